@@ -5,7 +5,7 @@
 from dataclasses import replace
 
 from armid_ros.diagnosis.data.evidence import Evidence, noise_floor
-from armid_ros.diagnosis.search.cause import SelectedEffect
+from armid_ros.diagnosis.search.cause import NamedEffect
 from armid_ros.diagnosis.search.explanation import Explanation
 from armid_ros.diagnosis.search.posterior import JointFit
 from armid_ros.diagnosis.settings import DiagnosisSettings
@@ -34,8 +34,8 @@ def sprung(bench):
     """Return what a spring in the elbow explains of recordings of an arm that has one."""
     evidence = evidence_of(bench, spring, 0)
     problem = JointFit.over_noise(bench.arm, evidence, np.random.default_rng(0))
-    named = SelectedEffect(CATALOGUE['joint_spring'].on(bench.robot, ('elbow',)), (0, 1))
-    fitted = problem.fit([named], [np.zeros(2)])
+    effect = CATALOGUE['joint_spring'].on(bench.robot, ('elbow',))
+    fitted = problem.fit([NamedEffect(effect, (0, 1), np.zeros(2))])
     assert fitted.estimate.values[0] == pytest.approx(1.5, abs=3.0 * fitted.estimate.std[0])
     return Explanation(bench.arm, fitted, problem.fit(), (), None, evidence, problem=problem)
 

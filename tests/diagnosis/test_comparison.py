@@ -7,7 +7,6 @@ from types import SimpleNamespace
 from armid_ros.diagnosis.data.days import Rows
 from armid_ros.diagnosis.data.trajectory import trajectories
 from armid_ros.diagnosis.search.candidates import Causes, value_unit
-from armid_ros.diagnosis.search.cause import SelectedEffect
 from armid_ros.diagnosis.search.comparison import CauseComparison
 from armid_ros.diagnosis.search.nuisance import Nuisance
 from armid_ros.diagnosis.search.odds import (
@@ -178,5 +177,5 @@ def test_a_value_that_motion_hardly_shows_has_a_possible_size(nuisance):
     """Gravity almost along an axis: an encoder offset of a million turns would explain a gap."""
     effect = CATALOGUE['encoder_offset'].on(nuisance.arm.robot, ('elbow',))
     columns = [np.full((*part.unsure.shape, 1), 1e-6) for part in nuisance.rows.data]
-    unit = value_unit(nuisance, SelectedEffect(effect, (0,)), columns)
+    unit = value_unit(nuisance, effect, (0,), columns)
     assert unit.item() == effect.quantities[0].largest('elbow', nuisance.arm.robot) < np.pi

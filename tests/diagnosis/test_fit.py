@@ -3,7 +3,7 @@
 """The fit of what was named."""
 
 from armid_ros.diagnosis.data.evidence import Evidence, noise_floor
-from armid_ros.diagnosis.search.cause import SelectedEffect
+from armid_ros.diagnosis.search.cause import NamedEffect
 from armid_ros.diagnosis.search.patch import Patch, patch_columns
 from armid_ros.diagnosis.search.posterior import JointFit
 from armid_ros.effects import CATALOGUE
@@ -23,7 +23,7 @@ def test_what_does_nothing_along_the_motion_is_not_told(bench):
     problem = JointFit.over_noise(
         bench.arm, Evidence.over_noise(data, sigma), np.random.default_rng(0)
     )
-    fitted = problem.fit([SelectedEffect(strap.with_shape(shape), (0,))], [np.zeros(1)])
+    fitted = problem.fit([NamedEffect(strap.with_shape(shape), (0,), np.zeros(1))])
     assert np.all(np.isinf(fitted.estimate.std))
 
 
@@ -40,7 +40,7 @@ def test_columns_of_a_shape_are_the_derivative_of_the_torque(bench, name, shape,
     (part,) = cut(bench.recordings()[:1])
     effect = CATALOGUE[name].on(bench.robot, ('elbow',)).with_shape(shape)
     kept = tuple(range(len(values)))
-    state = Patch(bench.arm, (SelectedEffect(effect, kept),), (np.array(values),))
+    state = Patch(bench.arm, (NamedEffect(effect, kept, np.array(values)),))
     columns = patch_columns(state, part)[0][:, :, len(values) :]
     for index in range(len(shape)):
         step = 1e-3 * max(abs(shape[index]), 0.01) * np.eye(len(shape))[index]

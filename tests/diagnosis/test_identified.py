@@ -8,7 +8,7 @@ from armid_ros.diagnosis import diagnose, known_misfit
 from armid_ros.diagnosis.data.baseline import described_precision
 from armid_ros.diagnosis.data.evidence import Evidence
 from armid_ros.diagnosis.data.trajectory import trajectories
-from armid_ros.diagnosis.search.cause import SelectedEffect
+from armid_ros.diagnosis.search.cause import NamedEffect
 from armid_ros.diagnosis.search.posterior import JointFit
 from armid_ros.effects import CATALOGUE
 from armid_ros.identification import identify, SignalSettings
@@ -49,7 +49,8 @@ def test_a_value_is_as_unsure_as_the_model_that_it_makes_up_for(bench):
     recordings = bench.recordings(lambda m, tau: np.array([0.0, 0.4]) * m.q)
     data = tuple(trajectories(recordings, conditioning(recordings, SignalSettings()), bench.arm))
     evidence = Evidence.over_noise(data, tuple(np.full(2, 0.03) for _ in data))
-    named = [SelectedEffect(CATALOGUE['joint_spring'].on(bench.robot, ('elbow',)), (0, 1))]
+    effect = CATALOGUE['joint_spring'].on(bench.robot, ('elbow',))
+    named = [NamedEffect(effect, (0, 1), np.zeros(2))]
     errors, as_exact = [], []
     for _ in range(40):
         theta = bench.arm.theta
@@ -57,7 +58,7 @@ def test_a_value_is_as_unsure_as_the_model_that_it_makes_up_for(bench):
         arm = bench.arm.with_theta(theta)
         problem = JointFit.over_noise(arm, evidence, np.random.default_rng(0), told)
         for fits, found in ((problem, errors), (problem.as_described(), as_exact)):
-            estimate = fits.fit(named, [np.zeros(2)]).estimate
+            estimate = fits.fit(named).estimate
             found.append((estimate.values[0] - 0.4) / estimate.std[0])
     assert np.mean(np.abs(errors) < 2.0) >= 0.9
     assert np.mean(np.abs(as_exact) < 2.0) < 0.7, as_exact

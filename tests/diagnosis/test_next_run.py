@@ -9,7 +9,7 @@ from armid_ros.arm import ArmModel
 from armid_ros.diagnosis import diagnose, next_run
 from armid_ros.diagnosis.data.evidence import Evidence, noise_floor
 from armid_ros.diagnosis.next_run.separation import Doubt, Load, Separation
-from armid_ros.diagnosis.search.cause import SelectedEffect
+from armid_ros.diagnosis.search.cause import NamedEffect
 from armid_ros.diagnosis.search.posterior import JointFit
 from armid_ros.effects import CATALOGUE
 from armid_ros.errors import TrajectoryError
@@ -140,7 +140,7 @@ def test_the_run_separates_the_names_as_far_as_was_said(bench, doubtful, chosen)
     def squares(name):
         effect = CATALOGUE[name].on(bench.robot, ('elbow',))
         kept = tuple(range(len(effect.parameters(bench.robot))))
-        fitted = problem.fit([SelectedEffect(effect, kept)], [np.zeros(len(kept))])
+        fitted = problem.fit([NamedEffect(effect, kept, np.zeros(len(kept)))])
         return float(np.sum(evidence.chi2_per_row(evidence.residuals(fitted.arm)) * rows))
 
     own = squares('torque_offset')
@@ -164,13 +164,13 @@ def test_only_a_known_payload_tells_a_gain_from_the_mass():
         data=[SimpleNamespace(used=used)],
         explanation=SimpleNamespace(
             given=SimpleNamespace(effects=(), values=()),
-            fitted=SimpleNamespace(named=[SelectedEffect(gain, (0,))]),
+            fitted=SimpleNamespace(named=[NamedEffect(gain, (0,), np.zeros(1))]),
             evidence=SimpleNamespace(sigma=[np.array([0.02])]),
         ),
     )
     trajectory = FourierTrajectory(
         robot.joints, 8.0, np.zeros(1), np.array([[0.8, 1.0]]), np.array([[0.5, 0.4]])
     )
-    doubt = Doubt(SelectedEffect(gain, (0,)), CATALOGUE['link_inertia'].on(robot))
+    doubt = Doubt(NamedEffect(gain, (0,), np.zeros(1)), CATALOGUE['link_inertia'].on(robot))
     assert Separation.of(found, doubt, trajectory).z < 1e-3
     assert Separation.of(found, doubt, trajectory, load=Load(1.0, 'bob')).z > 10.0

@@ -6,7 +6,6 @@ from types import SimpleNamespace
 
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis import diagnose
-from armid_ros.diagnosis.search.cause import SelectedEffect
 from armid_ros.diagnosis.search.explanation import Explanation
 from armid_ros.diagnosis.search.trial import Trial
 from armid_ros.diagnosis.verdict.same_body import is_same_body, on_outer_link
@@ -51,9 +50,22 @@ def test_a_payload_is_named_with_its_mass(request, arm, friction):
 def load_on(joint, first_moments, rivals=()):
     """Return a cause: a payload of 0.7 kg on the link of a joint."""
     values = np.array([0.7, *first_moments, *(6 * [0.01])])
-    effect = SelectedEffect(PayloadChange((joint,)), tuple(range(10)))
     each = np.full(10, 1e-3)
-    return Trial(effect, values, each, each, each, 1.0, 9.0, 9.0, 1.0, 1, 0.45, rivals)
+    return Trial(
+        PayloadChange((joint,)),
+        tuple(range(10)),
+        values,
+        each,
+        each,
+        each,
+        1.0,
+        9.0,
+        9.0,
+        1.0,
+        1,
+        0.45,
+        rivals,
+    )
 
 
 @pytest.mark.parametrize(
@@ -73,8 +85,8 @@ def test_a_load_on_the_axis_of_a_joint_is_assumed_on_the_outer_link(
     rival = load_on(outer, other)
     trial = load_on(joint, moments, (rival,))
     assert is_same_body(trial, rival, arm.robot) == same
-    fitted = SimpleNamespace(named=(trial.named,), values=(trial.values,))
-    problem = SimpleNamespace(fit=lambda named, values: (named, values))
+    fitted = SimpleNamespace(named=(None,))
+    problem = SimpleNamespace(fit=lambda named: named)
     found = Explanation(arm, fitted, fitted, (trial,), None, None, problem=problem)
     (step,) = on_outer_link(found).steps
     assert step.effect.joints == ((outer,) if same else (joint,))

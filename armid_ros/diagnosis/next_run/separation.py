@@ -15,7 +15,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from armid_ros.arm import ArmModel
-from armid_ros.diagnosis.search.cause import SelectedEffect
+from armid_ros.diagnosis.search.cause import NamedEffect
 from armid_ros.diagnosis.verdict.finding import Diagnosis
 from armid_ros.effects import Effect
 from armid_ros.excitation import FourierTrajectory
@@ -48,14 +48,14 @@ class Doubt:
 
     Attributes
     ----------
-    named : SelectedEffect
+    named : NamedEffect
         The named effect, as fitted.
     rival : Effect
         The rival.
 
     """
 
-    named: SelectedEffect
+    named: NamedEffect
     rival: Effect
 
     @property

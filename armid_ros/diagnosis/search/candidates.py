@@ -21,7 +21,7 @@ from types import MappingProxyType
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.data.days import Rows
 from armid_ros.diagnosis.data.trajectory import Trajectory
-from armid_ros.diagnosis.search.cause import Cause, SelectedEffect
+from armid_ros.diagnosis.search.cause import Cause
 from armid_ros.diagnosis.search.nuisance import Nuisance
 from armid_ros.diagnosis.search.odds import CauseInformation, odds
 from armid_ros.diagnosis.search.priors import HOW_OFTEN, log_prior
@@ -179,7 +179,8 @@ class Causes:
         columns = [x[:, :, list(cause.kept)] for x in self._columns(cause.effect)]
         return cause_of(
             self.nuisance,
-            SelectedEffect(cause.effect, cause.kept),
+            cause.effect,
+            cause.kept,
             columns,
             cause.unit,
             cause.prior,
@@ -214,9 +215,10 @@ class Causes:
             return None
         return cause_of(
             self.nuisance,
-            SelectedEffect(effect, tuple(kept[k] for k in np.flatnonzero(seen).tolist())),
+            effect,
+            tuple(kept[k] for k in np.flatnonzero(seen).tolist()),
             [x[:, :, seen] for x in columns],
-            _unit(SelectedEffect(effect, kept), torque, rows, robot)[seen],
+            _unit(effect, kept, torque, rows, robot)[seen],
             log_prior(effect, robot, self.changed)
             + HOW_OFTEN[self.prior.get(effect.said_as, 'usual')],
             torque[:, seen],
@@ -238,31 +240,33 @@ def _at_rest(columns: Sequence[FloatArray], rows: Rows) -> float:
     return float(np.mean(np.concatenate(zero)))
 
 
-def _unit(own: SelectedEffect, torque: FloatArray, rows: Rows, robot: Robot) -> FloatArray:
+def _unit(
+    effect: Effect, kept: Sequence[int], torque: FloatArray, rows: Rows, robot: Robot
+) -> FloatArray:
     """Return values whose torque equals that of the joint, limited to plausible values."""
-    effect, kept = own.effect, list(own.kept)
     spread = effect.spread(robot)
     if len(spread) == len(effect.owners) * len(effect.quantities):
         most = [q.largest(owner, robot) for owner in effect.owners for q in effect.quantities]
         spread = np.where(np.isinf(spread), most, spread)
-    spread = spread[kept]
+    spread = spread[list(kept)]
     if effect.adds_to(robot):  # a load and a link error have the same columns
-        spread = (float(robot.rigid_parameters[::10].sum()) * _BODY)[kept]
+        spread = (float(robot.rigid_parameters[::10].sum()) * _BODY)[list(kept)]
     largest = 1.0 / np.maximum(np.max(torque / rows.torque[:, np.newaxis], axis=0), 1e-12)
     return np.asarray(np.minimum(largest, np.where(spread > 0.0, spread, np.inf)))
 
 
 def value_unit(
-    nuisance: Nuisance, own: SelectedEffect, columns: Sequence[FloatArray]
+    nuisance: Nuisance, effect: Effect, kept: Sequence[int], columns: Sequence[FloatArray]
 ) -> FloatArray:
     """Return the unit of the values of an effect, (p,), from its columns (M, n, p)."""
     rows = nuisance.rows
-    return _unit(own, _torque_of(columns, rows), rows, nuisance.arm.robot)
+    return _unit(effect, kept, _torque_of(columns, rows), rows, nuisance.arm.robot)
 
 
 def cause_of(
     nuisance: Nuisance,
-    own: SelectedEffect,
+    effect: Effect,
+    kept: tuple[int, ...],
     columns: Sequence[FloatArray],
     unit: FloatArray,
     prior: float = 0.0,
@@ -275,8 +279,10 @@ def cause_of(
     ----------
     nuisance : Nuisance
         The data.
-    own : SelectedEffect
-        Effect and values.
+    effect : Effect
+        The effect, with its joints and shape.
+    kept : tuple of int
+        Its parameters that are fitted.
     columns : sequence of ndarray, each (M, n, p)
         Columns in each trajectory.
     unit : ndarray, shape (p,)
@@ -300,8 +306,8 @@ def cause_of(
         aim.append(flat.T @ y[joints].ravel())
         squares.append(flat.T @ flat)
     return Cause(
-        own.effect,
-        own.kept,
+        effect,
+        kept,
         unit,
         prior,
         tuple(joints),

@@ -65,11 +65,11 @@ class Cause:
         """Return whether the cause acts in each recording or group: today, or on both days."""
         return np.ones_like(today) if self.effect.lasting else today
 
-    def whole(self, values: FloatArray, robot: Robot) -> FloatArray:
-        """Return all parameters of the effect: the fitted values, and zero for the others."""
+    def at(self, values: FloatArray, robot: Robot) -> NamedEffect:
+        """Return the effect with its fitted values; its other parameters are zero."""
         whole = np.zeros(len(self.effect.parameters(robot)))
         whole[list(self.kept)] = values
-        return whole
+        return NamedEffect(self.effect, self.kept, whole)
 
     def among(self, effect: Effect, values: npt.NDArray[np.intp], shapes: int) -> Cause:
         """Return the cause with a subset of its values, for an effect on fewer joints."""
@@ -141,9 +141,9 @@ class CauseTerm:
 
 
 @dataclass(frozen=True)
-class SelectedEffect:
+class NamedEffect:
     """
-    A named effect with the choice of its fitted parameters.
+    A named effect with its values.
 
     Attributes
     ----------
@@ -151,8 +151,11 @@ class SelectedEffect:
         Joints and shape.
     kept : tuple of int
         Its parameters that are fitted; the others are zero.
+    values : ndarray, shape (P,)
+        Values of all its parameters.
 
     """
 
     effect: Effect
     kept: tuple[int, ...]
+    values: FloatArray

@@ -159,7 +159,8 @@ class Explainer:
         means = nuisance.means(result.under)
         for one, span in zip(nuisance.accepted, nuisance.spans, strict=True):
             if not one.cause.effect.joints:
-                arm = with_named(arm, one.cause.effect, one.cause.whole(means[span], arm.robot))
+                named = one.cause.at(means[span], arm.robot)
+                arm = with_named(arm, named.effect, named.values)
         return arm.body.gravity
 
     def _magnitude(self, result: Result) -> tuple[float | None, tuple[str, ...]]:

@@ -8,7 +8,7 @@ from collections.abc import Collection, Iterator, Sequence
 from dataclasses import replace
 
 from armid_ros.diagnosis.data.evidence import Evidence
-from armid_ros.diagnosis.search.cause import SelectedEffect
+from armid_ros.diagnosis.search.cause import NamedEffect
 from armid_ros.diagnosis.search.comparison import Result
 from armid_ros.diagnosis.search.explanation import Explanation
 from armid_ros.diagnosis.search.posterior import Fitted, JointFit
@@ -50,7 +50,7 @@ def explain(
     """
     robot, material, alarm = problem.arm.robot, settings.material, settings.thresholds.alarm
     fitted, steps = known or (None, ())
-    named, values = (list(fitted.named), list(fitted.values)) if fitted else ([], [])
+    named = list(fitted.named) if fitted else []
     steps, small = list(steps), list[Trial]()
     means = result.nuisance.means(result.under)
     for one, span in zip(result.accepted, result.nuisance.spans, strict=True):
@@ -63,21 +63,19 @@ def explain(
         if not np.any(made >= material * result.nuisance.rows.torque):
             small.append(trial)
             continue
-        named.append(SelectedEffect(cause.effect, cause.kept))
-        values.append(cause.whole(means[span], robot))
+        named.append(cause.at(means[span], robot))
         steps.append(trial)
     there = [trial for trial in _open(result, unknown, settings) if trial.odds > alarm]
     large = {t.effect.name for t in there if np.any(np.abs(t.values) >= t.least)}
     for trial in there:  # fit it in all joints, or its torque biases other values
         if trial.effect.name in large:
-            named.append(trial.named)
-            values.append(trial.values)
+            named.append(NamedEffect(trial.effect, trial.kept, trial.values))
             steps.append(trial)
         else:
             small.append(trial)
     return Explanation(
         problem.arm,
-        problem.fit(named, values),
+        problem.fit(named),
         problem.fit(),
         tuple(steps),
         survey_of(result, unknown, settings, [trial.key for trial in steps]),
@@ -122,7 +120,8 @@ def _open(
         odds = 0.5 * (means[k] ** 2 / variance + np.log(held * variance))
         seen = float(np.clip(1.0 - variance * held, 0.0, 1.0))
         yield Trial(
-            SelectedEffect(effect, (0,)),
+            effect,
+            (0,),
             means[k : k + 1],
             np.sqrt([variance]),
             np.array([seen]),

@@ -78,9 +78,7 @@ class Explanation:
     def only(self, keep: Sequence[int]) -> Explanation:
         """Return the explanation with some of its causes, refitted, in the given order."""
         assert self.problem is not None
-        own = self.fitted
-        named, values = [own.named[k] for k in keep], [own.values[k] for k in keep]
-        fitted = self.problem.fit(named, values)
+        fitted = self.problem.fit([self.fitted.named[k] for k in keep])
         return replace(self, fitted=fitted, steps=tuple(self.steps[k] for k in keep))
 
     def with_nothing_named(self) -> Explanation:

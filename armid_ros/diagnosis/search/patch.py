@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -11,7 +12,7 @@ from armid_ros.arm import ArmModel
 from armid_ros.arm.memoized_arm import memoized_arm
 from armid_ros.arm.model_file import with_named
 from armid_ros.diagnosis.data.trajectory import Trajectory
-from armid_ros.diagnosis.search.cause import SelectedEffect
+from armid_ros.diagnosis.search.cause import NamedEffect
 from armid_ros.effects import Effect, TorqueReading
 from armid_ros.estimate import ParameterName
 from armid_ros.motion import FloatArray, Motion
@@ -26,71 +27,67 @@ _STEP = 1e-3
 @dataclass(frozen=True)
 class Patch:
     """
-    An arm, the named effects, and the present values.
+    An arm and the named effects at the present values.
 
     Attributes
     ----------
     arm : ArmModel
         The arm without the named effects.
-    named : tuple of SelectedEffect
-        Effects, with their present shapes.
-    values : tuple of ndarray
-        All parameters of each effect.
+    named : tuple of NamedEffect
+        Effects, with their present shapes and values.
 
     """
 
     arm: ArmModel
-    named: tuple[SelectedEffect, ...]
-    values: tuple[FloatArray, ...]
+    named: tuple[NamedEffect, ...]
 
     @cached_property
     def model(self) -> ArmModel:
         """Return the arm with the named effects."""
         model = self.arm
-        for own, values in zip(self.named, self.values, strict=True):
-            model = with_named(model, own.effect, values)
-        return model
-
-    @property
-    def places(self) -> tuple[tuple[range, range], ...]:
-        """Positions of values and of shapes of each named effect among the fitted parameters."""
-        places, start = [], 0
         for own in self.named:
-            shapes = start + len(own.kept)
-            stop = shapes + len(own.effect.shape)
-            places.append((range(start, shapes), range(shapes, stop)))
-            start = stop
-        return tuple(places)
+            model = with_named(model, own.effect, own.values)
+        return model
 
     def moved(self, change: FloatArray) -> Patch:
         """Return the patch after a step of all fitted parameters, within bounds."""
-        named, values = list[SelectedEffect](), list[FloatArray]()
-        for own, old, (place, shapes) in zip(self.named, self.values, self.places, strict=True):
+        named = list[NamedEffect]()
+        for own, (place, shapes) in zip(self.named, places(self.named), strict=True):
             effect, kept = own.effect, list(own.kept)
             lower, upper = room(effect, self.arm)
-            new = old.copy()
-            new[kept] += change[list(place)]
-            values.append(np.clip(new, lower, upper))
+            values = own.values.copy()
+            values[kept] += change[list(place)]
             if shapes:
                 low, high, step = _shape_bounds(effect)
                 shape = np.array(effect.shape)
                 limit = np.maximum(_SHAPE_STEP * np.abs(shape), 30.0 * step)
                 shape = shape + np.clip(change[list(shapes)], -limit, limit)
                 effect = effect.with_shape(np.clip(shape, low, high))
-            named.append(SelectedEffect(effect, own.kept))
-        return Patch(self.arm, tuple(named), tuple(values))
+            named.append(NamedEffect(effect, own.kept, np.clip(values, lower, upper)))
+        return Patch(self.arm, tuple(named))
 
     def parameters(self) -> tuple[tuple[ParameterName, ...], FloatArray]:
         """Return names and values of the fitted parameters of each effect, its shapes last."""
         names: list[ParameterName] = []
         numbers: list[float] = []
-        for own, values in zip(self.named, self.values, strict=True):
+        for own in self.named:
             all_names = own.effect.parameters(self.arm.robot)
             names += [all_names[k] for k in own.kept]
-            numbers += [float(values[k]) for k in own.kept]
+            numbers += [float(own.values[k]) for k in own.kept]
             names += own.effect.shape_parameters(self.arm.robot)
             numbers += list(own.effect.shape)
         return tuple(names), np.array(numbers)
+
+
+def places(named: Sequence[NamedEffect]) -> list[tuple[range, range]]:
+    """Return the positions of values and of shapes of each effect among the fitted parameters."""
+    found, start = [], 0
+    for own in named:
+        shapes = start + len(own.kept)
+        stop = shapes + len(own.effect.shape)
+        found.append((range(start, shapes), range(shapes, stop)))
+        start = stop
+    return found
 
 
 def room(effect: Effect, arm: ArmModel) -> tuple[FloatArray, FloatArray]:

@@ -20,9 +20,9 @@ from armid_ros.arm.memoized_arm import memoized_arm
 from armid_ros.diagnosis.data.days import Rows
 from armid_ros.diagnosis.data.evidence import Evidence
 from armid_ros.diagnosis.search.candidates import cause_of, value_unit
-from armid_ros.diagnosis.search.cause import Cause, SelectedEffect
+from armid_ros.diagnosis.search.cause import Cause, NamedEffect
 from armid_ros.diagnosis.search.nuisance import Nuisance
-from armid_ros.diagnosis.search.patch import Patch, patch_columns
+from armid_ros.diagnosis.search.patch import Patch, patch_columns, places
 from armid_ros.diagnosis.search.setting import LASTING, Marginal, Setting
 from armid_ros.effects.gravity import GravityVector
 from armid_ros.estimate import Estimate
@@ -56,10 +56,8 @@ class Fitted:
     ----------
     arm : ArmModel
         The arm; the named effects are its last ones.
-    named : tuple of SelectedEffect
-        The named effects, with their fitted shapes.
-    values : tuple of ndarray
-        All values of each named effect.
+    named : tuple of NamedEffect
+        The named effects, with their fitted shapes and values.
     estimate : Estimate
         Estimate of the fitted parameters of the named effects, shapes included; the variance of a
         value that data do not determine is infinite.
@@ -69,15 +67,9 @@ class Fitted:
     """
 
     arm: ArmModel
-    named: tuple[SelectedEffect, ...]
-    values: tuple[FloatArray, ...]
+    named: tuple[NamedEffect, ...]
     estimate: Estimate
     means: FloatArray
-
-    @property
-    def places(self) -> tuple[tuple[range, range], ...]:
-        """Positions of values and of shapes of each named effect in the estimate."""
-        return Patch(self.arm, self.named, self.values).places
 
 
 @dataclass(frozen=True)
@@ -145,36 +137,32 @@ class JointFit:
         """Whether the body of the arm is refitted."""
         return self.stated and self.setting.body > 0.0
 
-    def fit(
-        self, named: Sequence[SelectedEffect] = (), values: Sequence[FloatArray] = ()
-    ) -> Fitted:
+    def fit(self, named: Sequence[NamedEffect] = ()) -> Fitted:
         """
         Fit the values of named effects.
 
         Parameters
         ----------
-        named : sequence of SelectedEffect
-            The effects.
-        values : sequence of ndarray
-            Initial values of all parameters of each effect.
+        named : sequence of NamedEffect
+            The effects at their initial values.
 
         """
-        state = Patch(self.arm, tuple(named), tuple(values))
-        linear = self.linear(state)
+        state = Patch(self.arm, tuple(named))
+        linear = self.linear(named)
         under = linear.marginal(self.setting, self.recordings)
         loss = self._loss(state)
         for _ in range(_MOST_ROUNDS if named else 0):
             means = linear.means(under)
             step = means[linear.spans[0].start : linear.spans[len(named) - 1].stop]
-            for own, now, (kept, _) in zip(state.named, state.values, state.places, strict=True):
-                step[kept.start : kept.stop] -= now[list(own.kept)]
+            for own, (kept, _) in zip(state.named, places(named), strict=True):
+                step[kept.start : kept.stop] -= own.values[list(own.kept)]
             tried = (state.moved(share * step) for share in _SHARES)
             better = ((self._loss(one), one) for one in tried)
             new, moved = next(((x, one) for x, one in better if x < loss), (loss, state))
             if moved is state:
                 break
             settled = loss - new < _SETTLED * max(abs(new), 1e-12)
-            state, linear = moved, self.linear(moved)
+            state, linear = moved, self.linear(moved.named)
             under, loss = linear.marginal(self.setting, self.recordings), new
             if settled:
                 break
@@ -192,9 +180,7 @@ class JointFit:
         open_ones = np.diag(covariance)[size:] > (1.0 - _DETERMINED) * before
         found[open_ones], found[:, open_ones] = 0.0, 0.0
         found[open_ones, open_ones] = np.inf
-        return Fitted(
-            arm, state.named, state.values, Estimate(names, numbers, found), means[:size]
-        )
+        return Fitted(arm, state.named, Estimate(names, numbers, found), means[:size])
 
     def _arm(self, state: Patch, means: FloatArray) -> ArmModel:
         """Return the arm with the named causes, and with fitted body and friction if stated."""
@@ -203,13 +189,11 @@ class JointFit:
             return state.model
         base, theta = self.nuisance.base, self.arm.theta
         moved = self.arm.with_theta(base.lift(base.values(theta) + change, theta))
-        return Patch(moved, state.named, state.values).model
+        return Patch(moved, state.named).model
 
-    def with_names_at(
-        self, named: Sequence[SelectedEffect], values: Sequence[FloatArray]
-    ) -> ArmModel:
+    def with_names_at(self, named: Sequence[NamedEffect]) -> ArmModel:
         """Return the arm with named causes at given values, all other parameters fitted."""
-        state = Patch(self.arm, tuple(named), tuple(values))
+        state = Patch(self.arm, tuple(named))
         there = self.nuisance.with_residual(self._weighted(state.model))
         return self._arm(state, there.means(there.marginal(self.setting, self.recordings)))
 
@@ -282,29 +266,31 @@ class JointFit:
         under = both.marginal(self.setting, self.recordings)
         return both.means(under)[size : len(means)] - means[size:]
 
-    def linear(self, state: Patch) -> Nuisance:
-        """Return the columns of nuisance parameters and named causes, linearised at a state."""
-        if not state.named:
+    def linear(self, named: Sequence[NamedEffect]) -> Nuisance:
+        """Return the columns of nuisance parameters and named causes, linearised at values."""
+        if not named:
             return self.nuisance
+        state = Patch(self.arm, tuple(named))
         rows, result = self.nuisance.rows, self.nuisance
         fitted = [k for k, part in enumerate(rows.data) if part.fold in self.recordings]
         blocks = {k: patch_columns(state, rows.data[k]) for k in fitted}
         made = list[Cause]()
         torque = [np.zeros((*part.unsure.shape, 1)) for part in rows.data]
-        for n, (own, values) in enumerate(zip(state.named, state.values, strict=True)):
+        for n, own in enumerate(named):
             count, kept = blocks[fitted[0]][n].shape[2], list(own.kept)
             columns = [
                 blocks[k][n] if k in blocks else np.zeros((*part.unsure.shape, count))
                 for k, part in enumerate(rows.data)
             ]
             only = [x[:, :, : len(kept)] for x in columns]
-            unit = value_unit(self.nuisance, own, only)
+            unit = value_unit(self.nuisance, own.effect, own.kept, only)
             least = [abs(s.default) or _NO_DEFAULT for s in own.effect.shapes]
             size = np.tile(least, len(own.effect.owners))
             shapes = _SHAPE * np.maximum(np.abs(own.effect.shape), size)
-            made.append(cause_of(result, own, columns, np.concatenate([unit, shapes])))
+            unit = np.concatenate([unit, shapes])
+            made.append(cause_of(result, own.effect, own.kept, columns, unit))
             for total, x in zip(torque, only, strict=True):
-                total[:, :, 0] += x @ values[kept]
+                total[:, :, 0] += x @ own.values[kept]
         for cause in made:
             known = None
             if self.gravity is not None and isinstance(cause.effect, GravityVector):

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TypeAlias
 
-from armid_ros.diagnosis.search.cause import Cause, SelectedEffect
+from armid_ros.diagnosis.search.cause import Cause
 from armid_ros.diagnosis.search.nuisance import Nuisance
 from armid_ros.diagnosis.search.odds import CauseFit, CauseInformation, odds
 from armid_ros.diagnosis.search.setting import Marginal
@@ -28,8 +28,10 @@ class Trial:
 
     Attributes
     ----------
-    named : SelectedEffect
-        The cause.
+    effect : Effect
+        The effect, with its joints and shape.
+    kept : tuple of int
+        Its parameters that are fitted; the others are zero.
     values, std : ndarray, shape (p,)
         Its values and their standard deviations.
     resolution : ndarray, shape (p,)
@@ -53,7 +55,8 @@ class Trial:
 
     """
 
-    named: SelectedEffect
+    effect: Effect
+    kept: tuple[int, ...]
     values: FloatArray
     std: FloatArray
     resolution: FloatArray
@@ -67,14 +70,9 @@ class Trial:
     rivals: tuple[Trial, ...] = ()
 
     @property
-    def effect(self) -> Effect:
-        """Return the effect of the cause."""
-        return self.named.effect
-
-    @property
     def key(self) -> Key:
         """Identity of the cause in any shape: name, joints and quantities."""
-        return self.effect.name, self.effect.joints, self.named.kept
+        return self.effect.name, self.effect.joints, self.kept
 
     @property
     def p(self) -> float:
@@ -205,7 +203,8 @@ class Look:
         made = float(sum(fit.values @ cause.own[k] @ fit.values for k in today))
         torque = cause.torque * known.visible / nuisance.rows.torque[:, np.newaxis]
         return Trial(
-            SelectedEffect(cause.effect, cause.kept),
+            cause.effect,
+            cause.kept,
             fit.values,
             fit.std,
             fit.resolution,

@@ -18,11 +18,12 @@ from armid_ros.arm import ArmModel
 from armid_ros.arm.memoized_arm import memoized_arm
 from armid_ros.diagnosis.data.days import Rows
 from armid_ros.diagnosis.data.evidence import Evidence, noise_floor
-from armid_ros.diagnosis.search.cause import SelectedEffect
+from armid_ros.diagnosis.search.cause import NamedEffect
 from armid_ros.diagnosis.search.choice import Explainer
 from armid_ros.diagnosis.search.comparison import settings_alone
 from armid_ros.diagnosis.search.explain import explain, survey_of
 from armid_ros.diagnosis.search.explanation import at_floor, Chosen, Explanation, NOISE
+from armid_ros.diagnosis.search.patch import places
 from armid_ros.diagnosis.search.posterior import Fitted, JointFit
 from armid_ros.diagnosis.search.trial import Survey, Trial
 from armid_ros.effects.tied import Partner, Tied, TiedInteraction, TiedSlack
@@ -60,7 +61,7 @@ def diagnose_ties(
     explainer = replace(explainer, baseline=None, misfit=None)
     nothing = np.zeros(arm.robot.n_joints)
     ties = _Ties(explainer, tuple(recordings), partner)
-    named, values = ties.significant()
+    named = ties.significant()
     if not named:
         problem = JointFit.over_noise(arm, prepared.described, explainer.rng).as_described()
         described = problem.fit()
@@ -71,7 +72,7 @@ def diagnose_ties(
     evidence = Evidence.over_noise(prepared.data, prepared.sigma)
     for _ in range(2):  # the noise of spring angles is estimated only with fitted ties
         problem = JointFit.over_noise(arm, evidence, explainer.rng)
-        fitted = problem.fit(named, values)
+        fitted = problem.fit(named)
         sigma = [noise_floor(part, fitted.arm).sigma for part in prepared.data]
         evidence = Evidence.over_noise(prepared.data, sigma)
     trial, survey = _as_one_cause(explainer, evidence, partner, fitted)
@@ -108,7 +109,7 @@ class _Ties:
     recordings: tuple[Recording, ...]
     partner: Partner
 
-    def significant(self) -> tuple[list[SelectedEffect], list[FloatArray]]:
+    def significant(self) -> list[NamedEffect]:
         """Return significant ties with their values; ties with a common slack become straps."""
         arm = self.explainer.arm
         tried: list[tuple[float, InteractionProblem, Interaction]] = []
@@ -119,7 +120,7 @@ class _Ties:
             except IdentificationError:
                 continue
         if not tried:
-            return [], []
+            return []
         best = min(tried, key=lambda one: one[2].misfit)
         noise = max(1.0, best[2].misfit / best[1].tau.size)
         if tried[0][2].misfit - best[2].misfit < _LEAST_GAIN * noise:
@@ -129,15 +130,15 @@ class _Ties:
             weakest = int(np.argmin(found.stiffness / found.std))
             problem = problem.with_springs(np.delete(np.arange(len(found.segments)), weakest))
             if not problem.segments:
-                return [], []
+                return []
             found = identify_interaction(problem)
-        named, values = list[SelectedEffect](), list[FloatArray]()
+        named = list[NamedEffect]()
         for joint, stiffness in zip(problem.spring_joints, found.stiffness, strict=True):
             effect = self.partner.tied(arm.robot, (joint,), slack=bool(slack))
             effect = effect.with_shape([slack]) if slack else effect
-            named.append(SelectedEffect(effect, (0,)))
-            values.append(stiffness * np.eye(len(effect.parameters(arm.robot)))[0])
-        return named, values
+            values = stiffness * np.eye(len(effect.parameters(arm.robot)))[0]
+            named.append(NamedEffect(effect, (0,), values))
+        return named
 
     def without_bias(self, found: Explanation) -> Explanation:
         """
@@ -163,7 +164,7 @@ class _Ties:
         if known is not None and known.misfit - fitted.misfit < _TOLD * freed * noise:
             assert found.problem is not None
             problem, own = found.problem.as_described(), found.fitted
-            again = problem.fit(own.named, own.values)
+            again = problem.fit(own.named)
             found = replace(
                 found, fitted=again, reference=problem.fit(), problem=problem, refitted=False
             )
@@ -226,13 +227,15 @@ def _with_springs(explanation: Explanation, found: Interaction) -> Fitted:
     wider[where] = found.std / np.sqrt(np.diag(covariance)[where])
     if any(not isinstance(name.effect, Tied) for name in fitted.named):
         wider = np.maximum(wider, 1.0)
-    each = [one.copy() for one in fitted.values]
-    for name, own_values, place in zip(fitted.named, each, fitted.places, strict=True):
-        own_values[list(name.kept)] = values[list(place[0])]
+    named = list[NamedEffect]()
+    for own, place in zip(fitted.named, places(fitted.named), strict=True):
+        replaced = own.values.copy()
+        replaced[list(own.kept)] = values[list(place[0])]
+        named.append(replace(own, values=replaced))
     return replace(
         fitted,
-        arm=problem.with_names_at(fitted.named, each),
-        values=tuple(each),
+        arm=problem.with_names_at(named),
+        named=tuple(named),
         estimate=Estimate(fitted.estimate.parameters, values, covariance * np.outer(wider, wider)),
     )
 

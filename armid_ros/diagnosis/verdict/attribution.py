@@ -18,7 +18,6 @@ from armid_ros.diagnosis.data.evidence import Evidence
 from armid_ros.diagnosis.data.trajectory import block_rows
 from armid_ros.diagnosis.search.explanation import Explanation
 from armid_ros.diagnosis.search.nuisance import Nuisance
-from armid_ros.diagnosis.search.patch import Patch
 from armid_ros.diagnosis.search.posterior import JointFit
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.motion import FloatArray
@@ -120,7 +119,7 @@ def left_out(explanation: Explanation) -> Attribution:
     """Return the cross-validated gain of each cause, added in order of gain."""
     assert explanation.problem is not None
     problem, own = explanation.problem, explanation.fitted
-    linear = problem.linear(Patch(problem.arm, own.named, own.values))
+    linear = problem.linear(own.named)
     folds, spans = _folds(problem, linear), linear.spans
     count = len(own.named)
     remaining, order = list(range(count)), list[int]()

@@ -220,12 +220,12 @@ def smallest_size(trial: Trial, robot: Robot) -> tuple[int, float]:
     A detectable size is significant and material. It is inf if the parameter cannot reach it.
 
     """
-    return next(_sizes(trial, robot), (trial.named.kept[0], float('inf')))
+    return next(_sizes(trial, robot), (trial.kept[0], float('inf')))
 
 
 def _sizes(trial: Trial, robot: Robot) -> Iterator[tuple[int, float]]:
     """Yield every identifiable parameter of a cause with its smallest detectable size."""
-    rows = zip(trial.named.kept, trial.std, trial.resolution, trial.least, strict=True)
+    rows = zip(trial.kept, trial.std, trial.resolution, trial.least, strict=True)
     for index, std, resolution, least in rows:
         size = max(SHOWS * float(std), float(least))
         if resolution > _IDENTIFIABLE and is_possible(trial.effect, index, size, robot):
@@ -252,7 +252,7 @@ def _said_size(trial: Trial, arm: ArmModel) -> tuple[ParameterName, float]:
             called_so = said.name == effect.said_as and there > 0.0
             if called_so and is_possible(said, most, there, arm.robot):
                 return said.parameters(arm.robot)[most], there
-    return names[trial.named.kept[0]], float('inf')
+    return names[trial.kept[0]], float('inf')
 
 
 def is_possible(effect: Effect, index: int, size: float, robot: Robot) -> bool:

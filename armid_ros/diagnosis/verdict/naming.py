@@ -8,9 +8,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from armid_ros.arm import ArmModel
-from armid_ros.diagnosis.search.cause import SelectedEffect
+from armid_ros.diagnosis.search.cause import NamedEffect
 from armid_ros.diagnosis.search.explanation import Explanation
-from armid_ros.diagnosis.search.patch import room
+from armid_ros.diagnosis.search.patch import places, room
 from armid_ros.diagnosis.search.trial import Trial
 from armid_ros.diagnosis.verdict.attribution import Attribution
 from armid_ros.diagnosis.verdict.finding import Finding, Rival
@@ -30,7 +30,7 @@ _RIVALS = 2
 
 
 @dataclass(frozen=True)
-class _NamedEffect:
+class _Translation:
     """Fitted cause of an explanation, converted to an effect of the catalogue."""
 
     effect: Effect
@@ -96,7 +96,7 @@ def findings(
     return tuple(sorted(result, key=lambda one: -one.share))
 
 
-def _rows(parts: Sequence[_NamedEffect]) -> list[tuple[ParameterName, float, float]]:
+def _rows(parts: Sequence[_Translation]) -> list[tuple[ParameterName, float, float]]:
     """Return each parameter once, with the sum and standard deviation of its values."""
     rows: dict[ParameterName, tuple[float, float]] = {}
     for part in parts:
@@ -117,7 +117,7 @@ def small_print(explanation: Explanation) -> tuple[Finding, ...]:
     """
     arm, result = explanation.given, []
     for trial in sorted(explanation.minor, key=lambda trial: -trial.gain):
-        effect, kept = trial.effect, list(trial.named.kept)
+        effect, kept = trial.effect, list(trial.kept)
         lower, upper = (bound[kept] for bound in room(effect, arm))
         beyond = (trial.values < lower) | (trial.values > upper)
         if np.any(beyond & excludes_zero(trial.values, trial.std)):
@@ -142,18 +142,18 @@ def small_print(explanation: Explanation) -> tuple[Finding, ...]:
     return tuple(result)
 
 
-def _in_words(explanation: Explanation, arm: ArmModel) -> list[list[_NamedEffect]]:
+def _in_words(explanation: Explanation, arm: ArmModel) -> list[list[_Translation]]:
     """Translate each fitted cause of an explanation into effects of the catalogue."""
     fitted = explanation.fitted
     covariance = fitted.estimate.covariance
     result = []
-    for own, values, place in zip(fitted.named, fitted.values, fitted.places, strict=True):
+    for own, place in zip(fitted.named, places(fitted.named), strict=True):
         span = slice(place[0].start, place[1].stop)
-        words = own.effect.named_as(values, arm)
+        words = own.effect.named_as(own.values, arm)
         if len(words) == 1 and words[0][0] is own.effect:
             result.append(
                 [
-                    _NamedEffect(
+                    _Translation(
                         own.effect,
                         fitted.estimate.parameters[span],
                         fitted.estimate.values[span],
@@ -162,16 +162,14 @@ def _in_words(explanation: Explanation, arm: ArmModel) -> list[list[_NamedEffect
                 ]
             )
             continue
-        parts = _translated(own, values, covariance[span, span], arm)
+        parts = _translated(own, covariance[span, span], arm)
         result.append([part for part in parts if _determined(part)] or parts[:1])
     return result
 
 
-def _translated(
-    own: SelectedEffect, values: FloatArray, covariance: FloatArray, arm: ArmModel
-) -> list[_NamedEffect]:
+def _translated(own: NamedEffect, covariance: FloatArray, arm: ArmModel) -> list[_Translation]:
     """Translate an effect into others of the catalogue, with propagated standard deviations."""
-    effect, kept, parts = own.effect, list(own.kept), []
+    effect, kept, values, parts = own.effect, list(own.kept), own.values, []
     inside = np.zeros((len(values), len(values)))
     inside[np.ix_(kept, kept)] = covariance[: len(kept), : len(kept)]
     known = np.isfinite(np.diag(inside))
@@ -195,11 +193,11 @@ def _translated(
         if word.shape:
             names += word.shape_parameters(arm.robot)
             numbers, std = np.append(numbers, word.shape), np.append(std, of_shape)
-        parts.append(_NamedEffect(word, names, numbers, std))
+        parts.append(_Translation(word, names, numbers, std))
     return parts
 
 
-def _determined(part: _NamedEffect) -> bool:
+def _determined(part: _Translation) -> bool:
     """Return whether any value is significant (3 sigma) and not negligible."""
     typical = [q.typical[0] if q.typical else 0.0 for q in part.effect.quantities]
     count = len(part.values) - len(part.effect.shape)

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from armid_ros.diagnosis.search.cause import NamedEffect
 from armid_ros.diagnosis.search.explanation import as_bodies, Explanation
 from armid_ros.diagnosis.search.trial import Trial
 from armid_ros.effects.quantities import MIN_Z_SCORE
@@ -46,7 +47,7 @@ def is_same_body(one: Trial, other: Trial, robot: Robot) -> bool:
 def _values(trial: Trial) -> tuple[FloatArray, FloatArray]:
     """Return all values of a load, and their deviations, zero where they are not fitted."""
     values, std = np.zeros((2, len(LINK_PARAMETERS)))
-    kept = list(trial.named.kept)
+    kept = list(trial.kept)
     values[kept], std[kept] = trial.values, trial.std
     return values, std
 
@@ -70,10 +71,8 @@ def on_outer_link(explanation: Explanation) -> Explanation:
                 continue
             others = tuple(one for one in trial.rivals if one is not rival)
             moved = replace(rival, rivals=(replace(trial, rivals=()), *others))
-            again = explanation.problem.fit(
-                [*fitted.named[:k], rival.named, *fitted.named[k + 1 :]],
-                [*fitted.values[:k], _values(rival)[0], *fitted.values[k + 1 :]],
-            )
+            outer = NamedEffect(rival.effect, rival.kept, _values(rival)[0])
+            again = explanation.problem.fit([*fitted.named[:k], outer, *fitted.named[k + 1 :]])
             found = replace(explanation, fitted=again, steps=(*steps[:k], moved, *steps[k + 1 :]))
             return on_outer_link(found)
     return explanation

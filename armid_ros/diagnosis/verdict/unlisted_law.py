@@ -19,10 +19,9 @@ from dataclasses import dataclass, replace
 
 from armid_ros.diagnosis.data.discrepancy import hats
 from armid_ros.diagnosis.search.candidates import cause_of
-from armid_ros.diagnosis.search.cause import Cause, SelectedEffect
+from armid_ros.diagnosis.search.cause import Cause
 from armid_ros.diagnosis.search.explanation import Explanation
 from armid_ros.diagnosis.search.nuisance import Nuisance
-from armid_ros.diagnosis.search.patch import Patch
 from armid_ros.diagnosis.search.posterior import JointFit
 from armid_ros.diagnosis.search.priors import UNLISTED
 from armid_ros.diagnosis.settings import DiagnosisSettings, Thresholds
@@ -70,7 +69,7 @@ def unlisted_laws(explanation: Explanation, settings: DiagnosisSettings) -> list
     """
     problem, named, evidence = explanation.problem, explanation.fitted, explanation.evidence
     assert problem is not None
-    linear = problem.linear(Patch(problem.arm, named.named, named.values))
+    linear = problem.linear(named.named)
     rows, joints = linear.rows, linear.arm.robot.joints
     misfit = rows.amplitude[-1]
     limit = np.mean(np.square(evidence.sigma), axis=0) * (1.0 + evidence.matters(settings))
@@ -81,7 +80,7 @@ def unlisted_laws(explanation: Explanation, settings: DiagnosisSettings) -> list
         joint = joints.index(law.joints[0])
         columns = [law.columns(part.at_rows, linear.arm) for part in rows.data]
         unit = np.full(len(law.knots), misfit[joint])
-        cause, fits = cause_of(linear, SelectedEffect(law, ()), columns, unit), []
+        cause, fits = cause_of(linear, law, (), columns, unit), []
         for size in (_USUAL, *_NEW):
             with_law = linear.and_cause(cause, size)
             under = with_law.marginal(problem.setting, problem.recordings)

@@ -308,7 +308,7 @@ def candidates_section(diagnosis: Diagnosis) -> ContentSection:
 
 def _candidate_value(diagnosis: Diagnosis, trial: Trial) -> str:
     """Return the first value with its interval, 'includes 0' or 'not possible'."""
-    arm, effect, kept = diagnosis.arm, trial.effect, list(trial.named.kept)
+    arm, effect, kept = diagnosis.arm, trial.effect, list(trial.kept)
     if diagnosis.explanation is not None:
         arm = diagnosis.explanation.given
     lower, upper = (bound[kept] for bound in room(effect, arm))
