@@ -21,7 +21,7 @@ from armid_ros.diagnosis.data.trajectory import trajectories, Trajectory
 from armid_ros.diagnosis.doubt import doubt_of, doubted
 from armid_ros.diagnosis.prepare import choose_filters, mended, prepare, with_friction
 from armid_ros.diagnosis.search.choice import Explainer
-from armid_ros.diagnosis.search.explanation import Chosen, Explanation, NOISE
+from armid_ros.diagnosis.search.explanation import Explanation, NOISE
 from armid_ros.diagnosis.search.spans import acting_spans, Span
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.diagnosis.ties.ties import diagnose_ties
@@ -146,10 +146,10 @@ def diagnose(
         tied = diagnose_ties(explainer, recordings, settings.partner)
         if tied is not None:
             return _as_diagnosis(tied, notes, explainer, doubt, given)
-    chosen = explainer.chosen()
-    result = _as_diagnosis(chosen, notes, explainer, doubt, given)
+    explanation = explainer.explanation()
+    result = _as_diagnosis(explanation, notes, explainer, doubt, given)
     if _hardly_explained(result, settings):
-        timed = _of_spans(chosen, explainer, recordings, validate, notes, doubt)
+        timed = _of_spans(explanation, explainer, recordings, validate, notes, doubt)
         result = timed or result
     return _each_alone(result, ([*recordings, *validate], baseline), used, explainer)
 
@@ -161,7 +161,7 @@ def _hardly_explained(result: Diagnosis, settings: DiagnosisSettings) -> bool:
 
 
 def _of_spans(
-    chosen: Chosen,
+    explanation: Explanation,
     explainer: Explainer,
     recordings: Sequence[Recording],
     validate: Sequence[Recording],
@@ -170,7 +170,8 @@ def _of_spans(
 ) -> Diagnosis | None:
     """Diagnose only the time span in which a cause acts; None if no cause explains that gap."""
     settings, arm, prepared = explainer.settings, explainer.arm, explainer.prepared
-    spans = () if chosen.look is None else acting_spans(chosen.look, settings.thresholds)
+    look = explanation.look
+    spans = () if look is None else acting_spans(look, settings.thresholds)
     if all(one.whole for one in spans):
         return None
     timed = [*recordings, *validate][: len(spans)]
@@ -189,7 +190,7 @@ def _of_spans(
         prepared = prepare(arm, prepared.used, data, settings, explainer.rng, by_misfit)
         within = replace(explainer, prepared=prepared, unseen=unseen)
         notes = (*notes, *untimed)
-        found = _as_diagnosis(within.chosen(), notes, within, doubt, plain_arm(arm))
+        found = _as_diagnosis(within.explanation(), notes, within, doubt, plain_arm(arm))
     except IdentificationError:  # too short for the filters, or without motion
         return None
     if _hardly_explained(found, settings):
@@ -238,47 +239,53 @@ def _with_unfitted_joints(
 
 
 def _as_diagnosis(
-    chosen: Chosen, notes: Sequence[str], explainer: Explainer, doubt: str, given: ArmModel
+    explanation: Explanation,
+    notes: Sequence[str],
+    explainer: Explainer,
+    doubt: str,
+    given: ArmModel,
 ) -> Diagnosis:
     """Return the diagnosis of an explanation; shares are measured on held-out data."""
     arm, settings, before = explainer.arm, explainer.settings, explainer.baseline
     explainer.tell(0.85, 'held-out gap')
-    explanation, of_bodies = as_placed_bodies(chosen.explanation)
-    unseen = _held_out_evidence(explainer.unseen, explanation, chosen)
+    explanation, of_bodies = as_placed_bodies(explanation)
+    unseen = _held_out_evidence(explainer.unseen, explanation)
     least = settings.thresholds.headline
-    every = 0.0 if chosen.measured or settings.everything else least
+    every = 0.0 if explanation.measured or settings.everything else least
     explanation, shares = headline(explanation, unseen, every, settings)
     whole = shares.share(range(len(explanation.steps)))
-    if before is not None and chosen.untested and whole <= settings.thresholds.open_share:
+    if before is not None and explanation.untested and whole <= settings.thresholds.open_share:
         nothing = explanation.with_nothing_named()
         explanation, shares = headline(nothing, unseen, every, settings)
-    measured = RemainingMisfit(chosen, unseen, before, arm, settings)
+    both = (explanation.evidence, *(() if unseen is None else (unseen,)))
+    excess = RemainingMisfit(explanation, both, before, arm, settings)
     evidence, patched = explanation.evidence, explanation.fitted.arm
     found, minor = findings(explanation, shares, arm, explainer.rng), small_print(explanation)
-    worse = measured.harmed(explanation)
+    worse, whole_residual = excess.worse_joints(), excess.of_residual()
     floors = tuple(noise_floor(part, patched) for part in evidence.data)
-    left, resting = measured.beside(explanation), measured.resting(explanation)
-    laws = measured.laws(explanation)
+    resting, laws = excess.at_rest(), excess.of_laws()
     strange = not_repeating(floors, settings.thresholds, settings.material * evidence.torque_rms)
     explanation = explanation if found else replace(explanation, reference=explanation.fitted)
     gap = measure_gap(explanation, unseen)
     word = decide(
         found,
-        [arm.robot.joints[k] for k in strange] if chosen.measured else (),
-        [*left, *resting, *laws],
+        [arm.robot.joints[k] for k in strange] if explanation.measured else (),
+        [*whole_residual, *resting, *laws],
         arm,
-        NOISE if chosen.measured else chosen.floor_in_words,
-        measured.as_it_is(explanation),
+        NOISE if explanation.measured else explanation.floor,
+        excess.of_given_body(),
         minor,
         gap,
     )
     word, doubt = doubted(word, doubt, found, given, before)
-    open_in = measured.shown_in(left, explanation)
+    open_in = max(
+        zip(both, whole_residual, strict=True), key=lambda one: float(one[1].ratio.max())
+    )[0]
     new = np.max([np.zeros(arm.robot.n_joints), *(one.ratio for one in laws)], axis=0) > 1.0
     places = where_it_is(explanation, (unseen or evidence) if found else open_in, settings, new)
     explainer.tell(1.0, word.word)
     small = [one for one in found if settings.everything and one.share < least]
-    remarks = _remarks((found, patched), worse, chosen, word, doubt, explainer)
+    remarks = _remarks((found, patched), worse, explanation, word, doubt, explainer)
     return Diagnosis(
         verdict=word.word,
         summary=' '.join([word.summary, *remarks]),
@@ -292,8 +299,8 @@ def _as_diagnosis(
         data=tuple(evidence.data),
         not_visible=_not_visible(explanation, found, explainer),
         refitted=explanation.refitted,
-        notes=tuple(x for x in (*notes, *chosen.notes, *of_bodies) if x not in remarks),
-        baseline=chosen.floor_in_words,
+        notes=tuple(x for x in (*notes, *explanation.notes, *of_bodies) if x not in remarks),
+        baseline=explanation.floor,
         harmful=bool(found and worse),
         doubt=doubt,
     )
@@ -303,7 +310,8 @@ def _not_visible(
     explanation: Explanation, found: Sequence[Finding], explainer: Explainer
 ) -> tuple[str, ...]:
     """Return the effects that are not visible on any joint, in the order of the catalogue."""
-    hidden = set() if explanation.survey is None else explanation.survey.hidden
+    hidden = {name for name, _ in explanation.invisible}
+    hidden -= {one.effect.said_as for one in explanation.candidates}
     hidden -= {finding.name for finding in found}
     if explainer.baseline is None:  # effects fitted with every cause have their own values
         hidden -= {one.name for one in with_friction(explainer.arm, explainer.settings.library)[1]}
@@ -313,7 +321,7 @@ def _not_visible(
 def _remarks(
     result: tuple[Sequence[Finding], ArmModel],
     worse: Sequence[str],
-    chosen: Chosen,
+    explanation: Explanation,
     verdict: Verdict,
     doubt: str,
     explainer: Explainer,
@@ -323,7 +331,7 @@ def _remarks(
     names = ' and '.join(name_in_words(one.name) for one in found)
     remarks = {
         f'The model is not patched: {names} would make it worse in {", ".join(worse)}.': worse,
-        chosen.untested: verdict.word == 'unknown',
+        explanation.untested: verdict.word == 'unknown',
         doubt: verdict.word != 'consistent',  # then it precedes the verdict
     }
     then = () if explainer.baseline is None else explainer.baseline.data
@@ -331,14 +339,12 @@ def _remarks(
     return [*(text for text, told in remarks.items() if text and told), *of_data]
 
 
-def _held_out_evidence(
-    data: Sequence[Trajectory], explanation: Explanation, chosen: Chosen
-) -> Evidence | None:
+def _held_out_evidence(data: Sequence[Trajectory], explanation: Explanation) -> Evidence | None:
     """Return the held-out recordings, weighted by the noise, or the misfit if larger."""
     if not data:
         return None
     noise = [noise_floor(part, explanation.fitted.arm).sigma for part in data]
-    sigma = [np.maximum(one, chosen.misfit) for one in noise]
+    sigma = [np.maximum(one, explanation.misfit) for one in noise]
     return Evidence(tuple(data), tuple(sigma), tuple(noise), explanation.evidence.varies)
 
 

@@ -37,7 +37,7 @@ def sprung(bench):
     effect = CATALOGUE['joint_spring'].on(bench.robot, ('elbow',))
     fitted = problem.fit([NamedEffect(effect, (0, 1), np.zeros(2))])
     assert fitted.estimate.values[0] == pytest.approx(1.5, abs=3.0 * fitted.estimate.std[0])
-    return Explanation(bench.arm, fitted, problem.fit(), (), None, evidence, problem=problem)
+    return Explanation(bench.arm, fitted, problem.fit(), (), evidence, problem)
 
 
 def test_a_share_is_that_of_the_squares_and_lies_in_its_interval():

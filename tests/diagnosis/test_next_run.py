@@ -59,7 +59,7 @@ def doubtful(named):
     """Return the same with two other names left possible, as poorer data would."""
     (step,) = named.explanation.steps
     rivals = [
-        next(t for t in named.explanation.survey.ranking if t.key[:2] == (name, ('elbow',)))
+        next(t for t in named.explanation.candidates if t.key[:2] == (name, ('elbow',)))
         for name in ('encoder_offset', 'torque_drift')
     ]
     steps = (replace(step, rivals=tuple(rivals)),)

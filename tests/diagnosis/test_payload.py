@@ -87,7 +87,7 @@ def test_a_load_on_the_axis_of_a_joint_is_assumed_on_the_outer_link(
     assert is_same_body(trial, rival, arm.robot) == same
     fitted = SimpleNamespace(named=(None,))
     problem = SimpleNamespace(fit=lambda named: named)
-    found = Explanation(arm, fitted, fitted, (trial,), None, None, problem=problem)
+    found = Explanation(arm, fitted, fitted, (trial,), None, problem)
     (step,) = on_outer_link(found).steps
     assert step.effect.joints == ((outer,) if same else (joint,))
     assert [one.effect.joints for one in step.rivals] == [(joint,) if same else (outer,)]

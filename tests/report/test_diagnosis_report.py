@@ -165,7 +165,7 @@ def test_bad_data_have_no_green_tick():
 
 
 def test_no_candidate_has_a_value_that_it_cannot_have(found, html):
-    ranking = found.explanation.survey.ranking
+    ranking = found.explanation.candidates
     rows = candidates_section(found).blocks[0].blocks[1].rows
     assert rows[0][0].kind == 'changed'
     assert all(float(row[2].rstrip(' %')) <= 100.0 for row in rows)

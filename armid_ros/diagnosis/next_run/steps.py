@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from math import hypot
 
 from armid_ros.diagnosis.next_run.plan import NextRun
-from armid_ros.diagnosis.search.choice import OWN_MISFIT
+from armid_ros.diagnosis.search.explanation import OWN_MISFIT
 from armid_ros.diagnosis.verdict.finding import Diagnosis, Finding, Rival
 from armid_ros.effects import CATALOGUE
 from armid_ros.estimate import name_in_words

@@ -30,13 +30,13 @@ from armid_ros.diagnosis.search.comparison import (
     settings_of_baseline,
     settings_of_misfit,
 )
-from armid_ros.diagnosis.search.explain import explain
 from armid_ros.diagnosis.search.explanation import (
     at_floor,
-    Chosen,
     ESTIMATED,
+    explain,
     Explanation,
-    NOISE,
+    OWN_MISFIT,
+    WRITTEN_MISFIT,
 )
 from armid_ros.diagnosis.search.nuisance import Nuisance
 from armid_ros.diagnosis.search.posterior import JointFit, SAME_GRAVITY
@@ -56,8 +56,6 @@ _LEAST_PART = 0.3
 #: masses. With 2 fits, the same number of 20 mountings is within 1 degree and 2 %.
 _MOST_TURNS = 5
 _KNOWN_GRAVITY = 'the magnitude of gravity is taken as that of the {}, {:g} m/s^2'
-OWN_MISFIT = 'the error of the model before'
-WRITTEN_MISFIT = 'the error of the model when it was identified'
 #: Note on a model without covariance of its identification.
 _AS_EXACT = (
     'the values of the model are taken as exact because its identification.json is missing: '
@@ -109,13 +107,13 @@ class Explainer:
     misfit: Misfit | None = None
     unseen: Sequence[Trajectory] = ()
 
-    def chosen(self) -> Chosen:
-        """Choose the explanation of the gap."""
+    def explanation(self) -> Explanation:
+        """Explain the gap."""
         if self.baseline is not None:
             return self._since(self.baseline)
         return self._alone() if self.misfit is None else self._explain_change(self.misfit)
 
-    def _alone(self) -> Chosen:
+    def _alone(self) -> Explanation:
         """Explain the gap of a model without a baseline or a known misfit."""
         prepared, settings = self.prepared, self.settings
         self.tell(0.2, 'what the model lacks')
@@ -144,14 +142,13 @@ class Explainer:
         nuisance = Nuisance.of(rows, memoized_arm(self.arm), self.rng, held=held, gravity=gravity)
         every = tuple(range(len(rows.today)))
         problem = JointFit(nuisance.arm, nuisance, setting, every, True, gravity=magnitude)
-        found = explain(problem, evidence, result, settings, unknown)
+        found = replace(explain(problem, evidence, result, settings, unknown), notes=notes)
         if at_floor(found, settings):
-            nothing = np.zeros(self.arm.robot.n_joints)
-            return Chosen(found, nothing, NOISE, notes, look=result.first)
+            return found
         misfit = np.sqrt(evidence.power(found.residual))
         sigma = tuple(np.maximum(one, misfit) for one in evidence.sigma)
-        found = replace(found, evidence=replace(evidence, sigma=sigma))
-        return Chosen(found, misfit, ESTIMATED, notes, look=result.first)
+        evidence = replace(evidence, sigma=sigma)
+        return replace(found, evidence=evidence, floor=ESTIMATED, misfit=misfit)
 
     def _gravity(self, result: Result) -> FloatArray:
         """Return gravity with the accepted causes, in the frame of the base, (3,) [m/s^2]."""
@@ -184,7 +181,7 @@ class Explainer:
                     return known, (_KNOWN_GRAVITY.format(sizes[known], known),)
         return None, ()
 
-    def _explain_change(self, written: Misfit) -> Chosen:
+    def _explain_change(self, written: Misfit) -> Explanation:
         """
         Explain the change since an identification if only the size of its misfit is known.
 
@@ -204,9 +201,11 @@ class Explainer:
         result = self.comparison(rows, grid, known).found()
         found = self._changes(result, evidence, 0.0)
         notes = (_AS_EXACT,) if found.steps and known is None else ()
-        return Chosen(found, misfit, WRITTEN_MISFIT, notes, _NO_BASELINE, result.first)
+        return replace(
+            found, floor=WRITTEN_MISFIT, misfit=misfit, notes=notes, untested=_NO_BASELINE
+        )
 
-    def _since(self, baseline: Baseline) -> Chosen:
+    def _since(self, baseline: Baseline) -> Explanation:
         """Explain the change since the baseline."""
         prepared = self.prepared
         now, then = torque_rms(prepared.data), torque_rms(baseline.data)
@@ -222,7 +221,7 @@ class Explainer:
         second = count_recordings(prepared.data) + count_recordings(self.unseen)
         untested = _ONE_EACH if found.steps and first == second == 1 else ''
         notes = (untested,) if untested else ()
-        return Chosen(found, misfit, OWN_MISFIT, notes, untested, result.first)
+        return replace(found, floor=OWN_MISFIT, misfit=misfit, notes=notes, untested=untested)
 
     def _changes(self, result: Result, evidence: Evidence, spread: float) -> Explanation:
         """Explain a change relative to the unchanged model."""

@@ -1,62 +1,65 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""
-An explanation of a gap: the named effects, and the arm with them.
-
-A fit of base parameters may give links that are not physically consistent. They are replaced by
-consistent links near the description with an equally good fit.
-
-"""
+"""An explanation of a gap: the material causes of a comparison, and the arm with their values."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 from armid_ros.arm import ArmModel
 from armid_ros.arm.memoized_arm import plain_arm
 from armid_ros.diagnosis.data.evidence import Evidence
+from armid_ros.diagnosis.search.cause import NamedEffect
+from armid_ros.diagnosis.search.comparison import Result
 from armid_ros.diagnosis.search.posterior import Fitted, JointFit
-from armid_ros.diagnosis.search.trial import Look, Survey, Trial
+from armid_ros.diagnosis.search.trial import Key, Look, Trial
 from armid_ros.diagnosis.settings import DiagnosisSettings
-from armid_ros.errors import IdentificationError
-from armid_ros.identification.physical.fit_among_bodies import physical_program, PhysicalSettings
+from armid_ros.effects import Effect
 from armid_ros.motion import FloatArray
 import numpy as np
 
+#: Floors of a gap: noise, or the misfit of the model: estimated, of a baseline, or of model.yaml.
 NOISE, ESTIMATED = 'noise', 'an estimate of the error of such a model'
-#: Candidate weights of the description; the largest weight with an equally good fit is used.
-_WEIGHTS = (1e-3, 1e-5, 1e-7)
-#: Largest ratio of squared residuals at which physically consistent links fit as well.
-_ALIKE = 1.05
+OWN_MISFIT = 'the error of the model before'
+WRITTEN_MISFIT = 'the error of the model when it was identified'
 
 
 @dataclass(frozen=True)
 class Explanation:
     """
-    The named causes with their values.
+    The named causes with their values, and the unit of the gap.
 
     Attributes
     ----------
     given : ArmModel
         The arm as given.
-    fitted : Fitted
-        The arm with all named effects.
-    reference : Fitted
-        The arm without named effects.
+    fitted, reference : Fitted
+        The arm with all named effects, and without them.
     steps : tuple of Trial
         The named causes, in the order of ``fitted``.
-    survey : Survey or None
-        The first comparison of all candidates.
     evidence : Evidence
         The data in the unit of the gap.
-    minor : tuple of Trial
-        Causes that are significant and not material.
     problem : JointFit or None
         Data and model in which the values are fitted; None in a finished diagnosis.
-    refitted : bool
-        Whether the rigid body was refitted.
+    minor : tuple of Trial
+        Causes that are significant and not material.
+    candidates : tuple of Trial
+        All visible causes in the comparison before any was accepted; the named causes come first.
+    invisible : tuple of (str, tuple of str)
+        Names and joints of the causes that the nuisance columns can reproduce.
+    look : Look or None
+        That comparison; None in a finished diagnosis.
+    floor : str
+        Floor of the gap, in words.
+    misfit : ndarray, shape (n,), or float
+        Misfit that the unit of the gap contains; zero if the unit is noise alone [N m].
+    notes : tuple of str
+        Notes for the reader of the report.
+    untested : str
+        Sentence on the recordings that would separate a change from the misfit of another motion.
+        If it is not empty, and there is a baseline, named causes have to explain most of the gap.
 
     """
 
@@ -64,11 +67,26 @@ class Explanation:
     fitted: Fitted
     reference: Fitted
     steps: tuple[Trial, ...]
-    survey: Survey | None
     evidence: Evidence
+    problem: JointFit | None
     minor: tuple[Trial, ...] = ()
-    problem: JointFit | None = None
-    refitted: bool = False
+    candidates: tuple[Trial, ...] = ()
+    invisible: tuple[tuple[str, tuple[str, ...]], ...] = ()
+    look: Look | None = None
+    floor: str = NOISE
+    misfit: FloatArray | float = 0.0
+    notes: tuple[str, ...] = ()
+    untested: str = ''
+
+    @property
+    def measured(self) -> bool:
+        """Whether the floor is noise or an estimated misfit, and not a known misfit."""
+        return self.floor in (NOISE, ESTIMATED)
+
+    @property
+    def refitted(self) -> bool:
+        """Whether the rigid body is refitted."""
+        return self.problem is not None and self.problem.refits_body
 
     def without(self, *names: int) -> Explanation:
         """Return the explanation without some of its causes; the other causes are refitted."""
@@ -94,6 +112,7 @@ class Explanation:
             fitted=replace(self.fitted, arm=plain_arm(self.fitted.arm)),
             reference=replace(self.reference, arm=plain_arm(self.reference.arm)),
             problem=None,
+            look=None,
         )
 
     @cached_property
@@ -107,90 +126,143 @@ class Explanation:
         return self.evidence.chi2_per_row(self.residual)
 
 
-@dataclass(frozen=True)
-class Chosen:
-    """
-    The chosen explanation of a gap, with the unit of the gap.
-
-    Attributes
-    ----------
-    explanation : Explanation
-        The explanation.
-    misfit : ndarray, shape (n,)
-        Misfit that the unit of the gap contains; zero if the unit is noise alone [N m].
-    floor_in_words : str
-        Name of the floor of the gap, a noise or a misfit.
-    notes : tuple of str
-        Notes for the reader of the report.
-    untested : str
-        Sentence on the recordings that would separate a change from the misfit of another motion.
-        If it is not empty, and there is a baseline, named causes have to explain most of the gap.
-    look : Look or None
-        The first comparison of all causes.
-
-    """
-
-    explanation: Explanation
-    misfit: FloatArray
-    floor_in_words: str
-    notes: tuple[str, ...] = ()
-    untested: str = ''
-    look: Look | None = None
-
-    @property
-    def measured(self) -> bool:
-        """Whether the floor is noise or an estimated misfit, and not a known misfit."""
-        return self.floor_in_words in (NOISE, ESTIMATED)
-
-
 def at_floor(explanation: Explanation, settings: DiagnosisSettings) -> bool:
     """Return whether an explanation leaves no gap in any joint."""
     limits = explanation.evidence.limits(explanation.residual, settings)
     return bool(np.all(explanation.chi2_per_row <= limits))
 
 
-def as_bodies(explanation: Explanation) -> tuple[Explanation, tuple[str, ...]]:
-    """Return the explanation with physically consistent links, or unchanged with a note."""
-    problem, fitted = explanation.problem, explanation.fitted
-    if problem is None or not problem.refits_body:
-        return explanation, ()
-    base, arm = problem.nuisance.base, problem.arm
-    if not base.rank or base.independent.min() >= len(arm.robot.rigid_parameters):
-        return explanation, ()
-    known = len(arm.parameters)
-    products, count = _products(problem, fitted)
-    program, _ = physical_program(arm, base, PhysicalSettings())
-    for weight in _WEIGHTS:
-        try:
-            theta = program.solve(products, count, weight)
-        except IdentificationError:
+def explain(
+    problem: JointFit,
+    evidence: Evidence,
+    result: Result,
+    settings: DiagnosisSettings,
+    unknown: Sequence[Effect] = (),
+    known: tuple[Fitted, Sequence[Trial]] | None = None,
+) -> Explanation:
+    """
+    Fit the material causes.
+
+    Parameters
+    ----------
+    problem : JointFit
+        Data and model in which the values are fitted.
+    evidence : Evidence
+        The data in the unit of the gap.
+    result : Result
+        Result of the comparison of causes.
+    settings : DiagnosisSettings
+        Thresholds, and the share of a torque that is material.
+    unknown : sequence of Effect
+        Friction and offsets without given values, which are named if significant.
+    known : (Fitted, sequence of Trial), optional
+        Causes that were named before, with their values.
+
+    """
+    robot, material, alarm = problem.arm.robot, settings.material, settings.thresholds.alarm
+    fitted, steps = known or (None, ())
+    named = list(fitted.named) if fitted else []
+    steps, small = list(steps), list[Trial]()
+    means = result.nuisance.means(result.under)
+    for one, span in zip(result.accepted, result.nuisance.spans, strict=True):
+        trial = replace(
+            one.look.worth(one.best, material),
+            rivals=tuple(one.look.worth(other, material) for other in one.tied),
+        )
+        cause = one.best.cause
+        made = np.max(np.abs(means[span]) * cause.torque, axis=1)
+        if not np.any(made >= material * result.nuisance.rows.torque):
+            small.append(trial)
             continue
-        changed = fitted.arm.with_theta(np.concatenate([theta, fitted.arm.theta[known:]]))
-        bodily = replace(explanation, fitted=replace(fitted, arm=changed))
-        if np.all(bodily.chi2_per_row <= np.maximum(_ALIKE * explanation.chi2_per_row, 1.0)):
-            return bodily, ()
-    return explanation, (
-        'no physically consistent links explain the data as well: the fitted inertias contain a '
-        'part of the cause, and a simulation with the patched model may fail',
+        named.append(cause.at(means[span], robot))
+        steps.append(trial)
+    there = [trial for trial in _open(result, unknown, settings) if trial.odds > alarm]
+    large = {t.effect.name for t in there if np.any(np.abs(t.values) >= t.least)}
+    for trial in there:  # fit it in all joints, or its torque biases other values
+        if trial.effect.name in large:
+            named.append(NamedEffect(trial.effect, trial.kept, trial.values))
+            steps.append(trial)
+        else:
+            small.append(trial)
+    return Explanation(
+        problem.arm,
+        problem.fit(named),
+        problem.fit(),
+        tuple(steps),
+        evidence,
+        problem,
+        tuple(small),
+        *survey(result, settings, unknown, [trial.key for trial in steps]),
+        result.first,
     )
 
 
-def _products(problem: JointFit, fitted: Fitted) -> tuple[FloatArray, float]:
-    """Return the products of the base columns and their target, and the number of rows."""
-    nuisance = problem.nuisance
-    rows, rank, base = nuisance.rows, nuisance.rank, nuisance.base
-    back = np.linalg.inv(nuisance.turn)
-    then, now = (base.values(x.theta[: len(base.standard)]) for x in (problem.arm, fitted.arm))
-    rest = [part.residual(fitted.arm)[:, :, np.newaxis] for part in rows.data]
-    left = rows.weighted(rest, range(len(rows.torque)))
-    products, count = np.zeros((rank + 1, rank + 1)), 0
-    for k, columns in enumerate(nuisance.columns):
-        own = columns[:, :, :rank] @ back
-        residual, values = (
-            (left[k][:, :, 0], now) if rows.today[k] else (nuisance.residual[k], then)
+def _open(
+    result: Result, unknown: Sequence[Effect], settings: DiagnosisSettings
+) -> Iterator[Trial]:
+    """
+    Yield friction and offsets without given values, which are fitted with every cause.
+
+    The odds of a nonzero value are the prior density at zero over the posterior density at zero
+    (Dickey, The weighted likelihood ratio, 1971).
+
+    """
+    nuisance = result.nuisance
+    rank, turn = nuisance.rank, nuisance.turn
+    values, covariance = nuisance.whole(result.under)
+    means, spread = turn @ values[:rank], turn @ covariance[:rank, :rank] @ turn.T
+    today, joints = np.flatnonzero(nuisance.rows.today).tolist(), nuisance.arm.robot.joints
+    back = np.linalg.inv(turn)
+    left = float(sum(np.sum(nuisance.rest(values, k) ** 2) for k in today))
+    names = [(one.name, one.joint) for one in nuisance.base.parameters]
+    for effect in unknown:
+        parameter = effect.parameters(nuisance.arm.robot)[0]
+        if (parameter.name, parameter.joint) not in names:
+            continue
+        k = names.index((parameter.name, parameter.joint))
+        columns = [nuisance.columns[j][:, :, :rank] @ back[:, k] for j in today]
+        square = float(sum(np.sum(x**2) for x in columns))
+        count = max(sum(np.count_nonzero(x) for x in columns), 1)
+        joint = joints.index(parameter.joint)
+        sigma = float(nuisance.rows.sigma[-1][joint])
+        rms = sigma * np.sqrt(square / count)
+        variance = float(spread[k, k])
+        held = max(float(nuisance.described[k, k]), 1e-12)
+        odds = 0.5 * (means[k] ** 2 / variance + np.log(held * variance))
+        seen = float(np.clip(1.0 - variance * held, 0.0, 1.0))
+        yield Trial(
+            effect,
+            (0,),
+            means[k : k + 1],
+            np.sqrt([variance]),
+            np.array([seen]),
+            np.array([settings.material * nuisance.rows.torque[joint] / max(rms, 1e-300)]),
+            np.sqrt(seen),
+            2.0 * odds,
+            odds,
+            min(means[k] ** 2 * square / max(left, 1e-300), 1.0),
+            len(today),
         )
-        both = np.concatenate([own, (residual + own @ values)[:, :, np.newaxis]], axis=2)
-        flat = both.reshape(-1, rank + 1)
-        products += flat.T @ flat
-        count += nuisance.count[k]
-    return products, float(count)
+
+
+def survey(
+    result: Result,
+    settings: DiagnosisSettings,
+    unknown: Sequence[Effect] = (),
+    named: Collection[Key] = (),
+) -> tuple[tuple[Trial, ...], tuple[tuple[str, tuple[str, ...]], ...]]:
+    """Return visible causes of the first comparison, named ones first, and the invisible ones."""
+    look, material = result.first, settings.material
+    # The likeliest setting without the causes may hide other causes.
+    under = look.nuisance.marginal(result.under.setting)
+    look = replace(look, under=under)
+    ranking = sorted(look.ranking, key=lambda one: one.cause.key not in named)
+    every = [
+        *(look.worth(replace(one, under=under), material) for one in ranking),
+        *(look.trial(one, material) for one in look.others),
+        *_open(result, unknown, settings),
+    ]
+    seen = tuple(one for one in every if one.visible >= settings.thresholds.least_visible)
+    keys = {one.key[:2] for one in seen}
+    places = {(effect.name, effect.joints): effect.said_as for effect in result.effects}
+    return seen, tuple((word, key[1]) for key, word in places.items() if key not in keys)

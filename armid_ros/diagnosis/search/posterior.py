@@ -194,7 +194,7 @@ class JointFit:
     def with_names_at(self, named: Sequence[NamedEffect]) -> ArmModel:
         """Return the arm with named causes at given values, all other parameters fitted."""
         state = Patch(self.arm, tuple(named))
-        there = self.nuisance.with_residual(self._weighted(state.model))
+        there = self.nuisance.with_residual(self.weighted_residual(state.model))
         return self._arm(state, there.means(there.marginal(self.setting, self.recordings)))
 
     def as_described(self) -> JointFit:
@@ -212,7 +212,7 @@ class JointFit:
 
         """
         rows = self.nuisance.rows
-        there = self.nuisance.with_residual(self._weighted(fitted.arm))
+        there = self.nuisance.with_residual(self.weighted_residual(fitted.arm))
         means = fitted.means.copy()
         means[: self.nuisance.rank] *= not self.stated
         found = []
@@ -225,7 +225,7 @@ class JointFit:
                     start += len(weight)
         return found
 
-    def _weighted(self, model: ArmModel) -> list[FloatArray]:
+    def weighted_residual(self, model: ArmModel) -> list[FloatArray]:
         """Return the weighted residual of each recording, (n, M), with a model of today."""
         rows = self.nuisance.rows
         rest = [
@@ -243,7 +243,7 @@ class JointFit:
 
     def _loss(self, state: Patch) -> float:
         """Return the negative log likelihood, the nuisance parameters integrated out."""
-        there = self.nuisance.with_residual(self._weighted(state.model))
+        there = self.nuisance.with_residual(self.weighted_residual(state.model))
         return there.marginal(self.setting, self.recordings).loss
 
     def _moved(self, linear: Nuisance, means: FloatArray) -> FloatArray:
@@ -304,7 +304,7 @@ class JointFit:
             [
                 rest + x[:, :, 0] if today else rest
                 for rest, x, today in zip(
-                    self._weighted(state.model), present, rows.today, strict=True
+                    self.weighted_residual(state.model), present, rows.today, strict=True
                 )
             ]
         )

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""A cause with its evidence (trial, ranked), and the comparison of all causes (look, survey)."""
+"""A cause with its evidence (trial, ranked), and the comparison of all causes (look)."""
 
 from __future__ import annotations
 
@@ -222,26 +222,3 @@ class Look:
         values = self.nuisance.means(self.under)
         today = np.flatnonzero(self.nuisance.rows.today).tolist()
         return max(float(sum(np.sum(self.nuisance.rest(values, k) ** 2) for k in today)), 1e-300)
-
-
-@dataclass(frozen=True)
-class Survey:
-    """
-    Summary of the first comparison of all causes.
-
-    Attributes
-    ----------
-    ranking : tuple of Trial
-        All visible causes in their best shape, the likeliest first.
-    unseen : tuple of (str, tuple of str)
-        Names and joints of the causes that are not visible beyond the nuisance columns.
-
-    """
-
-    ranking: tuple[Trial, ...]
-    unseen: tuple[tuple[str, tuple[str, ...]], ...]
-
-    @property
-    def hidden(self) -> set[str]:
-        """Names of effects that no joint's data would show."""
-        return {name for name, _ in self.unseen} - {one.effect.said_as for one in self.ranking}

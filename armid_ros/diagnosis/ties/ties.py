@@ -21,11 +21,10 @@ from armid_ros.diagnosis.data.evidence import Evidence, noise_floor
 from armid_ros.diagnosis.search.cause import NamedEffect
 from armid_ros.diagnosis.search.choice import Explainer
 from armid_ros.diagnosis.search.comparison import settings_alone
-from armid_ros.diagnosis.search.explain import explain, survey_of
-from armid_ros.diagnosis.search.explanation import at_floor, Chosen, Explanation, NOISE
+from armid_ros.diagnosis.search.explanation import at_floor, explain, Explanation, survey
 from armid_ros.diagnosis.search.patch import places
 from armid_ros.diagnosis.search.posterior import Fitted, JointFit
-from armid_ros.diagnosis.search.trial import Survey, Trial
+from armid_ros.diagnosis.search.trial import Trial
 from armid_ros.effects.tied import Partner, Tied, TiedInteraction, TiedSlack
 from armid_ros.errors import IdentificationError
 from armid_ros.estimate import Estimate
@@ -46,47 +45,42 @@ _TOLD = 5.0
 
 def diagnose_ties(
     explainer: Explainer, recordings: Sequence[Recording], partner: Partner
-) -> Chosen | None:
+) -> Explanation | None:
     """
     Explain a gap by ties to another machine, and the remaining residual by other causes.
 
     Returns
     -------
-    Chosen or None
+    Explanation or None
         The explanation with the ties as its first names; without names if the residual is noise;
         None if there is a gap and no tie.
 
     """
     arm, prepared, settings = explainer.arm, explainer.prepared, explainer.settings
     explainer = replace(explainer, baseline=None, misfit=None)
-    nothing = np.zeros(arm.robot.n_joints)
     ties = _Ties(explainer, tuple(recordings), partner)
     named = ties.significant()
     if not named:
         problem = JointFit.over_noise(arm, prepared.described, explainer.rng).as_described()
         described = problem.fit()
-        found = Explanation(
-            arm, described, described, (), None, prepared.described, problem=problem
-        )
-        return Chosen(found, nothing, NOISE) if at_floor(found, settings) else None
+        found = Explanation(arm, described, described, (), prepared.described, problem)
+        return found if at_floor(found, settings) else None
     evidence = Evidence.over_noise(prepared.data, prepared.sigma)
     for _ in range(2):  # the noise of spring angles is estimated only with fitted ties
         problem = JointFit.over_noise(arm, evidence, explainer.rng)
         fitted = problem.fit(named)
         sigma = [noise_floor(part, fitted.arm).sigma for part in prepared.data]
         evidence = Evidence.over_noise(prepared.data, sigma)
-    trial, survey = _as_one_cause(explainer, evidence, partner, fitted)
-    steps = (trial,) * len(named)
-    found = Explanation(
-        arm, fitted, problem.fit(), steps, survey, evidence, problem=problem, refitted=True
-    )
+    candidates, invisible = _as_one_cause(explainer, evidence, partner, fitted)
+    steps = candidates[:1] * len(named)
+    found = Explanation(arm, fitted, problem.fit(), steps, evidence, problem)
     if not at_floor(found, replace(settings, material=0.0)):
         rest = replace(explainer, arm=memoized_arm(fitted.arm))
         free = [one for one in settings_alone() if one.body]
         result = rest.comparison(Rows.over_noise(evidence), free).found()
         found = explain(problem, evidence, result, settings, known=(fitted, steps))
-        found = replace(found, survey=survey)
-    return Chosen(ties.without_bias(found), nothing, NOISE)
+    found = replace(found, candidates=candidates, invisible=invisible)
+    return ties.without_bias(found)
 
 
 @dataclass(frozen=True)
@@ -165,9 +159,7 @@ class _Ties:
             assert found.problem is not None
             problem, own = found.problem.as_described(), found.fitted
             again = problem.fit(own.named)
-            found = replace(
-                found, fitted=again, reference=problem.fit(), problem=problem, refitted=False
-            )
+            found = replace(found, fitted=again, reference=problem.fit(), problem=problem)
             return replace(found, fitted=_with_springs(found, known))
         return replace(found, fitted=_with_springs(found, fitted))
 
@@ -242,8 +234,8 @@ def _with_springs(explanation: Explanation, found: Interaction) -> Fitted:
 
 def _as_one_cause(
     explainer: Explainer, evidence: Evidence, partner: Partner, fitted: Fitted
-) -> tuple[Trial, Survey]:
-    """Compare all ties, as one cause, with the catalogue; return their trial and the survey."""
+) -> tuple[tuple[Trial, ...], tuple[tuple[str, tuple[str, ...]], ...]]:
+    """Compare all ties, as one cause, with the catalogue; return the `survey`, the ties first."""
     settings, robot = explainer.settings, explainer.arm.robot
     free = [one for one in settings_alone() if one.body]
     comparison = explainer.comparison(Rows.over_noise(evidence), free)
@@ -261,7 +253,6 @@ def _as_one_cause(
     one = comparison.ranked(cause, nuisance)
     look, material = result.first, settings.material
     rivals = [look.worth(other, material) for other in look.ranking if other.data >= one.data]
-    survey = survey_of(result, (), settings)
+    candidates, invisible = survey(result, settings)
     trial = replace(look.worth(one, material), probability=1.0 / (1.0 + len(rivals)))
-    survey = replace(survey, ranking=(trial, *survey.ranking))
-    return replace(trial, rivals=tuple(rivals)), survey
+    return (replace(trial, rivals=tuple(rivals)), *candidates), invisible

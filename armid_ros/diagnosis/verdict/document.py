@@ -165,7 +165,7 @@ def _filters(diagnosis: Diagnosis) -> dict[str, float] | None:
 def _candidates(diagnosis: Diagnosis) -> list[dict[str, Any]]:
     """Return the first candidates of the survey: named causes, then the likeliest others."""
     explanation = diagnosis.explanation
-    if explanation is None or explanation.survey is None:
+    if explanation is None:
         return []
     return [
         {
@@ -178,7 +178,7 @@ def _candidates(diagnosis: Diagnosis) -> list[dict[str, Any]]:
             'min_detectable': _finite(_said_size(trial, explanation.given)[1]),
             'adjusted_p': trial.p,
         }
-        for trial in explanation.survey.ranking[:_MOST_CANDIDATES]
+        for trial in explanation.candidates[:_MOST_CANDIDATES]
     ]
 
 
@@ -271,14 +271,15 @@ def is_possible(effect: Effect, index: int, size: float, robot: Robot) -> bool:
 
 def detectable(explanation: Explanation | None) -> tuple[Detectable, ...]:
     """Return the detectable sizes of all effects on all joints, in the order of the catalogue."""
-    survey = None if explanation is None else explanation.survey
-    if explanation is None or survey is None:
+    if explanation is None:
         return ()
     rows = []
-    for trial in survey.ranking:
+    for trial in explanation.candidates:
         effect = trial.effect
         parameter, size = _said_size(trial, explanation.given)
         rows.append(Detectable(effect.said_as, effect.joints, parameter, size, trial.visible))
-    rows += [Detectable(name, joints, None, float('inf'), 0.0) for name, joints in survey.unseen]
+    rows += [
+        Detectable(name, joints, None, float('inf'), 0.0) for name, joints in explanation.invisible
+    ]
     order = {name: position for position, name in enumerate(CATALOGUE)}
     return tuple(sorted(rows, key=lambda row: order.get(row.name, len(order))))

@@ -18,7 +18,7 @@ from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.data.baseline import Baseline
 from armid_ros.diagnosis.data.evidence import Evidence
 from armid_ros.diagnosis.data.trajectory import REST_TIME
-from armid_ros.diagnosis.search.explanation import Chosen, ESTIMATED, Explanation, NOISE
+from armid_ros.diagnosis.search.explanation import ESTIMATED, Explanation
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.diagnosis.verdict.unlisted_law import unlisted_laws
 from armid_ros.diagnosis.verdict.where import Excess, Where
@@ -31,23 +31,21 @@ _SLIGHTLY = 0.05
 #: Largest residual at rest, divided by dry friction in motion. Breakaway friction adds two, and
 #: the model's friction, whose direction is arbitrary at rest, adds one.
 _HELD = 3.0
-#: Texts on a blocked joint: for a table, within a sentence, and at its end.
+#: Signature of a blocked joint.
 _WHERE = 'at rest or turning round, and more than friction: a stop, a brake or a contact'
-_TURNING = 'where it stands still or turns round'
-_BESIDE = ' in addition to friction: a stop, a brake or a contact does that'
 
 
 @dataclass(frozen=True)
 class RemainingMisfit:
     """
-    The remaining misfit of an explanation.
+    The remaining misfit of an explanation: excess of the residual over its largest usual value.
 
     Attributes
     ----------
-    chosen : Chosen
-        The explanation, and the unit of its gap.
-    unseen : Evidence or None
-        Held-out recordings.
+    explanation : Explanation
+        The named causes.
+    data : tuple of Evidence
+        The fitted recordings, and the held-out ones if there are any.
     before : Baseline or None
         Recordings from when nothing was wrong.
     given : ArmModel
@@ -57,13 +55,13 @@ class RemainingMisfit:
 
     """
 
-    chosen: Chosen
-    unseen: Evidence | None
+    explanation: Explanation
+    data: tuple[Evidence, ...]
     before: Baseline | None
     given: ArmModel
     settings: DiagnosisSettings
 
-    def beside(self, explanation: Explanation) -> list[Excess]:
+    def of_residual(self) -> list[Excess]:
         """
         Return the excess of the residual with the named causes, for each set of data.
 
@@ -71,29 +69,28 @@ class RemainingMisfit:
         subtracted: in other motions the arm visits other states, where the misfit differs.
 
         """
-        problem, parts = explanation.problem, self._parts(explanation)
-        left = [part.residuals(explanation.fitted.arm) for part in parts]
-        if problem is not None and not self.chosen.measured:
+        explanation, problem = self.explanation, self.explanation.problem
+        residuals = [part.residuals(explanation.fitted.arm) for part in self._parts]
+        if problem is not None and not explanation.measured:
             rest = problem.rest(explanation.fitted)
             first = len(explanation.evidence.data)
-            left = [rest[:first], *(rest[first:] or one for one in left[1:])]
-        return list(self._of_whole(parts, left))
+            residuals = [rest[:first], *(rest[first:] or one for one in residuals[1:])]
+        return list(self._over_limits(residuals))
 
-    def laws(self, explanation: Explanation) -> list[Excess]:
+    def of_laws(self) -> list[Excess]:
         """Return the excess of laws that the catalogue lacks, if the misfit is known."""
-        if explanation.problem is None or self.chosen.floor_in_words in (NOISE, ESTIMATED):
-            return []
-        return unlisted_laws(explanation, self.settings)
+        measured = self.explanation.measured
+        return [] if measured else unlisted_laws(self.explanation, self.settings)
 
-    def as_it_is(self, explanation: Explanation) -> Excess | None:
+    def of_given_body(self) -> Excess | None:
         """Return the excess with the given body; None if the body is not refitted."""
-        if not explanation.refitted:
+        if not self.explanation.refitted:
             return None
-        part, given, fitted = self._parts(explanation)[:1], self.given.theta, explanation.fitted
-        arm = fitted.arm.with_theta(np.concatenate([given, fitted.arm.theta[len(given) :]]))
-        return next(self._of_whole(part, [part[0].residuals(arm)]))
+        given, fitted = self.given.theta, self.explanation.fitted.arm
+        arm = fitted.with_theta(np.concatenate([given, fitted.theta[len(given) :]]))
+        return next(self._over_limits([self._parts[0].residuals(arm)]))
 
-    def harmed(self, explanation: Explanation) -> tuple[str, ...]:
+    def worse_joints(self) -> tuple[str, ...]:
         """
         Return the joints in which the patched model is worse than the given one.
 
@@ -103,8 +100,8 @@ class RemainingMisfit:
         """
         worse = np.zeros(self.given.robot.n_joints, dtype=bool)
         thresholds = self.settings.thresholds
-        for part in self._parts(explanation) if explanation.steps else ():
-            residuals = [part.residuals(arm) for arm in (self.given, explanation.fitted.arm)]
+        for part in self._parts if self.explanation.steps else ():
+            residuals = [part.residuals(arm) for arm in (self.given, self.explanation.fitted.arm)]
             had, has = (part.block_squares(rows) for rows in residuals)
             more = has - had
             spread = more.std(axis=0, ddof=1) * np.sqrt(len(more))
@@ -116,48 +113,38 @@ class RemainingMisfit:
             worse |= (surely | by_far) & (part.chi2_per_row(residuals[1]) > limit)
         return tuple(j for j, bad in zip(self.given.robot.joints, worse, strict=True) if bad)
 
-    def _parts(self, explanation: Explanation) -> list[Evidence]:
+    @property
+    def _parts(self) -> list[Evidence]:
         """Return fitted and held-out data, in units of noise if the misfit is only estimated."""
-        both = self._data(explanation)
-        if self.chosen.floor_in_words != ESTIMATED:
-            return both
-        return [replace(part, sigma=part.noise) for part in both]
+        if self.explanation.floor != ESTIMATED:
+            return list(self.data)
+        return [replace(part, sigma=part.noise) for part in self.data]
 
-    def shown_in(self, left: Sequence[Excess], explanation: Explanation) -> Evidence:
-        """Return the data with the largest excess."""
-        worst = max(range(len(left)), key=lambda k: float(left[k].ratio.max()))
-        data = self._data(explanation)
-        return data[worst % len(data)]  # `left` has one excess of each kind for each set of data
-
-    def _data(self, explanation: Explanation) -> list[Evidence]:
-        return [explanation.evidence, *([] if self.unseen is None else [self.unseen])]
-
-    def _of_whole(
-        self, parts: Sequence[Evidence], left: Sequence[Sequence[FloatArray]]
-    ) -> Iterator[Excess]:
-        """Yield the excess of the fitted data and of the held-out data."""
-        usual = 1.0 if self.chosen.measured else self.settings.thresholds.predicted
+    def _over_limits(self, residuals: Sequence[Sequence[FloatArray]]) -> Iterator[Excess]:
+        """Yield the excess of residuals of the fitted data, and of the held-out data."""
+        usual = 1.0 if self.explanation.measured else self.settings.thresholds.predicted
         more = usual, self.settings.thresholds.predicted
         where = 'in the recordings', 'in recordings that were not used'
-        for part, own, factor, words in zip(parts, left, more, where, strict=False):
+        for part, own, factor, words in zip(self._parts, residuals, more, where, strict=False):
             limits = factor * part.limits(own, self.settings)
             yield Excess(part.chi2_per_row(own) / limits, words)
 
-    def resting(self, explanation: Explanation) -> list[Excess]:
+    def at_rest(self) -> list[Excess]:
         """Return the excess of torque over friction in joints at rest, for each set of data."""
         if self.settings.partner is not None:
             return []
-        surely, before, found = self.settings.thresholds.surely, self.before, list[Excess]()
-        for part in self._data(explanation):
-            arm = explanation.fitted.arm
-            excess = standing(arm, part, part.residuals(arm), surely)
-            if before is not None:  # subtract the earlier blocking torque, such as a brake
-                unit = (before.misfit,) * len(before.data)
-                rows = Evidence.over_noise(before.data, unit)
-                then = standing(self.given, rows, before.residual, surely)
-                excess = excess / np.maximum(self.settings.thresholds.same_fit * then, 1.0)
-            found.append(Excess(excess, _TURNING, _BESIDE))
-        return found
+        thresholds, before = self.settings.thresholds, self.before
+        arm, usual = self.explanation.fitted.arm, np.ones(self.given.robot.n_joints)
+        if before is not None:  # an earlier blocking torque, such as that of a brake
+            rows = Evidence.over_noise(before.data, (before.misfit,) * len(before.data))
+            earlier = standing(self.given, rows, before.residual, thresholds.surely)
+            usual = np.maximum(thresholds.same_fit * earlier, usual)
+        ratios = (
+            standing(arm, part, part.residuals(arm), thresholds.surely) for part in self.data
+        )
+        where = 'where it stands still or turns round'
+        more = ' in addition to friction: a stop, a brake or a contact does that'
+        return [Excess(ratio / usual, where, more) for ratio in ratios]
 
 
 def places_held(arm: ArmModel, excesses: Sequence[Excess]) -> tuple[Where, ...]:

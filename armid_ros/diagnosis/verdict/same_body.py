@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-A load that the torque assigns to neither of two links.
+Bodies that torques do not determine: loads on either of two links, and inconsistent inertias.
 
 A body centred on the axis of a turning joint loads every joint alike on either link.
 
@@ -12,13 +12,25 @@ from __future__ import annotations
 from dataclasses import replace
 
 from armid_ros.diagnosis.search.cause import NamedEffect
-from armid_ros.diagnosis.search.explanation import as_bodies, Explanation
+from armid_ros.diagnosis.search.explanation import Explanation
+from armid_ros.diagnosis.search.posterior import Fitted, JointFit
 from armid_ros.diagnosis.search.trial import Trial
 from armid_ros.effects.quantities import MIN_Z_SCORE
+from armid_ros.errors import IdentificationError
+from armid_ros.identification.physical.fit_among_bodies import physical_program, PhysicalSettings
 from armid_ros.model import LINK_PARAMETERS
 from armid_ros.motion import FloatArray
 from armid_ros.robots import Robot
 import numpy as np
+
+#: Largest ratio of squared residuals at which physically consistent links fit as well.
+_MAX_LOSS_RATIO = 1.05
+
+
+def as_placed_bodies(explanation: Explanation) -> tuple[Explanation, tuple[str, ...]]:
+    """Return the explanation with loads on outer links and possible bodies, and notes on names."""
+    found, notes = as_bodies(on_outer_link(explanation))
+    return found, notes if found.steps else ()
 
 
 def is_same_body(one: Trial, other: Trial, robot: Robot) -> bool:
@@ -52,12 +64,6 @@ def _values(trial: Trial) -> tuple[FloatArray, FloatArray]:
     return values, std
 
 
-def as_placed_bodies(explanation: Explanation) -> tuple[Explanation, tuple[str, ...]]:
-    """Return the explanation with loads on outer links and possible bodies, and notes on names."""
-    found, notes = as_bodies(on_outer_link(explanation))
-    return found, notes if found.steps else ()
-
-
 def on_outer_link(explanation: Explanation) -> Explanation:
     """Return the explanation with each load on the outer one of two links that it may be on."""
     if explanation.problem is None:
@@ -76,3 +82,54 @@ def on_outer_link(explanation: Explanation) -> Explanation:
             found = replace(explanation, fitted=again, steps=(*steps[:k], moved, *steps[k + 1 :]))
             return on_outer_link(found)
     return explanation
+
+
+def as_bodies(explanation: Explanation) -> tuple[Explanation, tuple[str, ...]]:
+    """
+    Return the explanation with physically consistent links, or unchanged with a note.
+
+    A fit of base parameters may give impossible links. They are replaced by consistent links near
+    the description with an equally good fit.
+
+    """
+    problem, fitted = explanation.problem, explanation.fitted
+    if problem is None or not problem.refits_body:
+        return explanation, ()
+    base, arm = problem.nuisance.base, problem.arm
+    if not base.rank or base.independent.min() >= len(arm.robot.rigid_parameters):
+        return explanation, ()
+    known = len(arm.parameters)
+    products, count = _products(problem, fitted)
+    program, _ = physical_program(arm, base, PhysicalSettings())
+    for weight in (1e-3, 1e-5, 1e-7):  # of the description: the largest one that fits as well
+        try:
+            theta = program.solve(products, count, weight)
+        except IdentificationError:
+            continue
+        changed = fitted.arm.with_theta(np.concatenate([theta, fitted.arm.theta[known:]]))
+        bodily = replace(explanation, fitted=replace(fitted, arm=changed))
+        if np.all(
+            bodily.chi2_per_row <= np.maximum(_MAX_LOSS_RATIO * explanation.chi2_per_row, 1.0)
+        ):
+            return bodily, ()
+    return explanation, (
+        'no physically consistent links explain the data as well: the fitted inertias contain a '
+        'part of the cause, and a simulation with the patched model may fail',
+    )
+
+
+def _products(problem: JointFit, fitted: Fitted) -> tuple[FloatArray, float]:
+    """Return the products of the base columns and their target, and the number of rows."""
+    nuisance, base = problem.nuisance, problem.nuisance.base
+    rank, back = nuisance.rank, np.linalg.inv(nuisance.turn)
+    then, now = (base.values(x.theta[: len(base.standard)]) for x in (problem.arm, fitted.arm))
+    patched = nuisance.with_residual(problem.weighted_residual(fitted.arm))
+    products = np.zeros((rank + 1, rank + 1))
+    for k, today in enumerate(nuisance.rows.today):
+        values = now if today else then
+        square = back.T @ patched.fixed[0][k][:rank, :rank] @ back
+        residual = back.T @ patched.fixed[1][k][:rank]
+        target = residual + square @ values
+        power = patched.power[k] + (residual + target) @ values
+        products += np.block([[square, target[:, np.newaxis]], [target, power]])
+    return products, float(nuisance.count.sum())

@@ -266,7 +266,6 @@ def _detectable_row(name: str, sizes: Sequence[Detectable]) -> tuple[str, str, s
 def candidates_section(diagnosis: Diagnosis) -> ContentSection:
     """Return the part of the gap that each cause alone would explain, in ranking order."""
     explanation = diagnosis.explanation
-    survey = None if explanation is None else explanation.survey
     names = {finding.name for finding in diagnosis.findings}
     rows = [
         (
@@ -280,7 +279,7 @@ def candidates_section(diagnosis: Diagnosis) -> ContentSection:
             _candidate_value(diagnosis, trial),
             percent(trial.visible),
         )
-        for trial in (() if survey is None else survey.ranking[:15])
+        for trial in (() if explanation is None else explanation.candidates[:15])
     ]
     if not rows:
         nothing = Paragraph('No effect explains any of the residual.')
