@@ -8,7 +8,7 @@ from types import SimpleNamespace
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis import diagnose, next_run
 from armid_ros.diagnosis.data.evidence import Evidence, noise_floor
-from armid_ros.diagnosis.next_run.separation import Doubt, Load, Separation
+from armid_ros.diagnosis.next_run.separation import Load, separation
 from armid_ros.diagnosis.search.cause import NamedEffect
 from armid_ros.diagnosis.search.posterior import JointFit
 from armid_ros.effects import CATALOGUE
@@ -171,6 +171,6 @@ def test_only_a_known_payload_tells_a_gain_from_the_mass():
     trajectory = FourierTrajectory(
         robot.joints, 8.0, np.zeros(1), np.array([[0.8, 1.0]]), np.array([[0.5, 0.4]])
     )
-    doubt = Doubt(NamedEffect(gain, (0,), np.zeros(1)), CATALOGUE['link_inertia'].on(robot))
-    assert Separation.of(found, doubt, trajectory).z < 1e-3
-    assert Separation.of(found, doubt, trajectory, load=Load(1.0, 'bob')).z > 10.0
+    pair = gain, CATALOGUE['link_inertia'].on(robot)
+    assert separation(found, *pair, trajectory).z < 1e-3
+    assert separation(found, *pair, trajectory, load=Load(1.0, 'bob')).z > 10.0

@@ -17,10 +17,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
-from armid_ros.diagnosis.next_run.separation import Doubt, Load, NOTHING, Separation
+from armid_ros.diagnosis.next_run.separation import Load, Separation, separation
 from armid_ros.diagnosis.verdict.finding import Diagnosis
+from armid_ros.effects import Effect
 from armid_ros.effects.tied import Tied
 from armid_ros.errors import TrajectoryError
 from armid_ros.estimate import name_in_words
@@ -39,11 +40,7 @@ import numpy as np
 #: File name of a planned run.
 EXPERIMENT_FILE = 'experiment.yaml'
 #: Sufficient separation in standard deviations; a motion that reaches it needs no payload.
-_SURE = 5.0
-#: Largest reported number of standard deviations; the noise is not known well enough for more.
-_CERTAIN = 30.0
-#: Largest number of pairs of names in a sentence.
-_SAID = 3
+_SUFFICIENT_Z = 5.0
 
 
 @dataclass(frozen=True)
@@ -78,12 +75,13 @@ class NextRun:
     def sentence(self) -> str:
         """Describe the run and the pairs that it separates, the least separated pair first."""
         separated = sorted((s for s in self.separations if s.distinct), key=lambda one: one.z)
-        parts = [
-            f'{one.name} from {one.rival} by {_many(one.z)} standard deviations'
-            for one in separated[:_SAID]
-        ]
-        if len(separated) > _SAID:
-            parts.append(f'{len(separated) - _SAID} more pairs of names by more')
+        most = 3  # pairs in a sentence
+        parts = []
+        for one in separated[:most]:  # the noise is not known well enough for more than 30
+            times = f'{one.z:.0f}' if one.z < 30.0 else 'more than 30'
+            parts.append(f'{one.name} from {one.rival} by {times} standard deviations')
+        if len(separated) > most:
+            parts.append(f'{len(separated) - most} more pairs of names by more')
         again = ''
         if self.load is not None:
             again = f', then again with {self.load.mass:g} kg fixed to {self.load.frame}'
@@ -108,9 +106,13 @@ class NextRun:
         }
 
 
-def _many(deviations: float) -> str:
-    """Format a z-score; above `_CERTAIN` it becomes "more than `_CERTAIN`"."""
-    return f'{deviations:.0f}' if deviations < _CERTAIN else f'more than {_CERTAIN:.0f}'
+class _Candidate(NamedTuple):
+    """A motion, a load of a second run, and the predicted separation of each pair of names."""
+
+    template: Template
+    trajectory: FourierTrajectory
+    load: Load | None
+    separations: tuple[Separation, ...]
 
 
 def next_run(
@@ -142,14 +144,15 @@ def next_run(
         If the arm cannot make any of the motions, or none separates any names; gives the reason.
 
     """
-    doubts = _doubts(diagnosis)
+    pairs = _pairs(diagnosis)
     arm = diagnosis.arm
-    if not doubts or any(isinstance(effect, Tied) for effect in arm.effects):
+    if not pairs or any(isinstance(effect, Tied) for effect in arm.effects):
         return None
     clearance = ClearanceModel.of(collision or collision_model(arm.robot), CLEARANCE)
-    joints = dict.fromkeys(joint for doubt in doubts for joint in doubt.joints)
-    whole_arm = any(not doubt.joints for doubt in doubts)
-    runs: list[_Run] = []
+    effects = [effect for pair in pairs for effect in pair]
+    joints = dict.fromkeys(joint for effect in effects for joint in effect.joints)
+    whole_arm = any(not effect.joints for effect in effects)
+    candidates: list[_Candidate] = []
     refused: list[str] = []
     for template in templates(() if whole_arm else tuple(joints)):
         try:
@@ -158,14 +161,13 @@ def next_run(
             refused.append(str(error))
             continue
         load = Load.along(arm, trajectory) if template.loaded else None
-        pairs = tuple(Separation.of(diagnosis, doubt, trajectory, load) for doubt in doubts)
-        runs.append(_Run(template, trajectory, load, pairs))
-    telling = [run for run in runs if any(one.distinct for one in run.separations)]
-    if runs and not telling:
-        names = ', '.join(f'{one.name} from {one.rival}' for one in runs[0].separations)
+        separated = (separation(diagnosis, *pair, trajectory, load) for pair in pairs)
+        candidates.append(_Candidate(template, trajectory, load, tuple(separated)))
+    useful = [one for one in candidates if any(pair.distinct for pair in one.separations)]
+    if candidates and not useful:
+        names = ', '.join(f'{one.name} from {one.rival}' for one in candidates[0].separations)
         raise TrajectoryError(f'none of the planned motions separates {name_in_words(names)}')
-    for run in _in_order(telling):
-        kind = run.template
+    for kind, trajectory, load, separations in _in_order(useful) if useful else ():
         settings = DesignSettings(
             period=kind.period,
             harmonics=kind.harmonics,
@@ -174,48 +176,40 @@ def next_run(
         )
         problem = DesignProblem.of(arm, settings, rng)
         try:
-            excitation = placed(problem, run.trajectory)
+            excitation = placed(problem, trajectory)
         except TrajectoryError as error:
             refused.append(str(error))
             continue
-        return NextRun(excitation, kind.name, run.load, run.separations)
+        return NextRun(excitation, kind.name, load, separations)
     raise TrajectoryError(f'no motion for the next run: {refused[-1]}')
 
 
-@dataclass(frozen=True)
-class _Run:
-    """A motion and its predicted separation of each pair of names."""
+def _in_order(candidates: Sequence[_Candidate]) -> list[_Candidate]:
+    """
+    Sort motions by the sum of log(1 + D_T) over pairs, the best first.
 
-    template: Template
-    trajectory: FourierTrajectory
-    load: Load | None
-    separations: tuple[Separation, ...]
+    Motions with a payload come last if a motion without one separates all pairs sufficiently.
 
-    @property
-    def worth(self) -> float:
-        """Sum of log(1 + D_T) over pairs; inseparable pairs add nothing."""
-        return float(sum(np.log1p(pair.power) for pair in self.separations))
-
-
-def _in_order(runs: Sequence[_Run]) -> list[_Run]:
-    """Sort runs, best first; runs with a payload come last if some motion needs none."""
-    most = np.max([[pair.z for pair in run.separations] for run in runs], axis=0, initial=0.0)
-    wanted = np.where(most < NOTHING, 0.0, np.minimum(most, _SURE))
-    plain = [run for run in runs if not run.template.loaded]
-    enough = any(all(p.z >= z for p, z in zip(r.separations, wanted, strict=True)) for r in plain)
-    return sorted(runs, key=lambda run: (enough and run.template.loaded, -run.worth))
+    """
+    z = np.array([[pair.z for pair in one.separations] for one in candidates])
+    loaded = np.array([one.template.loaded for one in candidates])
+    most = z.max(axis=0)
+    wanted = np.where(most < 1.0, 0.0, np.minimum(most, _SUFFICIENT_Z))
+    enough = bool(np.any(np.all(z[~loaded] >= wanted, axis=1)))
+    order = np.lexsort((-np.log1p(z**2).sum(axis=1), loaded & enough))
+    return [candidates[k] for k in order]
 
 
-def _doubts(diagnosis: Diagnosis) -> tuple[Doubt, ...]:
-    """Return the pairs of a named effect and a rival."""
+def _pairs(diagnosis: Diagnosis) -> list[tuple[Effect, Effect]]:
+    """Return the pairs of a named effect and a rival, one for each pair of names."""
     explanation = diagnosis.explanation
     if explanation is None:
-        return ()
-    pairs = zip(explanation.fitted.named, explanation.steps, strict=True)
-    found = {own.effect.name for own in explanation.fitted.named}
-    doubts: dict[tuple[str, str], Doubt] = {}
-    for named, trial in pairs:
-        for other in (rival.effect for rival in trial.rivals):
-            if other.name not in found:
-                doubts.setdefault((named.effect.name, other.name), Doubt(named, other))
-    return tuple(doubts.values())
+        return []
+    fitted = [own.effect for own in explanation.fitted.named]
+    found = {effect.name for effect in fitted}
+    pairs: dict[tuple[str, str], tuple[Effect, Effect]] = {}
+    for named, trial in zip(fitted, explanation.steps, strict=True):
+        for rival in (one.effect for one in trial.rivals):
+            if rival.name not in found:
+                pairs.setdefault((named.name, rival.name), (named, rival))
+    return list(pairs.values())
