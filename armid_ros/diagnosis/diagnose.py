@@ -10,7 +10,7 @@ errors of the description), and the model with refitted body and known effects.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 
 from armid_ros.arm import ArmModel, Misfit
@@ -64,8 +64,6 @@ _NO_MODEL = (
     'model. It belongs to another arm, or has other units. Identify the arm from the baseline, '
     'and give that model'
 )
-#: Uncertainty of the start and the end of a time span [s].
-_UNSURE = 0.25
 
 
 def diagnose(
@@ -151,7 +149,12 @@ def diagnose(
     if _hardly_explained(result, settings):
         timed = _of_spans(explanation, explainer, recordings, validate, notes, doubt)
         result = timed or result
-    return _each_alone(result, ([*recordings, *validate], baseline), used, explainer)
+    if (result.verdict in OPEN or result.doubt) and settings.partner is None:
+        days = [*recordings, *validate], baseline
+        apart = [one for day in days for one in _with_unfitted_joints(arm, day, used)]
+        alone = mistaken_recordings(arm, apart, used)
+        return _bad(given, result.data, alone, result.notes) if alone else result
+    return result
 
 
 def _hardly_explained(result: Diagnosis, settings: DiagnosisSettings) -> bool:
@@ -180,7 +183,8 @@ def _of_spans(
     shorter, held_out = ([x for x in part if x is not None] for part in (cut[:count], cut[count:]))
     if not shorter:
         return None
-    untimed = () if len(timed) == len(recordings) + len(validate) else (_NOT_TIMED,)
+    if len(timed) < len(recordings) + len(validate):
+        notes = (*notes, _NOT_TIMED)
     by_misfit = explainer.baseline is not None and settings.partner is None
     try:
         data, unseen = (
@@ -189,7 +193,6 @@ def _of_spans(
         )
         prepared = prepare(arm, prepared.used, data, settings, explainer.rng, by_misfit)
         within = replace(explainer, prepared=prepared, unseen=unseen)
-        notes = (*notes, *untimed)
         found = _as_diagnosis(within.explanation(), notes, within, doubt, plain_arm(arm))
     except IdentificationError:  # too short for the filters, or without motion
         return None
@@ -202,24 +205,9 @@ def _cropped(span: Span, recording: Recording) -> Recording | None:
     """Return the time span of a recording in which a cause acts."""
     if span.whole:
         return recording
-    inside = recording.t >= span.start + _UNSURE, recording.t <= span.stop - _UNSURE
-    return recording.select(inside[0] & inside[1]) if span.stop > span.start else None
-
-
-def _each_alone(
-    result: Diagnosis,
-    days: Iterable[Sequence[Recording]],
-    used: Conditioning,
-    explainer: Explainer,
-) -> Diagnosis:
-    """Return the result, or `bad_data` if it is inconclusive and a single recording is faulty."""
-    arm = explainer.arm
-    open_or_doubted = result.verdict in OPEN or bool(result.doubt)
-    if not open_or_doubted or explainer.settings.partner is not None:
-        return result
-    apart = [one for day in days for one in _with_unfitted_joints(arm, day, used)]
-    alone = mistaken_recordings(arm, apart, used)
-    return _bad(plain_arm(arm), result.data, alone, result.notes) if alone else result
+    margin = 0.25  # s: uncertainty of the start and of the end
+    inside = (recording.t >= span.start + margin) & (recording.t <= span.stop - margin)
+    return recording.select(inside) if span.stop > span.start else None
 
 
 def _with_unfitted_joints(
@@ -351,19 +339,6 @@ def _held_out_evidence(data: Sequence[Trajectory], explanation: Explanation) -> 
 def _bad(
     arm: ArmModel, data: Sequence[Trajectory], faults: Sequence[str], notes: Sequence[str]
 ) -> Diagnosis:
-    return Diagnosis(
-        verdict='bad_data',
-        summary=f'The data cannot be diagnosed: {"; ".join(faults)}.',
-        findings=(),
-        minor=(),
-        where=(),
-        left=(),
-        gap=None,
-        explanation=None,
-        arm=arm,
-        data=tuple(data),
-        not_visible=(),
-        refitted=False,
-        notes=tuple(notes),
-        baseline='',
-    )
+    """Return the verdict `bad_data`."""
+    summary = f'The data cannot be diagnosed: {"; ".join(faults)}.'
+    return Diagnosis('bad_data', summary, arm, tuple(data), tuple(notes))

@@ -22,11 +22,6 @@ from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording
 import numpy as np
 
-_UNUSABLE = (
-    'The model was unusable when it was identified (see its identification.json): its residual '
-    'does not measure a change.'
-)
-
 
 def doubt_of(
     arm: ArmModel,
@@ -52,7 +47,12 @@ def doubt_of(
         Factors by which a misfit varies from motion to motion.
 
     """
-    unusable = _UNUSABLE if misfit is not None and misfit.unusable else ''
+    unusable = ''
+    if misfit is not None and misfit.unusable:
+        unusable = (
+            'The model was unusable when it was identified (see its identification.json): its '
+            'residual does not measure a change.'
+        )
     if baseline is None:
         return unusable
     changed = '' if misfit is None else _changed(arm, baseline, recordings, misfit, thresholds)
@@ -127,12 +127,12 @@ def _changed(
 def _poor(arm: ArmModel, baseline: Baseline) -> str:
     """Return a sentence if the baseline residual is a large share of the torque."""
     whole, each = baseline.errors
-    errors = {'the arm': whole, **dict(zip(arm.robot.joints, each.tolist(), strict=True))}
-    limits = {place: LIMITS.poor if place == 'the arm' else LIMITS.unusable for place in errors}
+    rows = [(whole, LIMITS.poor, 'the arm')]
+    rows += [(e, LIMITS.unusable, j) for e, j in zip(each.tolist(), arm.robot.joints, strict=True)]
     bad = [
-        f'{100.0 * errors[place]:.0f} % of the torque of {place}'
-        for place in sorted(errors, key=lambda place: -errors[place])
-        if 100.0 * errors[place] > limits[place]
+        f'{100.0 * error:.0f} % of the torque of {place}'
+        for error, limit, place in sorted(rows, key=lambda row: -row[0])
+        if 100.0 * error > limit
     ]
     if not bad:
         return ''

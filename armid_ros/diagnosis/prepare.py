@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.data.baseline import excited, refitted
 from armid_ros.diagnosis.data.evidence import Evidence, noise_floor, NoiseFloor
-from armid_ros.diagnosis.data.trajectory import thinnable, Trajectory, UNSURE
+from armid_ros.diagnosis.data.trajectory import MAX_UNCERTAIN_SHARE, thinnable, Trajectory
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.effects import CATALOGUE, Effect
 from armid_ros.identification.fitting.held_out import cutoff_of_torques
@@ -24,11 +24,11 @@ import numpy as np
 
 #: Band of the rows, divided by the band of the motion. An identification uses a factor of ten,
 #: but the upper part is mostly noise, which would hide a gap.
-_BANDS = 6.0
+_ROW_BAND_RATIO = 6.0
 #: Pass band, with a partner, divided by the band in which the motion exceeds the noise of
 #: angles. Above, noise dominates, and a fit would reduce inertias to fit the noise of
 #: accelerations.
-_NARROW = 1.25
+_PARTNER_BAND_RATIO = 1.25
 
 
 @dataclass(frozen=True)
@@ -42,8 +42,6 @@ class Prepared:
         Filters and decimation.
     data : tuple of Trajectory
         Stretches of the recordings in rows.
-    base : BaseParameters
-        Base parameters of the arm that the motion excites.
     floors : tuple of NoiseFloor
         Noise of each trajectory in the residual of the arm as fitted to the data.
     as_described : tuple of ndarray, shape (n,)
@@ -53,7 +51,6 @@ class Prepared:
 
     used: Conditioning
     data: tuple[Trajectory, ...]
-    base: BaseParameters
     floors: tuple[NoiseFloor, ...]
     as_described: tuple[FloatArray, ...]
 
@@ -88,7 +85,7 @@ def choose_filters(
     """
     used = conditioning([*recordings, *baseline], settings.signals)
     if settings.partner is not None:
-        return band_of_motion(recordings, used, settings.signals, _NARROW)
+        return band_of_motion(recordings, used, settings.signals, _PARTNER_BAND_RATIO)
     if settings.signals.cutoff_hz is None:
         fuller, _ = with_friction(arm, settings.library)
         independent = fuller.base_parameters(rng).independent
@@ -96,7 +93,7 @@ def choose_filters(
     if settings.signals.decimation is not None:
         return used
     band = used.rate_hz / (2.5 * MODEL_BANDS * used.decimation)
-    wide = replace(used, decimation=max(1, int(used.rate_hz / (2.5 * _BANDS * band))))
+    wide = replace(used, decimation=max(1, int(used.rate_hz / (2.5 * _ROW_BAND_RATIO * band))))
     return thinnable(wide)
 
 
@@ -116,16 +113,20 @@ def prepare(
     model, and it differs between motions.
 
     """
-    whole = arm.base_parameters(rng)
-    prepared = _measured(arm, used, data, whole)
+    theory = arm.base_parameters(rng)
+    prepared = _measured(arm, used, data, theory)
     if misfit:
         return prepared
     fuller, _ = with_friction(arm, settings.library)
-    uncertain = settings.thresholds.uncertain
-    allowed = uncertain * _noise_over_friction(fuller, prepared, rng.spawn(1)[0])
-    allowed = np.maximum(allowed, UNSURE)
-    wider = [replace(part, allowed=allowed) for part in prepared.data]
-    return _measured(arm, prepared.used, wider, whole)
+    base, _ = excited(fuller, fuller.base_parameters(rng.spawn(1)[0]), data)
+    friction = refitted(fuller, base, data, prepared.sigma).action().dry_friction
+    allowed = np.full(arm.robot.n_joints, np.inf)
+    if friction is not None:
+        dry = np.concatenate([friction.largest(fuller.load(part.at_rows)) for part in data])
+        size = np.maximum(np.sqrt(np.mean(dry**2, axis=0)), 1e-300)
+        noise = np.sqrt(np.mean(np.square(prepared.sigma), axis=0))
+        allowed = np.maximum(settings.thresholds.uncertain * noise / size, MAX_UNCERTAIN_SHARE)
+    return _measured(arm, used, [replace(part, allowed=allowed) for part in data], theory)
 
 
 def with_friction(arm: ArmModel, library: Sequence[str]) -> tuple[ArmModel, tuple[Effect, ...]]:
@@ -142,30 +143,15 @@ def with_friction(arm: ArmModel, library: Sequence[str]) -> tuple[ArmModel, tupl
 
 
 def _measured(
-    arm: ArmModel, used: Conditioning, data: Sequence[Trajectory], whole: BaseParameters
+    arm: ArmModel, used: Conditioning, data: Sequence[Trajectory], theory: BaseParameters
 ) -> Prepared:
-    base, _ = excited(arm, whole, data)
+    """Measure the noise in the residual of the arm as given, and as fitted to the data."""
+    base, _ = excited(arm, theory, data)
     first = [noise_floor(part, arm) for part in data]
     refit = refitted(arm, base, data, [floor.sigma for floor in first])
     floors = tuple(noise_floor(part, refit) for part in data)
     as_described = tuple((a if a.period else b).sigma for a, b in zip(first, floors, strict=True))
-    return Prepared(used, tuple(data), base, floors, as_described)
-
-
-def _noise_over_friction(
-    arm: ArmModel, prepared: Prepared, rng: np.random.Generator
-) -> FloatArray:
-    """Return the rms noise divided by the rms dry friction of each joint, (n,)."""
-    data, sigma = prepared.data, prepared.sigma
-    base, _ = excited(arm, arm.base_parameters(rng), data)
-    arm = refitted(arm, base, data, sigma)
-    friction = arm.action().dry_friction
-    if friction is None:
-        return np.full(arm.robot.n_joints, np.inf)
-    dry = np.concatenate([friction.largest(arm.load(part.at_rows)) for part in data])
-    noise = np.sqrt(np.mean(np.square(sigma), axis=0))
-    size = np.sqrt(np.mean(dry**2, axis=0))
-    return np.asarray(noise / np.maximum(size, 1e-300))
+    return Prepared(used, tuple(data), floors, as_described)
 
 
 def mended(

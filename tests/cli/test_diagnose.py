@@ -108,9 +108,7 @@ def test_a_script_learns_from_the_code_whether_to_go_on(
 ):
     """Whatever the code is, the folder has the result."""
     urdf, model, bags = files
-    said = Diagnosis(
-        verdict, 'Said.', (), (), (), (), None, None, load_model(model), (), (), False, (), ''
-    )
+    said = Diagnosis(verdict, 'Said.', load_model(model), (), ())
     monkeypatch.setattr('armid_ros.api.diagnosis.run', lambda *_, **__: said)
     asked = ('diagnose', *bags, '--robot', urdf, '--model', model, '--no-baseline')
     for more, expected in (((), code), (('--strict',), strict_code), (('--json',), code)):

@@ -33,9 +33,6 @@ from armid_ros.recording import Recording
 import numpy as np
 import scipy.linalg
 
-#: Share of its length below which the part of a column that is independent of the others is zero.
-EXCITED = 1e-4
-
 
 def excited(
     arm: ArmModel, theory: BaseParameters, data: Sequence[Trajectory]
@@ -44,7 +41,7 @@ def excited(
     columns = [part.base_columns(arm, arm.effects, theory.independent) for part in data]
     stacked = np.concatenate([block.reshape(-1, theory.rank) for block in columns])
     names = tuple(theory.standard[column] for column in theory.independent)
-    kept = group_columns(stacked, names, tolerance=EXCITED)
+    kept = group_columns(stacked, names, tolerance=1e-4)  # share of the length of a column
     if kept.rank == theory.rank:
         return theory, columns
     base = replace(
@@ -77,17 +74,22 @@ def described_precision(
         Information on its first parameters, from recordings that are no longer available.
 
     """
-    spread = _described_spread(arm)
-    told = np.isfinite(spread)
-    covariance = np.diag(spread[told] ** 2)
+    values = np.abs(arm.theta[len(arm.robot.rigid_parameters) :])
+    largest = np.concatenate([[], *(effect.spread(arm.robot) for effect in arm.effects)])
+    of_effects = np.where(values > 0.0, values, largest)
+    std = np.concatenate([described_spread(arm.robot).ravel(), of_effects])
+    finite = np.isfinite(std)
+    covariance = np.diag(std[finite] ** 2)
     if known is not None:
-        precision = np.diag(spread**-2.0)
+        precision = np.diag(std**-2.0)
         precision[: len(known), : len(known)] += known
-        told = np.diag(precision) > 0.0
-        covariance = scaled_inverse(precision[np.ix_(told, told)])
-    seen = np.eye(base.rank) if told.all() else scipy.linalg.null_space(base.grouping[:, ~told].T)
-    within = seen.T @ base.grouping[:, told]
-    return np.asarray(seen @ scaled_inverse(within @ covariance @ within.T) @ seen.T)
+        finite = np.diag(precision) > 0.0
+        covariance = scaled_inverse(precision[np.ix_(finite, finite)])
+    kept = np.eye(base.rank)
+    if not finite.all():
+        kept = scipy.linalg.null_space(base.grouping[:, ~finite].T)
+    within = kept.T @ base.grouping[:, finite]
+    return np.asarray(kept @ scaled_inverse(within @ covariance @ within.T) @ kept.T)
 
 
 def refitted(
@@ -102,15 +104,6 @@ def refitted(
     theta = arm.theta
     change = informative_solution(matrix, vector)
     return arm.with_theta(base.lift(base.values(theta) + change, theta))
-
-
-def _described_spread(arm: ArmModel) -> FloatArray:
-    """Return the prior standard deviation of each parameter; infinite if undescribed, (P,)."""
-    size = len(arm.robot.rigid_parameters)
-    known = np.abs(arm.theta[size:])
-    own = np.concatenate([[], *(effect.spread(arm.robot) for effect in arm.effects)])
-    effects = np.where(known > 0.0, known, own)
-    return np.concatenate([arm.robot.described_spread.ravel(), effects])
 
 
 @dataclass(frozen=True)
@@ -141,37 +134,33 @@ class Baseline:
     @classmethod
     def of(cls, arm: ArmModel, data: Sequence[Trajectory], rng: np.random.Generator) -> Baseline:
         """Measure the misfit of a model in recordings of a baseline."""
-        residual = [part.residual(arm) for part in data]
+        residuals = [part.residual(arm) for part in data]
         base, columns = excited(arm, arm.base_parameters(rng), data)
-        held = described_precision(base, arm)
+        prior = described_precision(base, arm)
         informative = np.concatenate([part.informative for part in data])
-        rest = np.concatenate(residual)
-        w = np.concatenate(columns)
         informative[:, ~informative.any(axis=0)] = True  # all rows of a joint that never moved
-        scale = np.sqrt(np.mean(rest**2, axis=0, where=informative))
-        weight = informative / np.maximum(scale, 1e-12)
-        rows = w * weight[:, :, np.newaxis]
-        aim = rest * weight
+        x, y = np.concatenate(columns), np.concatenate(residuals)
+        given = np.sqrt(np.mean(y**2, axis=0, where=informative))
+        weight = informative / np.maximum(given, 1e-12)
+        rows, target = x * weight[:, :, np.newaxis], y * weight
         fold = fold_rows(data)
-        folds = range(int(fold.max()) + 1)
-        own = [np.einsum('rnp,rnq->pq', rows[fold == k], rows[fold == k]) for k in folds]
-        to = [np.einsum('rnp,rn->p', rows[fold == k], aim[fold == k]) for k in folds]
-        whole = np.linalg.lstsq(sum(own) + held, sum(to), rcond=1e-10)[0]
-        for k in folds:
-            others = np.linalg.lstsq(sum(own) - own[k] + held, sum(to) - to[k], rcond=1e-10)[0]
-            rest[fold == k] += w[fold == k] @ (whole - others)
-        predicted = np.sqrt(np.mean(rest**2, axis=0, where=informative))
-        counts = np.array([informative[fold == k].sum(axis=0) for k in folds])
-        sums = np.array(
-            [np.sum(rest[fold == k] ** 2, axis=0, where=informative[fold == k]) for k in folds]
-        )
-        worst = np.max(sums / np.maximum(counts, 1), axis=0)
-        return cls(
-            tuple(data),
-            tuple(residual),
-            np.sqrt(scale * predicted),
-            worst / np.maximum(predicted**2, 1e-300),
-        )
+        folds = [fold == k for k in range(int(fold.max()) + 1)]
+        squares = [np.einsum('rnp,rnq->pq', rows[own], rows[own]) for own in folds]
+        products = [np.einsum('rnp,rn->p', rows[own], target[own]) for own in folds]
+
+        def fitted(square: FloatArray, product: FloatArray) -> FloatArray:
+            return np.asarray(np.linalg.lstsq(square + prior, product, rcond=1e-10)[0])
+
+        square, product = sum(squares), sum(products)
+        whole, worst = fitted(square, product), np.zeros_like(given)
+        for own, own_square, own_product in zip(folds, squares, products, strict=True):
+            others = fitted(square - own_square, product - own_product)
+            y[own] += x[own] @ (whole - others)
+            power = np.sum(y[own] ** 2, axis=0, where=informative[own])
+            worst = np.maximum(worst, power / np.maximum(informative[own].sum(axis=0), 1))
+        predicted = np.sqrt(np.mean(y**2, axis=0, where=informative))
+        varies = worst / np.maximum(predicted**2, 1e-300)
+        return cls(tuple(data), tuple(residuals), np.sqrt(given * predicted), varies)
 
     @property
     def errors(self) -> tuple[float, FloatArray]:

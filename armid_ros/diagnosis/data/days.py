@@ -14,9 +14,6 @@ from armid_ros.motion import FloatArray
 import numpy as np
 import numpy.typing as npt
 
-#: Smallest unit of the rows of a joint, as a share of its rms torque.
-_LEAST = 1e-4
-
 
 @dataclass(frozen=True)
 class Rows:
@@ -52,8 +49,8 @@ class Rows:
         return cls(evidence.data, evidence.sigma, 0, amplitude).not_below_rounding()
 
     def not_below_rounding(self) -> Rows:
-        """Return the rows with units of at least the rounding error of the torque."""
-        least = _LEAST * self.torque
+        """Return the rows with units of at least 1e-4 of the rms torque, its rounding error."""
+        least = 1e-4 * self.torque
         return replace(
             self,
             sigma=tuple(np.maximum(one, least) for one in self.sigma),

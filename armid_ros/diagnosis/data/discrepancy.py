@@ -18,14 +18,14 @@ from collections.abc import Sequence
 from armid_ros.diagnosis.data.trajectory import Trajectory
 from armid_ros.effects.base import Arm
 from armid_ros.effects.catalogue import UNASKED_FRICTION
-from armid_ros.motion import FloatArray, Motion
+from armid_ros.motion import FloatArray
 import numpy as np
 
-#: Knots of the function of position, evenly over the range of motion.
-_POSITIONS = 4
+#: Number of knots of the function of position, evenly over the range of motion.
+_POSITION_KNOTS = 4
 #: Knots of the function of velocity on each side, as shares of the top speed: friction changes
 #: most at low speed.
-_SPEEDS = (0.03, 0.25, 1.0)
+_SPEED_KNOTS = (0.03, 0.25, 1.0)
 
 
 def discrepancy_columns(data: Sequence[Trajectory], arm: Arm) -> list[FloatArray]:
@@ -51,14 +51,17 @@ def discrepancy_columns(data: Sequence[Trajectory], arm: Arm) -> list[FloatArray
     motions = [part.at_rows for part in data]
     q = np.concatenate([motion.q for motion in motions])
     top = np.max([np.abs(motion.dq).max(axis=0) for motion in motions], axis=0)
-    positions = np.linspace(q.min(axis=0), q.max(axis=0), _POSITIONS)
-    velocities = np.outer([*(-share for share in reversed(_SPEEDS)), *_SPEEDS], top)
-    friction = [_unasked_friction(motion, arm) for motion in motions]
+    positions = np.linspace(q.min(axis=0), q.max(axis=0), _POSITION_KNOTS)
+    velocities = np.outer([*(-share for share in reversed(_SPEED_KNOTS)), *_SPEED_KNOTS], top)
+    friction = []
+    for motion in motions:  # the friction laws that are not fitted by default
+        laws = [kind(motion.joints).columns(motion, arm) for kind in UNASKED_FRICTION]
+        friction.append(np.stack([np.diagonal(x, axis1=1, axis2=2) for x in laws], axis=2))
     size = np.sqrt(np.mean(np.concatenate(friction) ** 2, axis=0))
     unit = np.where(size > 0.0, size, 1.0)
     found = []
-    for motion, laws in zip(motions, friction, strict=True):
-        link, own = arm.link_motion(motion), laws / unit
+    for motion, torque in zip(motions, friction, strict=True):
+        link, own = arm.link_motion(motion), torque / unit
         count = len(positions) + len(velocities) + own.shape[2]
         columns = np.zeros((*motion.q.shape, motion.n_joints * count))
         for joint in range(motion.n_joints):
@@ -71,12 +74,6 @@ def discrepancy_columns(data: Sequence[Trajectory], arm: Arm) -> list[FloatArray
             )
         found.append(columns)
     return found
-
-
-def _unasked_friction(motion: Motion, arm: Arm) -> FloatArray:
-    """Return the columns of the friction laws that are not fitted by default, (N, n, L)."""
-    laws = [kind(motion.joints).columns(motion, arm) for kind in UNASKED_FRICTION]
-    return np.stack([np.diagonal(columns, axis1=1, axis2=2) for columns in laws], axis=2)
 
 
 def hats(x: FloatArray, knots: FloatArray) -> list[FloatArray]:

@@ -25,16 +25,14 @@ import numpy as np
 import numpy.typing as npt
 from scipy import signal, stats
 
-#: Largest lag at which residuals may be correlated [rows].
-_LAGS = 20
 #: Smallest number of informative rows; with fewer, all rows are used.
-_FEW = 20
+_MIN_ROWS = 20
 #: Ratio of the noise of torques, which is coloured, to white noise with the same second
 #: differences: at most this value in 95 % of the joints of 48 recordings with two equal periods.
-_COLOUR = 1.4
+_COLOURED_OVER_WHITE = 1.4
 #: Upper frequency of disturbances by people, loose parts and nearby machines [Hz]; a band with
-#: equal noise of torques and more noise of positions [Hz]; window of spectra [s].
-_SLOW_HZ, _FAST_HZ, _WINDOW = 4.0, (6.0, 12.0), 2.5
+#: equal noise of torques and more noise of positions [Hz].
+_LOW_HZ, _HIGH_HZ = 4.0, (6.0, 12.0)
 
 
 @dataclass(frozen=True)
@@ -76,12 +74,6 @@ class Evidence:
         """Root mean square of the measured torque of each joint, shape (n,) [N m]."""
         return np.sqrt(self.power([part.torque for part in self.data]))
 
-    @cached_property
-    def noise_share(self) -> FloatArray:
-        """Mean square of the noise of each joint over that of the unit, shape (n,)."""
-        sigma = np.mean([own**2 for own in self.sigma], axis=0)
-        return np.asarray(np.mean([one**2 for one in self.noise], axis=0) / sigma)
-
     def chi2_per_row(self, residual: Sequence[FloatArray]) -> FloatArray:
         """Return the loss of each joint, the mean square of its weighted residual, shape (n,)."""
         return self.power([rows / s for rows, s in zip(residual, self.sigma, strict=True)])
@@ -108,11 +100,6 @@ class Evidence:
         rows = np.concatenate(residual) * row_weights(self.data, self.sigma)
         return np.column_stack([np.bincount(block, column) for column in rows.T**2])
 
-    @property
-    def assumed(self) -> bool:
-        """Whether the noise of some trajectory is assumed, because it has no repeated period."""
-        return any(part.period is None for part in self.data)
-
     def limits(self, residual: Sequence[FloatArray], settings: DiagnosisSettings) -> FloatArray:
         """
         Return the largest mean squared weighted residual of each joint without a gap, shape (n,).
@@ -124,29 +111,31 @@ class Evidence:
         """
         thresholds = settings.thresholds
         count = np.maximum(self.count, 2.0)
-        free = np.maximum(count / self._lasting(residual), 4.0)
+        freedom = np.maximum(count / self._correlation_length(residual), 4.0)
         each = 1.0 - (1.0 - thresholds.confidence) / len(count)
-        noise = stats.f.ppf(each, free, free) * (thresholds.same_fit if self.assumed else 1.0)
-        own = self.noise_share
-        misfit = own < 1.0 / thresholds.same_fit
-        return np.where(misfit, self.as_good(settings), noise) + self.matters(settings)
+        noise = stats.f.ppf(each, freedom, freedom)
+        if any(part.period is None for part in self.data):  # its noise is assumed
+            noise = noise * thresholds.same_fit
+        share = np.mean(np.square(self.noise), axis=0) / np.mean(np.square(self.sigma), axis=0)
+        misfit = share < 1.0 / thresholds.same_fit
+        return np.where(misfit, self.misfit_limit(settings), noise) + self.material_loss(settings)
 
-    def as_good(self, settings: DiagnosisSettings) -> FloatArray:
+    def misfit_limit(self, settings: DiagnosisSettings) -> FloatArray:
         """Return the largest loss of each joint by the misfit in another motion, (n,)."""
         varies = np.ones_like(self.count) if self.varies is None else self.varies
         return np.asarray(settings.thresholds.same_fit * np.maximum(varies, 1.0))
 
-    def matters(self, settings: DiagnosisSettings) -> FloatArray:
+    def material_loss(self, settings: DiagnosisSettings) -> FloatArray:
         """Return the loss of a residual of just material size in each joint, (n,)."""
-        sigma = np.mean([own**2 for own in self.sigma], axis=0)
-        return np.asarray((settings.material * self.torque_rms) ** 2 / sigma)
+        unit = np.mean(np.square(self.sigma), axis=0)
+        return np.asarray((settings.material * self.torque_rms) ** 2 / unit)
 
-    def _lasting(self, residual: Sequence[FloatArray]) -> FloatArray:
+    def _correlation_length(self, residual: Sequence[FloatArray]) -> FloatArray:
         """Return the correlation length of the squared residual, shape (n,) [rows]."""
-        products = np.zeros((_LAGS + 1, len(self.count)))
+        products = np.zeros((21, len(self.count)))  # correlated over 20 rows at most
         for part, own in zip(self.data, residual, strict=True):
             rows = np.where(part.informative, own, 0.0)
-            for lag in range(min(_LAGS + 1, len(rows))):
+            for lag in range(min(len(products), len(rows))):
                 products[lag] += np.sum(rows[lag:] * rows[: len(rows) - lag], axis=0)
         correlation = products[1:] / np.maximum(products[0], 1e-300)
         return np.asarray(1.0 + 2.0 * np.sum(correlation**2, axis=0))
@@ -219,16 +208,16 @@ def noise_floor(trajectory: Trajectory, arm: ArmModel) -> NoiseFloor:
         sigma[joint] = np.sqrt(np.sum(rest[used] ** 2) / freedom / 2.0)
         rest, used = _difference(trajectory, residual, first, lag, joint)
         rest = np.where(used, rest, 0.0)
-        length = min(len(rest), int(_WINDOW * trajectory.used.rate_hz))
+        length = min(len(rest), int(2.5 * trajectory.used.rate_hz))
         frequency, power = signal.welch(
             rest, fs=trajectory.used.rate_hz, nperseg=length, detrend=False
         )
-        low = (frequency > 0.0) & (frequency < _SLOW_HZ)
-        fast = (frequency > _FAST_HZ[0]) & (frequency < _FAST_HZ[1])
-        if low.any() and fast.sum() >= 3:
-            structure[joint] = power[low].mean() / max(float(power[fast].mean()), 1e-300)
+        low = (frequency > 0.0) & (frequency < _LOW_HZ)
+        high = (frequency > _HIGH_HZ[0]) & (frequency < _HIGH_HZ[1])
+        if low.any() and high.sum() >= 3:
+            structure[joint] = power[low].mean() / max(float(power[high].mean()), 1e-300)
         moving = np.sqrt(len(used) / max(2.0 * used.sum(), 1.0))
-        below = power[frequency < _SLOW_HZ].sum() * frequency[1]
+        below = power[frequency < _LOW_HZ].sum() * frequency[1]
         slow[joint] = np.sqrt(below) * moving
     structure[sigma < least] = 1.0
     sigma = np.maximum(sigma, least)
@@ -254,7 +243,7 @@ def _difference(
     used = _in_informative_rows(trajectory, first, joint) & _in_informative_rows(
         trajectory, first + lag, joint
     )
-    if used.sum() < _FEW:
+    if used.sum() < _MIN_ROWS:
         used = np.ones(len(first), dtype=bool)
     fit = np.linalg.lstsq(drifting[used], difference[used], rcond=None)[0]
     return difference - drifting @ fit, used
@@ -280,11 +269,13 @@ def _assumed(trajectory: Trajectory, smooth: FloatArray) -> FloatArray:
     rows, informative = smooth[trajectory.rows], trajectory.informative
     bend = np.diff(rows, 2, axis=0)
     between = informative[:-2] & informative[1:-1] & informative[2:]
-    between[:, between.sum(axis=0) < _FEW] = True
+    between[:, between.sum(axis=0) < _MIN_ROWS] = True
     power = np.sum(bend**2, axis=0, where=between) / np.maximum(between.sum(axis=0), 1)
     used = trajectory.used
     phase = 2.0 * np.pi * np.linspace(0.0, used.kept_hz * used.decimation / used.rate_hz, 100)
-    return np.asarray(_COLOUR * np.sqrt(power / np.mean((2.0 - 2.0 * np.cos(phase)) ** 2)))
+    return np.asarray(
+        _COLOURED_OVER_WHITE * np.sqrt(power / np.mean((2.0 - 2.0 * np.cos(phase)) ** 2))
+    )
 
 
 def _least(trajectory: Trajectory, arm: ArmModel) -> FloatArray:

@@ -35,8 +35,6 @@ import numpy as np
 import numpy.typing as npt
 from scipy import signal
 
-#: Rate of the columns, divided by that of the rows; it resolves signs of velocity and hysteresis.
-_OVERSAMPLING = 8
 #: Share of its top speed below which a joint is at rest, and shortest time of a rest [s].
 _REST_SPEED, REST_TIME = 0.02, 0.2
 #: The sign of a velocity, and with it dry friction, is uncertain below this share of the top
@@ -44,13 +42,7 @@ _REST_SPEED, REST_TIME = 0.02, 0.2
 _REVERSAL_SPEED, _REVERSAL_NOISE = 0.004, 3.0
 #: Smallest limit of the share of an informative row with an uncertain sign of velocity; the three
 #: rows next to a reversal exceed it.
-UNSURE = 0.003
-#: Least number of folds of all data. Each recording has two or more, so an effect in a single
-#: fast recording is fitted to one half of it and predicted in the other.
-PARTS = 6
-#: Number of blocks of a fold, each of 1 to 2 s, longer than any correlation of noise; smallest
-#: number of rows of a block.
-BLOCKS, _LEAST_ROWS = 6, 8
+MAX_UNCERTAIN_SHARE = 0.003
 
 
 @dataclass(frozen=True)
@@ -74,8 +66,6 @@ class Trajectory:
         Share of each row in which the sign of the velocity is uncertain; infinite at rest.
     allowed : ndarray, shape (n,)
         The largest such share of an informative row.
-    period_recorded : float
-        Sampling period of the recording [s].
     sensors : SensorNoise or None
         Effect of sensor noise on an arm tied to another machine; None for an arm alone.
 
@@ -88,7 +78,6 @@ class Trajectory:
     rows: npt.NDArray[np.intp]
     unsure: FloatArray
     allowed: FloatArray
-    period_recorded: float
     sensors: SensorNoise | None = None
 
     @cached_property
@@ -193,12 +182,11 @@ def trajectories(
         if not found:
             check_stamps([recording], used)
             raise no_stretch(recording, used)
-        if allowed is not None:
-            found = [replace(part, allowed=allowed) for part in found]
+        sensors = None
         if recording.partner is not None and arm is not None:
             sensors = SensorNoise(arm.robot, recording, used)
-            found = [replace(part, sensors=sensors) for part in found]
-        result += found
+        limits = found[0].allowed if allowed is None else allowed
+        result += [replace(part, allowed=limits, sensors=sensors) for part in found]
     return result
 
 
@@ -222,7 +210,8 @@ def _widest(used: Conditioning) -> int:
 
     """
     fast_enough = int(used.rate_hz / (4.0 * used.cutoff_hz))
-    return max(1, min(used.decimation // _OVERSAMPLING, fast_enough))
+    # eight samples a row resolve signs of velocity and hysteresis
+    return max(1, min(used.decimation // 8, fast_enough))
 
 
 def _trajectory(
@@ -237,9 +226,8 @@ def _trajectory(
         used = Conditioning(used.rate_hz / thin, used.cutoff_hz, used.decimation // thin)
     rows = np.array(decimated_samples(len(motion), used), dtype=np.intp)
     unsure = np.where(_at_rest(motion), np.inf, _unsure(motion, used, least))[rows]
-    allowed = np.full(motion.n_joints, UNSURE)
-    source, period = recording.source, recording.period
-    return Trajectory(source, fold, motion, used, rows, unsure, allowed, period)
+    allowed = np.full(motion.n_joints, MAX_UNCERTAIN_SHARE)
+    return Trajectory(recording.source, fold, motion, used, rows, unsure, allowed)
 
 
 def _at_rest(motion: Motion) -> npt.NDArray[np.bool_]:
@@ -274,7 +262,8 @@ def block_rows(
     owner: list[int] = []
     for k in np.unique(fold):
         rows = np.flatnonzero(fold == k)
-        pieces = min(BLOCKS, max(2, len(rows) // _LEAST_ROWS), len(rows))
+        # six blocks of 1 to 2 s, longer than any correlation of noise, of eight rows or more
+        pieces = min(6, max(2, len(rows) // 8), len(rows))
         for piece in np.array_split(rows, pieces):
             block[piece] = len(owner)
             owner.append(int(k))
@@ -301,8 +290,14 @@ def not_shown(data: Sequence[Trajectory], joints: Sequence[str]) -> tuple[str, .
 
 
 def fold_rows(data: Sequence[Trajectory]) -> npt.NDArray[np.intp]:
-    """Return the number of the fold of every row; a fold is a stretch of one recording."""
-    pieces = max(2, -(-PARTS // max(count_recordings(data), 1)))
+    """
+    Return the number of the fold of every row; a fold is a stretch of one recording.
+
+    All data have six folds or more. Each recording has two or more, so an effect in a single fast
+    recording is fitted to one half of it and predicted in the other.
+
+    """
+    pieces = max(2, -(-6 // max(count_recordings(data), 1)))
     rows = []
     for part in data:
         span = np.linspace(0, pieces, len(part.rows), endpoint=False).astype(np.intp)

@@ -11,7 +11,7 @@ with a large enough share, the others are minor.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from armid_ros.diagnosis.data.evidence import Evidence
@@ -23,9 +23,6 @@ from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.motion import FloatArray
 import numpy as np
 
-#: Number of bootstrap samples: ends of a 95 % interval are accurate to a tenth of its width.
-_RESAMPLINGS = 500
-
 
 @dataclass(frozen=True)
 class Attribution:
@@ -36,27 +33,28 @@ class Attribution:
     ----------
     order : tuple of int
         Indices of the named causes in the order in which they are added, largest gain first.
-    whole : ndarray, shape (B,)
-        The gap: squared held-out residual without named causes.
-    taken : ndarray, shape (K, B)
+    gap : ndarray, shape (B,)
+        Squared held-out residual without named causes.
+    gains : ndarray, shape (K, B)
         Gain of each named cause, in the order of the explanation.
 
     """
 
     order: tuple[int, ...]
-    whole: FloatArray
-    taken: FloatArray
+    gap: FloatArray
+    gains: FloatArray
 
     def share(self, names: Sequence[int]) -> float:
         """Return the share of the gap that some causes explain together, at most 1."""
-        share = self.taken[list(names)].sum() / max(float(self.whole.sum()), 1e-300)
+        share = self.gains[list(names)].sum() / max(float(self.gap.sum()), 1e-300)
         return min(float(share), 1.0)
 
     def interval(self, names: Sequence[int], rng: np.random.Generator) -> tuple[float, float]:
         """Return the 95 % interval of the share that some causes explain together."""
-        drawn = rng.integers(len(self.whole), size=(_RESAMPLINGS, len(self.whole)))
-        taken = self.taken[list(names)].sum(axis=0)[drawn].sum(axis=1)
-        shares = taken / np.maximum(self.whole[drawn].sum(axis=1), 1e-300)
+        # with 500 resamples, the ends of the interval are accurate to a tenth of its width
+        drawn = rng.integers(len(self.gap), size=(500, len(self.gap)))
+        gains = self.gains[list(names)].sum(axis=0)[drawn].sum(axis=1)
+        shares = gains / np.maximum(self.gap[drawn].sum(axis=1), 1e-300)
         low, high = np.quantile(shares, [0.025, 0.975])
         return min(float(low), 1.0), min(float(high), 1.0)
 
@@ -109,76 +107,60 @@ def predicted(explanation: Explanation, order: Sequence[int], unseen: Evidence) 
     every = [explanation.reference, *(one.fitted for one in fewer), explanation.fitted]
     arms = [one.arm for one in every[: len(order) + 1]]
     squares = [unseen.block_squares(unseen.residuals(arm)).sum(axis=1) for arm in arms]
-    taken = np.zeros((len(order), len(squares[0])))
-    for position, k in enumerate(order):
-        taken[k] = squares[position] - squares[position + 1]
-    return Attribution(tuple(order), squares[0], taken)
+    gains = np.zeros((len(order), len(squares[0])))
+    gains[list(order)] = -np.diff(squares, axis=0)
+    return Attribution(tuple(order), squares[0], gains)
 
 
 def left_out(explanation: Explanation) -> Attribution:
     """Return the cross-validated gain of each cause, added in order of gain."""
     assert explanation.problem is not None
-    problem, own = explanation.problem, explanation.fitted
-    linear = problem.linear(own.named)
-    folds, spans = _folds(problem, linear), linear.spans
-    count = len(own.named)
-    remaining, order = list(range(count)), list[int]()
+    problem, named = explanation.problem, explanation.fitted.named
+    linear = problem.linear(named)
+    folds, spans = list(_folds(problem, linear)), linear.spans
+    remaining, order = list(range(len(named))), list[int]()
 
-    def left(names: Sequence[int]) -> FloatArray:
-        others = [spans[n] for n in range(count) if n not in names]
+    def squared_residual(causes: Sequence[int]) -> FloatArray:
+        """Return the squared held-out residual of each block, all other causes being zero."""
+        others = [spans[n] for n in range(len(named)) if n not in causes]
         absent = [k for span in others for k in range(span.start, span.stop)]
-        return np.concatenate([one.left(absent) for one in folds])
+        squares = []
+        for columns, target, means, covariance in folds:
+            values = means
+            if absent:
+                border = covariance[:, absent]
+                values = means - border @ np.linalg.solve(border[absent], means[absent])
+            pairs = zip(columns, target, strict=True)
+            squares += [np.sum((y - x @ values) ** 2) for x, y in pairs]
+        return np.array(squares)
 
-    before = whole = left(())
-    taken = np.zeros((count, len(whole)))
+    before = gap = squared_residual(())
+    gains = np.zeros((len(named), len(gap)))
     while remaining:
-        after = {k: left([*order, k]) for k in remaining}
+        after = {k: squared_residual([*order, k]) for k in remaining}
         best = min(remaining, key=lambda k: float(after[k].sum()))
-        taken[best], before = before - after[best], after[best]
+        gains[best], before = before - after[best], after[best]
         order.append(best)
         remaining.remove(best)
-    return Attribution(tuple(order), whole, taken)
+    return Attribution(tuple(order), gap, gains)
 
 
-@dataclass(frozen=True)
-class _Fold:
+def _folds(
+    problem: JointFit, linear: Nuisance
+) -> Iterator[tuple[list[FloatArray], list[FloatArray], FloatArray, FloatArray]]:
     """
-    A part of a recording, with the posterior of all parameters fitted to the other parts.
+    Yield the folds of the diagnosed day.
 
-    Attributes
-    ----------
-    columns : sequence of ndarray, each (m, p)
-        Weighted columns of each block; zero for parameters that are not part of the arm.
-    target : sequence of ndarray, each (m,)
-        Weighted residual of each block.
-    means, covariance : ndarray, shape (p,), (p, p)
-        The posterior.
+    A fold has weighted columns (m, p) and residual (m,) of its blocks, and the means and the
+    covariance of all parameters fitted to all other rows. Columns are zero for parameters that
+    are not part of the arm.
 
     """
-
-    columns: Sequence[FloatArray]
-    target: Sequence[FloatArray]
-    means: FloatArray
-    covariance: FloatArray
-
-    def left(self, absent: Sequence[int]) -> FloatArray:
-        """Return the squared residual of each block, given that some parameters are zero."""
-        values, border = self.means, self.covariance[:, absent]
-        if absent:
-            values = values - border @ np.linalg.solve(border[absent], values[absent])
-        pairs = zip(self.columns, self.target, strict=True)
-        return np.array([np.sum((y - x @ values) ** 2) for x, y in pairs])
-
-
-def _folds(problem: JointFit, linear: Nuisance) -> list[_Fold]:
-    """Return the folds of the diagnosed day, each predicted from all other rows."""
-    rows, found = linear.rows, list[_Fold]()
+    rows = linear.rows
     part_of_arm = np.ones(linear.cross.shape[1], dtype=bool)
     part_of_arm[: linear.rank] = problem.stated
     part_of_arm[linear.discrepancy] = False
-    for k in problem.recordings:
-        if not rows.today[k]:
-            continue
+    for k in (k for k in problem.recordings if rows.today[k]):
         block, fold = block_rows([part for part in rows.data if part.fold == k])
         x, y = linear.rows_of(k), linear.residual[k].T
         for one in np.unique(fold):
@@ -187,6 +169,4 @@ def _folds(problem: JointFit, linear: Nuisance) -> list[_Fold]:
             target = [y[own].ravel() for own in blocks]
             less = k, np.concatenate(columns), np.concatenate(target)
             under = linear.marginal(problem.setting, problem.recordings, less)
-            columns = [own * part_of_arm for own in columns]
-            found.append(_Fold(columns, target, *linear.whole(under)))
-    return found
+            yield [own * part_of_arm for own in columns], target, *linear.whole(under)

@@ -25,9 +25,6 @@ from armid_ros.robots.ties import Tie
 import numpy as np
 import scipy.linalg
 
-#: Smallest share of the gap of a minor cause that a sentence mentions.
-SAID = 0.01
-
 
 @dataclass(frozen=True)
 class Rival:
@@ -67,8 +64,6 @@ class Finding:
         Probability that the effect is not there, or has not changed.
     rivals : tuple of Rival
         Other effects that the data do not exclude, the likeliest first.
-    gain : float
-        Reduction of the squared held-out residual; twice the log Bayes factor of a minor cause.
     sign : str
         Meaning of a positive value, if the name does not express it.
     ties : tuple of Tie
@@ -97,7 +92,6 @@ class Finding:
     share_interval: tuple[float, float]
     p: float
     rivals: tuple[Rival, ...] = ()
-    gain: float = 0.0
     sign: str = ''
     ties: tuple[Tie, ...] = ()
     weighs: bool = False
@@ -233,6 +227,12 @@ class Diagnosis:
         consistent, named, ambiguous, partial, unknown, not_repeatable or bad_data.
     summary : str
         The verdict in a sentence or two.
+    arm : ArmModel
+        The patched model; the given one if nothing was named or a patch would make it worse.
+    data : tuple of Trajectory
+        The diagnosed recordings.
+    notes : tuple of str
+        Notes for the reader of the report.
     findings : tuple of Finding
         The headline: named effects with share, parameters, rivals and the experiment that would
         separate them.
@@ -246,16 +246,10 @@ class Diagnosis:
         Residuals without and with the named effects, and the floor; None if the data are bad.
     explanation : Explanation or None
         The named effects with their fits and trials; None if the data are bad.
-    arm : ArmModel
-        The patched model; the given one if nothing was named or a patch would make it worse.
-    data : tuple of Trajectory
-        The diagnosed recordings.
     not_visible : tuple of str
         Effects of the catalogue that these data cannot show.
     refitted : bool
         Whether the rigid body was refitted.
-    notes : tuple of str
-        Notes for the reader of the report.
     baseline : str
         The floor of the gap in words: the noise, the misfit of the model, or an estimate of it.
     harmful : bool
@@ -269,18 +263,18 @@ class Diagnosis:
 
     verdict: str
     summary: str
-    findings: tuple[Finding, ...]
-    minor: tuple[Finding, ...]
-    where: tuple[Where, ...]
-    left: tuple[Where, ...]
-    gap: Gap | None
-    explanation: Explanation | None
     arm: ArmModel
     data: tuple[Trajectory, ...]
-    not_visible: tuple[str, ...]
-    refitted: bool
     notes: tuple[str, ...]
-    baseline: str
+    findings: tuple[Finding, ...] = ()
+    minor: tuple[Finding, ...] = ()
+    where: tuple[Where, ...] = ()
+    left: tuple[Where, ...] = ()
+    gap: Gap | None = None
+    explanation: Explanation | None = None
+    not_visible: tuple[str, ...] = ()
+    refitted: bool = False
+    baseline: str = ''
     harmful: bool = False
     doubt: str = ''
     spans: tuple[Span, ...] = ()

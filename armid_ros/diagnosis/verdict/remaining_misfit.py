@@ -107,7 +107,7 @@ class RemainingMisfit:
             spread = more.std(axis=0, ddof=1) * np.sqrt(len(more))
             total = more.sum(axis=0)
             floor = np.maximum(had.sum(axis=0), part.count)
-            limit = part.as_good(self.settings) + part.matters(self.settings)
+            limit = part.misfit_limit(self.settings) + part.material_loss(self.settings)
             surely = (total > thresholds.surely * spread) & (total > _SLIGHTLY * floor)
             by_far = total > (thresholds.same_fit - 1.0) * floor
             worse |= (surely | by_far) & (part.chi2_per_row(residuals[1]) > limit)

@@ -72,7 +72,7 @@ def unlisted_laws(explanation: Explanation, settings: DiagnosisSettings) -> list
     linear = problem.linear(named.named)
     rows, joints = linear.rows, linear.arm.robot.joints
     misfit = rows.amplitude[-1]
-    limit = np.mean(np.square(evidence.sigma), axis=0) * (1.0 + evidence.matters(settings))
+    limit = np.mean(np.square(evidence.sigma), axis=0) * (1.0 + evidence.material_loss(settings))
     ratio = {of: np.zeros(len(joints)) for of in ('velocity', 'position')}
     alarm = settings.thresholds.alarm + np.log(len(ratio) * len(joints))
     found = Counter(one.effect.joints for one in (*explanation.steps, *explanation.minor))

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from armid_ros.arm import ArmModel
-from armid_ros.diagnosis.verdict.finding import Finding, Gap, Rival, SAID
+from armid_ros.diagnosis.verdict.finding import Finding, Gap, Rival
 from armid_ros.diagnosis.verdict.where import Excess
 from armid_ros.effects import CATALOGUE
 from armid_ros.estimate import name_in_words, ParameterName
@@ -84,7 +84,7 @@ def decide(
     size = larger(np.sqrt(worst.ratio.max())) + f' expected from {floor_in_words}{worst.more}'
     no_larger = f'is no larger than {floor_in_words}'
     refit = _refit(as_it_is, arm.robot, floor_in_words)
-    shown = bool(minor) and minor[0].share >= SAID
+    shown = bool(minor) and minor[0].share >= 0.01  # of the gap
     small = sentence(minor[0], 'the gap' if open_gap else 'the remaining error') if shown else ''
     if not findings:
         if open_gap:
