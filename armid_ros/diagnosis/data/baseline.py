@@ -77,7 +77,7 @@ def described_precision(
     values = np.abs(arm.theta[len(arm.robot.rigid_parameters) :])
     largest = np.concatenate([[], *(effect.spread(arm.robot) for effect in arm.effects)])
     of_effects = np.where(values > 0.0, values, largest)
-    std = np.concatenate([described_spread(arm.robot).ravel(), of_effects])
+    std = np.concatenate([arm.robot.described_spread.ravel(), of_effects])
     finite = np.isfinite(std)
     covariance = np.diag(std[finite] ** 2)
     if known is not None:

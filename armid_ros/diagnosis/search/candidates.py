@@ -35,19 +35,13 @@ from armid_ros.robots import Robot
 import numpy as np
 from scipy import optimize
 
-#: Largest number of combinations of start values of shapes.
-_MOST_SHAPES = 12
-#: Largest distance of side lobes from a spectral peak, and half width of the peak [1/rev].
-_LOBES, _PEAK = 3.0, 0.2
-#: Largest number of evaluations of one line search.
-_EVALUATIONS = 9
 #: Smallest share of samples in which an effect that rests has no torque; a strap that is always
 #: taut fits as a spring.
-_LEAST_AT_REST = 0.1
+_MIN_SHARE_AT_REST = 0.1
 #: Reference temperatures where none is measured.
 _NO_REFERENCE: Mapping[str, float] = MappingProxyType({})
 #: Largest mass [1], first moments [m] and inertias [m^2] of a body, divided by its mass.
-_BODY = np.array([1.0, *3 * [0.1], *6 * [0.01]])
+_BODY_SIZES = np.array([1.0, *3 * [0.1], *6 * [0.01]])
 
 
 @dataclass(frozen=True)
@@ -166,13 +160,14 @@ class Causes:
         yield from filter(None, (self._known[key] for key in keys))
 
     @cached_property
-    def _parts(self) -> list[Trajectory]:
+    def _predicted(self) -> list[Trajectory]:
+        """Return the trajectories with the torque of the model in place of the measured one."""
         arm = self.nuisance.arm
         return [without_measurement(part, arm) for part in self.nuisance.rows.data]
 
     def _columns(self, effect: Effect) -> list[FloatArray]:
         """Return the columns of an effect in each trajectory, (M, n, p)."""
-        return [part.columns(self.nuisance.arm, effect) for part in self._parts]
+        return [part.columns(self.nuisance.arm, effect) for part in self._predicted]
 
     def renewed(self, cause: Cause) -> Cause:
         """Return a cause of another comparison with products for these nuisance columns."""
@@ -211,7 +206,7 @@ class Causes:
         rows, robot = self.nuisance.rows, self.nuisance.arm.robot
         torque = _torque_of(columns, rows)
         seen = torque.any(axis=0)
-        if not seen.any() or (effect.traits.rests and _at_rest(columns, rows) < _LEAST_AT_REST):
+        if not seen.any() or (effect.traits.rests and _at_rest(columns, rows) < _MIN_SHARE_AT_REST):
             return None
         return cause_of(
             self.nuisance,
@@ -250,7 +245,7 @@ def _unit(
         spread = np.where(np.isinf(spread), most, spread)
     spread = spread[list(kept)]
     if effect.adds_to(robot):  # a load and a link error have the same columns
-        spread = (float(robot.rigid_parameters[::10].sum()) * _BODY)[list(kept)]
+        spread = (float(robot.rigid_parameters[::10].sum()) * _BODY_SIZES)[list(kept)]
     largest = 1.0 / np.maximum(np.max(torque / rows.torque[:, np.newaxis], axis=0), 1e-12)
     return np.asarray(np.minimum(largest, np.where(spread > 0.0, spread, np.inf)))
 
@@ -371,16 +366,12 @@ def shaped(
         return
     grids = effect.shape_starts(unexplained, arm)
     counts = [grid.shape[1] for grid in grids]
-    together = len(set(counts)) == 1 and int(np.prod(counts)) > _MOST_SHAPES
-    chosen = (
-        [(k,) * len(counts) for k in range(counts[0])]
-        if together
-        else list(product(*(range(count) for count in counts)))
-    )
-    for index in chosen:
+    indices = list(product(*(range(count) for count in counts)))
+    if len(indices) > 12 and len(set(counts)) == 1:  # too many: only the diagonal of the grid
+        indices = [(k,) * len(counts) for k in range(counts[0])]
+    lower, upper = ([getattr(s, end) for s in effect.shapes] for end in ('lower', 'upper'))
+    for index in indices:
         values = np.column_stack([grid[:, k] for grid, k in zip(grids, index, strict=True)])
-        lower = np.array([s.lower for s in effect.shapes])
-        upper = np.array([s.upper for s in effect.shapes])
         values = np.clip(values, lower, upper)
         rows = values if len(members) > 1 else [values.ravel()]
         whole = effect.with_shape(values)
@@ -399,10 +390,10 @@ def line_search(
         moved[index] = np.exp(x) if positive else x
         return moved
 
-    if kind.unit == '1/rev':  # side lobes are almost as high as the peak
-        scan = value + np.linspace(-_LOBES, _LOBES, 25)
+    if kind.unit == '1/rev':  # a peak is 0.4 wide; its side lobes are almost as high
+        scan = value + np.linspace(-3.0, 3.0, 25)
         value = max(scan[scan > kind.lower].tolist(), key=lambda x: gain(at(x)))
-        low, high = value - _PEAK, value + _PEAK
+        low, high = value - 0.2, value + 0.2
     elif positive:
         ratio = max([b / a for a, b in pairwise(sorted(kind.grid)) if a > 0.0] or [3.0])
         ratio = min(ratio, 3.5)
@@ -417,7 +408,7 @@ def line_search(
         lambda x: -gain(at(x)),
         bounds=(low, high),
         method='bounded',
-        options={'maxiter': _EVALUATIONS},
+        options={'maxiter': 9},
     )
     return at(found.x) if -found.fun > gain(shape) else shape
 

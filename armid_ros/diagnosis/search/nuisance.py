@@ -33,12 +33,10 @@ import numpy.typing as npt
 from scipy import linalg
 
 #: Least prior precision over the squares of a column, so that the equations can be solved.
-_HELD = 1e-12
+_MIN_PRECISION = 1e-12
 #: Relative prior error of a described value of an effect, or of a torque in unvisited states.
 #: Errors of values in the laboratory reach 0.1, and friction of an arm changes by 0.2 in a day.
-_DESCRIBED = 0.25
-#: Smallest number of rows for a correlation, negligible correlation, and largest lag [rows].
-_FEW, _UNCORRELATED, _LAGS = 60, 0.05, 20
+_RELATIVE_PRIOR_STD = 0.25
 
 
 @dataclass(frozen=True)
@@ -120,7 +118,7 @@ class Nuisance:
         values = arm.theta[base.independent]
         unset = (base.independent >= rigid) & (values == 0.0)  # noqa: RUF069 - no given value
         given = (base.independent >= rigid) & ~unset
-        described[given, given] += (_DESCRIBED * values[given]) ** -2.0
+        described[given, given] += (_RELATIVE_PRIOR_STD * values[given]) ** -2.0
         joints = range(arm.robot.n_joints)
         flat = [x.reshape(-1, base.rank) for x in rows.weighted(columns, joints)]
         turn = _orthonormal_transform(np.concatenate(flat), described, unset)
@@ -257,7 +255,7 @@ class Nuisance:
             np.mean([np.diag(x)[self.discrepancy] for x in part], axis=0)
             for part in (self.square[:before], self.square[before:])
         )
-        most = np.maximum(_DESCRIBED * self.rows.torque / self.rows.amplitude[0], 1.0)
+        most = np.maximum(_RELATIVE_PRIOR_STD * self.rows.torque / self.rows.amplitude[0], 1.0)
         with np.errstate(divide='ignore', invalid='ignore'):
             more = np.sqrt(np.where(now > 0.0, now / then, 1.0))
         return np.asarray(np.clip(more, 1.0, most[:, np.newaxis]))
@@ -268,8 +266,8 @@ class Nuisance:
         rigid = self.base.independent < len(self.arm.robot.rigid_parameters)
         scale = np.where(rigid, setting.body or 1.0, 1.0)
         body = self.turn.T @ (self.described / np.outer(scale, scale)) @ self.turn
-        body += _HELD * np.eye(self.rank)
-        size = max(setting.shared, _HELD) * unit[:, np.newaxis] * self.reach
+        body += _MIN_PRECISION * np.eye(self.rank)
+        size = max(setting.shared, _MIN_PRECISION) * unit[:, np.newaxis] * self.reach
         shared = size.ravel() ** -2.0
         more = [one.prior[0] for one in self.accepted]
         whole = linalg.block_diag(body, np.diag(shared), *more)
@@ -396,19 +394,23 @@ class Nuisance:
         return rest
 
     def lasting(self, under: Marginal, recordings: Sequence[int], least: float) -> float:
-        """Return the median correlation length of the residual [rows]."""
-        found = []
+        """
+        Return the median correlation length of the residual [rows].
+
+        It is the sum of the correlations at all lags, up to the first one below 0.05.
+
+        """
+        lengths = []
         values = self.means(under)
         for k in recordings:
-            rest = self.unexplained(values, under.setting, k)
-            for x in rest:
+            for x in self.unexplained(values, under.setting, k):
                 x = x[np.abs(x) > 0.0]
-                if len(x) >= _FEW:
-                    lags = np.array([x[lag:] @ x[:-lag] for lag in range(1, _LAGS)]) / (x @ x)
-                    below = lags < _UNCORRELATED
-                    count = int(np.argmax(below)) if below.any() else len(lags)
-                    found.append(1.0 + 2.0 * float(lags[:count].sum()))
-        return max(float(np.median(found)) if found else least, 1.0)
+                if len(x) >= 60:  # three times the largest lag
+                    correlation = np.array([x[lag:] @ x[:-lag] for lag in range(1, 20)]) / (x @ x)
+                    below = correlation < 0.05
+                    count = int(np.argmax(below)) if below.any() else len(correlation)
+                    lengths.append(1.0 + 2.0 * float(correlation[:count].sum()))
+        return max(float(np.median(lengths)) if lengths else least, 1.0)
 
 
 def _orthonormal_transform(

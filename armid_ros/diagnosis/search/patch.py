@@ -18,11 +18,6 @@ from armid_ros.estimate import ParameterName
 from armid_ros.motion import FloatArray, Motion
 import numpy as np
 
-#: Largest relative change of a shape in one step; the search has already refined it.
-_SHAPE_STEP = 0.1
-#: Relative step of finite differences with respect to a shape.
-_STEP = 1e-3
-
 
 @dataclass(frozen=True)
 class Patch:
@@ -60,7 +55,8 @@ class Patch:
             if shapes:
                 low, high, step = _shape_bounds(effect)
                 shape = np.array(effect.shape)
-                limit = np.maximum(_SHAPE_STEP * np.abs(shape), 30.0 * step)
+                # the search has refined the shape, so a step is small
+                limit = np.maximum(0.1 * np.abs(shape), 30.0 * step)
                 shape = shape + np.clip(change[list(shapes)], -limit, limit)
                 effect = effect.with_shape(np.clip(shape, low, high))
             named.append(NamedEffect(effect, own.kept, np.clip(values, lower, upper)))
@@ -109,7 +105,7 @@ def _shape_bounds(effect: Effect) -> tuple[FloatArray, FloatArray, FloatArray]:
     low = np.tile([s.lower for s in effect.shapes], owners)
     high = np.tile([s.upper for s in effect.shapes], owners)
     size = np.tile([max(abs(s.default), 1e-3) for s in effect.shapes], owners)
-    return low, high, _STEP * np.maximum(np.abs(np.array(effect.shape)), 0.1 * size)
+    return low, high, 1e-3 * np.maximum(np.abs(np.array(effect.shape)), 0.1 * size)
 
 
 def patch_columns(state: Patch, part: Trajectory) -> list[FloatArray]:
@@ -119,31 +115,29 @@ def patch_columns(state: Patch, part: Trajectory) -> list[FloatArray]:
     for named in state.named:
         columns = [model.columns_of(named.effect, motion)[:, :, list(named.kept)]]
         if named.effect.shape:
-            position = len(model.effects) - 1 - model.effects[::-1].index(named.effect)
-            columns.append(_shape_columns(model, position, motion))
+            columns.append(_shape_columns(model, named.effect, motion))
         blocks.append(part.reduce(np.concatenate(columns, axis=2)))
     return blocks
 
 
-def _shape_columns(model: ArmModel, position: int, motion: Motion) -> FloatArray:
+def _shape_columns(model: ArmModel, effect: Effect, motion: Motion) -> FloatArray:
     """Return the finite-difference Jacobian of the torque by the shape, (N, n, S)."""
-    effect = model.effects[position]
+    place = len(model.effects) - 1 - model.effects[::-1].index(effect)
     low, high, step = _shape_bounds(effect)
     shape = np.array(effect.shape)
+
+    def torque(index: int, value: float) -> FloatArray:
+        """Return the torque for another shape, up to a part independent of the shape."""
+        moved = shape.copy()
+        moved[index] = value
+        other = effect.with_shape(moved)
+        if effect.linear and not isinstance(effect, TorqueReading):
+            return np.asarray(model.columns_of(other, motion) @ model.values[place])
+        effects = (*model.effects[:place], other, *model.effects[place + 1 :])
+        return replace(model, effects=effects).torque(motion)
+
     columns = np.empty((len(motion), motion.n_joints, len(shape)))
-    for index, own in enumerate(step):
-        ends, torques = np.clip(shape[index] + [own, -own], low[index], high[index]), []
-        for end in ends:
-            moved = shape.copy()
-            moved[index] = end
-            torques.append(_torque_with(model, position, effect.with_shape(moved), motion))
-        columns[:, :, index] = (torques[0] - torques[1]) / max(ends[0] - ends[1], 1e-12)
+    for k, own in enumerate(step):
+        above, below = np.clip(shape[k] + [own, -own], low[k], high[k]).tolist()
+        columns[:, :, k] = (torque(k, above) - torque(k, below)) / max(above - below, 1e-12)
     return columns
-
-
-def _torque_with(model: ArmModel, position: int, effect: Effect, motion: Motion) -> FloatArray:
-    """Return the torque for another shape of an effect, up to a part independent of the shape."""
-    if effect.linear and not isinstance(effect, TorqueReading):
-        return np.asarray(model.columns_of(effect, motion) @ model.values[position])
-    effects = (*model.effects[:position], effect, *model.effects[position + 1 :])
-    return replace(model, effects=effects).torque(motion)

@@ -23,7 +23,7 @@ from armid_ros.diagnosis.search.candidates import cause_of, value_unit
 from armid_ros.diagnosis.search.cause import Cause, NamedEffect
 from armid_ros.diagnosis.search.nuisance import Nuisance
 from armid_ros.diagnosis.search.patch import Patch, patch_columns, places
-from armid_ros.diagnosis.search.setting import LASTING, Marginal, Setting
+from armid_ros.diagnosis.search.setting import LASTING, Setting
 from armid_ros.effects.gravity import GravityVector
 from armid_ros.estimate import Estimate
 from armid_ros.motion import FloatArray
@@ -31,20 +31,6 @@ import numpy as np
 
 #: Relative standard deviation of gravity on one celestial body: Earth has 9.78 to 9.83 m/s^2.
 SAME_GRAVITY = 0.003
-#: Largest number of Gauss-Newton steps; the comparison has refined the shapes already.
-_MOST_ROUNDS = 4
-#: Step lengths of the line search, until the loss decreases.
-_SHARES = (1.0, 0.5, 0.2)
-#: Relative change of the loss at which the fit has converged.
-_SETTLED = 1e-4
-#: Relative prior standard deviation of a shape; it is small as the comparison refined the shape.
-_SHAPE = 0.3
-#: Size of a shape without a default, such as a rest position [rad or m].
-_NO_DEFAULT = 0.1
-#: Smallest prior standard deviation of a value before the change, as a multiple of its unit.
-_LEAST = 1e-3
-#: Share by which data have to reduce the prior variance of a determined value.
-_DETERMINED = 0.5
 
 
 @dataclass(frozen=True)
@@ -151,36 +137,35 @@ class JointFit:
         linear = self.linear(named)
         under = linear.marginal(self.setting, self.recordings)
         loss = self._loss(state)
-        for _ in range(_MOST_ROUNDS if named else 0):
+        # the comparison has refined the shapes, so four Gauss-Newton steps suffice
+        for _ in range(4 if named else 0):
             means = linear.means(under)
             step = means[linear.spans[0].start : linear.spans[len(named) - 1].stop]
             for own, (kept, _) in zip(state.named, places(named), strict=True):
                 step[kept.start : kept.stop] -= own.values[list(own.kept)]
-            tried = (state.moved(share * step) for share in _SHARES)
-            better = ((self._loss(one), one) for one in tried)
-            new, moved = next(((x, one) for x, one in better if x < loss), (loss, state))
-            if moved is state:
+            before = loss
+            for share in (1.0, 0.5, 0.2):  # line search
+                moved = state.moved(share * step)
+                loss = self._loss(moved)
+                if loss < before:
+                    break
+            else:
                 break
-            settled = loss - new < _SETTLED * max(abs(new), 1e-12)
             state, linear = moved, self.linear(moved.named)
-            under, loss = linear.marginal(self.setting, self.recordings), new
-            if settled:
+            under = linear.marginal(self.setting, self.recordings)
+            if before - loss < 1e-4 * max(abs(loss), 1e-12):
                 break
-        return self._fitted(state, linear, under)
-
-    def _fitted(self, state: Patch, linear: Nuisance, under: Marginal) -> Fitted:
-        means, covariance = linear.whole(under)
+        means, posterior = linear.whole(under)
         size = self.nuisance.columns[0].shape[2]
-        arm = self._arm(state, means)
-        names, numbers = state.parameters()
-        moved = self._moved(linear, means)
-        found = covariance[size:, size:] * (1.0 + self.spread) + np.diag(moved**2)
-        units = [one.cause.unit for one in linear.accepted]
-        before = np.concatenate([np.zeros(0), *units]) ** 2
-        open_ones = np.diag(covariance)[size:] > (1.0 - _DETERMINED) * before
-        found[open_ones], found[:, open_ones] = 0.0, 0.0
-        found[open_ones, open_ones] = np.inf
-        return Fitted(arm, state.named, Estimate(names, numbers, found), means[:size])
+        change = self._change_by_first_day(linear, means)
+        covariance = posterior[size:, size:] * (1.0 + self.spread) + np.diag(change**2)
+        units = np.concatenate([np.zeros(0), *(one.cause.unit for one in linear.accepted)])
+        # data that determine a value reduce its prior variance to less than half
+        undetermined = np.diag(posterior)[size:] > 0.5 * units**2
+        covariance[undetermined], covariance[:, undetermined] = 0.0, 0.0
+        covariance[undetermined, undetermined] = np.inf
+        estimate = Estimate(*state.parameters(), covariance)
+        return Fitted(self._arm(state, means), state.named, estimate, means[:size])
 
     def _arm(self, state: Patch, means: FloatArray) -> ArmModel:
         """Return the arm with the named causes, and with fitted body and friction if stated."""
@@ -194,8 +179,8 @@ class JointFit:
     def with_names_at(self, named: Sequence[NamedEffect]) -> ArmModel:
         """Return the arm with named causes at given values, all other parameters fitted."""
         state = Patch(self.arm, tuple(named))
-        there = self.nuisance.with_residual(self.weighted_residual(state.model))
-        return self._arm(state, there.means(there.marginal(self.setting, self.recordings)))
+        nuisance = self.with_model(state.model)
+        return self._arm(state, nuisance.means(nuisance.marginal(self.setting, self.recordings)))
 
     def as_described(self) -> JointFit:
         """Return the fit with the body fixed to the description."""
@@ -212,12 +197,12 @@ class JointFit:
 
         """
         rows = self.nuisance.rows
-        there = self.nuisance.with_residual(self.weighted_residual(fitted.arm))
+        nuisance = self.with_model(fitted.arm)
         means = fitted.means.copy()
         means[: self.nuisance.rank] *= not self.stated
         found = []
         for k in np.flatnonzero(rows.today).tolist():
-            whole, start = there.unexplained(means, self.setting, k), 0
+            whole, start = nuisance.unexplained(means, self.setting, k), 0
             for part, weight in zip(rows.data, rows.weight, strict=True):
                 if part.fold == k:
                     own = whole[:, start : start + len(weight)].T
@@ -225,7 +210,11 @@ class JointFit:
                     start += len(weight)
         return found
 
-    def weighted_residual(self, model: ArmModel) -> list[FloatArray]:
+    def with_model(self, model: ArmModel) -> Nuisance:
+        """Return the nuisance parameters with the residual of a model of the diagnosed day."""
+        return self.nuisance.with_residual(self._weighted_residual(model))
+
+    def _weighted_residual(self, model: ArmModel) -> list[FloatArray]:
         """Return the weighted residual of each recording, (n, M), with a model of today."""
         rows = self.nuisance.rows
         rest = [
@@ -243,10 +232,9 @@ class JointFit:
 
     def _loss(self, state: Patch) -> float:
         """Return the negative log likelihood, the nuisance parameters integrated out."""
-        there = self.nuisance.with_residual(self.weighted_residual(state.model))
-        return there.marginal(self.setting, self.recordings).loss
+        return self.with_model(state.model).marginal(self.setting, self.recordings).loss
 
-    def _moved(self, linear: Nuisance, means: FloatArray) -> FloatArray:
+    def _change_by_first_day(self, linear: Nuisance, means: FloatArray) -> FloatArray:
         """
         Return the change of the values for a cause that also acted on the first day.
 
@@ -260,7 +248,7 @@ class JointFit:
         for one, span in zip(linear.accepted, linear.spans, strict=True):
             if one.cause.effect.lasting:
                 continue
-            unit = np.clip(np.abs(means[span]), _LEAST * one.cause.unit, one.cause.unit)
+            unit = np.clip(np.abs(means[span]), 1e-3 * one.cause.unit, one.cause.unit)
             before = replace(one.cause, unit=unit)
             both = both.and_cause(before, 1.0, np.ones_like(one.acts))
         under = both.marginal(self.setting, self.recordings)
@@ -284,9 +272,11 @@ class JointFit:
             ]
             only = [x[:, :, : len(kept)] for x in columns]
             unit = value_unit(self.nuisance, own.effect, own.kept, only)
-            least = [abs(s.default) or _NO_DEFAULT for s in own.effect.shapes]
+            # without a default, a shape is a position of 0.1 rad or m
+            least = [abs(s.default) or 0.1 for s in own.effect.shapes]
             size = np.tile(least, len(own.effect.owners))
-            shapes = _SHAPE * np.maximum(np.abs(own.effect.shape), size)
+            # the comparison has refined the shape, so its prior deviation is small
+            shapes = 0.3 * np.maximum(np.abs(own.effect.shape), size)
             unit = np.concatenate([unit, shapes])
             made.append(cause_of(result, own.effect, own.kept, columns, unit))
             for total, x in zip(torque, only, strict=True):
@@ -304,7 +294,7 @@ class JointFit:
             [
                 rest + x[:, :, 0] if today else rest
                 for rest, x, today in zip(
-                    self.weighted_residual(state.model), present, rows.today, strict=True
+                    self._weighted_residual(state.model), present, rows.today, strict=True
                 )
             ]
         )

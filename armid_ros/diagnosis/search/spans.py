@@ -33,8 +33,8 @@ import numpy.typing as npt
 
 #: Time between candidate change points [s], and the shortest span [s].
 _STEP, _SHORTEST = 0.25, 3.0
-#: Change points of the coarse pass, refining passes, and number of causes that are refined.
-_COARSE, _PASSES, _REFINED = 9, 2, 3
+#: Number of candidate change points of the first pass, in each recording.
+_COARSE = 9
 #: First and last change point of the span of each recording.
 Spans: TypeAlias = Mapping[int, tuple[int, int]]
 
@@ -63,10 +63,19 @@ class Span:
 
 @dataclass(frozen=True)
 class _Timed:
-    """A cause with candidate change points in each recording of the diagnosed day."""
+    """A cause with candidate change points (edges) in each recording of the diagnosed day."""
 
     ranked: Ranked
     look: Look
+
+    @cached_property
+    def times(self) -> dict[int, FloatArray]:
+        """Time of the rows of each recording [s]."""
+        rows = self.look.nuisance.rows
+        return {
+            k: np.concatenate([part.t for part in rows.data if part.fold == k])
+            for k in np.flatnonzero(rows.today).tolist()
+        }
 
     @cached_property
     def edges(self) -> dict[int, npt.NDArray[np.intp]]:
@@ -79,61 +88,48 @@ class _Timed:
         return found
 
     @cached_property
-    def times(self) -> dict[int, FloatArray]:
-        """Time of the rows of each recording [s]."""
-        rows = self.look.nuisance.rows
-        return {
-            k: np.concatenate([part.t for part in rows.data if part.fold == k])
-            for k in np.flatnonzero(rows.today).tolist()
-        }
-
-    @cached_property
-    def _sums(self) -> dict[int, tuple[FloatArray, FloatArray, FloatArray]]:
+    def _sums(self) -> dict[int, list[FloatArray]]:
         """Products with nuisance columns, columns and residual, summed up to each edge."""
         nuisance, cause = self.look.nuisance, self.ranked.cause
         joints = list(cause.joints)
-        found = dict[int, tuple[FloatArray, FloatArray, FloatArray]]()
+        found = dict[int, list[FloatArray]]()
         for k, edges in self.edges.items():
-            z, x, y = cause.columns[k], nuisance.columns[k], nuisance.residual[k]
-            parts = [
-                (
-                    np.einsum('jmq,jmp->qp', x[joints, a:b], z[:, a:b]),
-                    np.einsum('jmq,jmp->qp', z[:, a:b], z[:, a:b]),
-                    np.einsum('jm,jmp->p', y[joints, a:b], z[:, a:b]),
-                )
-                for a, b in pairwise(edges.tolist())
-            ]
-            first, second, third = (np.array(one) for one in zip(*parts, strict=True))
-            found[k] = _up_to(first), _up_to(second), _up_to(third)
+            z, x, y = cause.columns[k], nuisance.columns[k][joints], nuisance.residual[k][joints]
+            factors = ('jmq,jmp->qp', x), ('jmq,jmp->qp', z), ('jm,jmp->p', y)
+            found[k] = []
+            for product, other in factors:
+                parts = [
+                    np.einsum(product, other[:, a:b], z[:, a:b])
+                    for a, b in pairwise(edges.tolist())
+                ]
+                found[k].append(np.cumsum([np.zeros_like(parts[0]), *parts], axis=0))
         return found
 
     def within(self, tried: Sequence[Spans]) -> list[Ranked]:
         """Return the cause that acts between two edges of each recording, for several spans."""
-        nuisance, timed = self.look.nuisance, [self._timed(spans) for spans in tried]
-        causes = [cause for cause, _ in timed]
+        nuisance, cause = self.look.nuisance, self.ranked.cause
+        causes, choices = list[Cause](), list[float]()
+        for spans in tried:
+            products, own, aim = (x.copy() for x in (cause.products, cause.own, cause.aim))
+            choices.append(0.0)  # log of the number of possible spans
+            for k, (a, b) in spans.items():
+                products[k], own[k], aim[k] = (x[b] - x[a] for x in self._sums[k])
+                count = len(self.edges[k])
+                if b - a < count - 1:
+                    choices[-1] += float(np.log(0.5 * count * (count - 1)))
+            causes.append(replace(cause, products=products, own=own, aim=aim))
         # Earlier values act throughout, so that all spans are compared with the same null model.
         known = CauseInformation.of_all(causes, nuisance, self.ranked.under, by_day=True)
         fits = posteriors(causes, nuisance, known.of_day(today=True))
         return [
             replace(
                 self.ranked,
-                cause=cause,
+                cause=timed,
                 fit=fit,
-                data=fit.factor + allowed(cause, fit, nuisance) - chosen,
+                data=fit.factor + allowed(timed, fit, nuisance) - choice,
             )
-            for (cause, chosen), fit in zip(timed, fits, strict=True)
+            for timed, choice, fit in zip(causes, choices, fits, strict=True)
         ]
-
-    def _timed(self, spans: Spans) -> tuple[Cause, float]:
-        """Return the cause within spans, and the log of the number of possible spans."""
-        cause, chosen = self.ranked.cause, 0.0
-        products, own, aim = (x.copy() for x in (cause.products, cause.own, cause.aim))
-        for k, (a, b) in spans.items():
-            products[k], own[k], aim[k] = (x[b] - x[a] for x in self._sums[k])
-            count = len(self.edges[k])
-            if b - a < count - 1:
-                chosen += float(np.log(0.5 * count * (count - 1)))
-        return replace(cause, products=products, own=own, aim=aim), chosen
 
     @cached_property
     def throughout(self) -> Ranked:
@@ -149,20 +145,19 @@ class _Timed:
         found, spans = self.throughout, self._whole
         for k, edges in self.edges.items():
             coarse = np.unique(np.linspace(0, len(edges) - 1, _COARSE).astype(int)).tolist()
-            found, spans = self._likeliest_span(
-                found, spans, k, [(0, 0), *combinations(coarse, 2)]
-            )
+            tried = [(0, 0), *combinations(coarse, 2)]
+            found, spans = self._likeliest_span(found, spans, k, tried)
         return found, spans
 
     def refined(self, found: Ranked, spans: Spans) -> tuple[Ranked, Spans]:
-        """Return spans after each edge is moved to the likeliest change point."""
-        for _ in range(_PASSES):
+        """Return spans after each edge is moved twice to the likeliest change point."""
+        for _ in range(2):
             for k, edges in self.edges.items():
                 near = (len(edges) - 1) // (_COARSE - 1)
                 for end in (0, 1):
                     first, last = spans[k]
                     moves = range(-near, near + 1)
-                    tried = [(first + x, last) if end == 0 else (first, last + x) for x in moves]
+                    tried = [(first, last + x) if end else (first + x, last) for x in moves]
                     found, spans = self._likeliest_span(found, spans, k, tried)
         return found, spans
 
@@ -183,11 +178,6 @@ class _Timed:
         ranked = self.within(others) if others else []
         pairs: list[tuple[Ranked, Spans]] = [(found, spans), *zip(ranked, others, strict=True)]
         return max(pairs, key=lambda one: one[0].worth)
-
-
-def _up_to(parts: FloatArray) -> FloatArray:
-    """Return the sums of the first 0, 1, 2, ... parts."""
-    return np.concatenate([np.zeros((1, *parts.shape[1:])), np.cumsum(parts, axis=0)])
 
 
 def acting_spans(look: Look, thresholds: Thresholds) -> tuple[Span, ...]:
@@ -212,7 +202,7 @@ def acting_spans(look: Look, thresholds: Thresholds) -> tuple[Span, ...]:
         return ()
     timed = [_Timed(one, look) for one in look.ranking]
     coarse = sorted(((*one.coarse(), one) for one in timed), key=lambda one: -one[0].worth)
-    found = [(*own.refined(one, near), own) for one, near, own in coarse[:_REFINED]]
+    found = [(*own.refined(one, near), own) for one, near, own in coarse[:3]]
     best, spans, own = max(found, key=lambda one: one[0].worth)
     throughout = max((one.throughout for one in timed), key=lambda one: one.worth)
     nuisance = look.nuisance

@@ -37,10 +37,10 @@ from armid_ros.recording import Recording
 import numpy as np
 
 #: Smallest reduction of chi-squared for a significant slack: z > 5.
-_LEAST_GAIN = 25.0
+_MIN_SLACK_GAIN = 25.0
 #: Reduction of chi-squared per fitted inertia above which the description is rejected. The
 #: expected reduction is one, or two if filters correlate neighbouring rows.
-_TOLD = 5.0
+_MAX_GAIN_PER_INERTIA = 5.0
 
 
 def diagnose_ties(
@@ -117,7 +117,7 @@ class _Ties:
             return []
         best = min(tried, key=lambda one: one[2].misfit)
         noise = max(1.0, best[2].misfit / best[1].tau.size)
-        if tried[0][2].misfit - best[2].misfit < _LEAST_GAIN * noise:
+        if tried[0][2].misfit - best[2].misfit < _MIN_SLACK_GAIN * noise:
             best = tried[0]
         slack, problem, found = best
         while len(found.segments) and not np.min(found.stiffness / found.std) >= MIN_Z_SCORE:
@@ -155,7 +155,10 @@ class _Ties:
             return found
         freed = len(fitted.estimate.values) - len(fitted.segments)
         noise = max(1.0, fitted.misfit / fitted.residual.size)
-        if known is not None and known.misfit - fitted.misfit < _TOLD * freed * noise:
+        if (
+            known is not None
+            and known.misfit - fitted.misfit < _MAX_GAIN_PER_INERTIA * freed * noise
+        ):
             assert found.problem is not None
             problem, own = found.problem.as_described(), found.fitted
             again = problem.fit(own.named)

@@ -123,7 +123,7 @@ def _products(problem: JointFit, fitted: Fitted) -> tuple[FloatArray, float]:
     nuisance, base = problem.nuisance, problem.nuisance.base
     rank, back = nuisance.rank, np.linalg.inv(nuisance.turn)
     then, now = (base.values(x.theta[: len(base.standard)]) for x in (problem.arm, fitted.arm))
-    patched = nuisance.with_residual(problem.weighted_residual(fitted.arm))
+    patched = problem.with_model(fitted.arm)
     products = np.zeros((rank + 1, rank + 1))
     for k, today in enumerate(nuisance.rows.today):
         values = now if today else then
