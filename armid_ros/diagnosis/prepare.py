@@ -119,7 +119,8 @@ def prepare(
         return prepared
     fuller, _ = with_friction(arm, settings.library)
     base, _ = excited(fuller, fuller.base_parameters(rng.spawn(1)[0]), data)
-    friction = refitted(fuller, base, data, prepared.sigma).action().dry_friction
+    fuller = refitted(fuller, base, data, prepared.sigma)
+    friction = fuller.action().dry_friction
     allowed = np.full(arm.robot.n_joints, np.inf)
     if friction is not None:
         dry = np.concatenate([friction.largest(fuller.load(part.at_rows)) for part in data])

@@ -17,7 +17,7 @@ from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.next_run.separation import basis_of, informative_weight
 from armid_ros.diagnosis.search.candidates import candidate_effects
 from armid_ros.diagnosis.settings import DiagnosisSettings
-from armid_ros.diagnosis.verdict.document import Detectable, is_possible, SHOWS
+from armid_ros.diagnosis.verdict.document import Detectable, DETECTABLE_Z, is_possible
 from armid_ros.effects import Effect
 from armid_ros.motion import FloatArray, Motion
 import numpy as np
@@ -130,7 +130,7 @@ def _detectable(effect: Effect, columns: FloatArray, arm: ArmModel) -> Detectabl
     for k, parameter in enumerate(effect.parameters(arm.robot)):
         others = basis_of(np.delete(columns, k, axis=1))
         own = columns[:, k] - others @ (others.T @ columns[:, k])
-        size = SHOWS / max(float(np.linalg.norm(own)), 1e-300)
+        size = DETECTABLE_Z / max(float(np.linalg.norm(own)), 1e-300)
         if is_possible(effect, k, size, arm.robot):
             return Detectable(effect.said_as, effect.joints, parameter, size, 1.0)
     return Detectable(effect.said_as, effect.joints, None, float('inf'), 0.0)

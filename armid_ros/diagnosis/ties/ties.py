@@ -153,18 +153,14 @@ class _Ties:
         known, fitted = (self._springs(bare, which, joints) for which in ('known', 'free'))
         if fitted is None:
             return found
-        freed = len(fitted.estimate.values) - len(fitted.segments)
-        noise = max(1.0, fitted.misfit / fitted.residual.size)
-        if (
-            known is not None
-            and known.misfit - fitted.misfit < _MAX_GAIN_PER_INERTIA * freed * noise
-        ):
+        springs, inertias = fitted, len(fitted.estimate.values) - len(fitted.segments)
+        limit = _MAX_GAIN_PER_INERTIA * inertias * max(1.0, fitted.misfit / fitted.residual.size)
+        if known is not None and known.misfit - fitted.misfit < limit:
             assert found.problem is not None
-            problem, own = found.problem.as_described(), found.fitted
-            again = problem.fit(own.named)
+            springs, problem = known, found.problem.as_described()
+            again = problem.fit(found.fitted.named)
             found = replace(found, fitted=again, reference=problem.fit(), problem=problem)
-            return replace(found, fitted=_with_springs(found, known))
-        return replace(found, fitted=_with_springs(found, fitted))
+        return replace(found, fitted=_with_springs(found, springs))
 
     def _springs(self, bare: ArmModel, inertias: Inertias, joints: set[str]) -> Interaction | None:
         """Identify the springs of some joints; other effects of the arm are subtracted."""

@@ -14,12 +14,8 @@ from armid_ros.estimate import name_in_words
 from armid_ros.identification.rows.temperature import mean_temperatures
 import numpy as np
 
-#: Difference of temperature that counts as another temperature [K], and change of friction that
-#: is worth a remark, as a share.
-_OTHER, _WORTH = 2.0, 0.03
-#: Standard deviation of the temperature within a day, over its difference between the days, that
-#: separates a law of temperature from wear.
-_VARIED = 0.2
+#: Smallest difference of two temperatures [K].
+_MIN_DIFFERENCE = 2.0
 
 
 def data_remarks(
@@ -61,7 +57,7 @@ def data_remarks(
         return
     changes: dict[str, list[str]] = {'colder': [], 'warmer': []}
     for joint, share in _changes(laws, arm, now, warmer).items():
-        if abs(warmer[joint]) >= _OTHER and abs(share) >= _WORTH:
+        if abs(warmer[joint]) >= _MIN_DIFFERENCE and abs(share) >= 0.03:  # of friction
             changes['colder' if warmer[joint] < 0.0 else 'warmer'].append(
                 f'{joint} by {abs(warmer[joint]):.0f} degC (friction {100.0 * share:+.0f} %)'
             )
@@ -73,12 +69,13 @@ def data_remarks(
     )
     within = max(_spread(now), _spread(then))
     named = any(CATALOGUE[one.name].lasting for one in found if one.name in CATALOGUE)
-    if named and within < _VARIED * max(map(abs, warmer.values())):
+    # a fifth of the difference within a day separates a law of temperature from wear
+    if named and within < 0.2 * max(map(abs, warmer.values())):
         yield (
             'The temperature differs between the days and hardly within them, so wear of the same '
             'size is not excluded: record a day over a range of temperatures.'
         )
-    equal = {joint for joint, more in warmer.items() if abs(more) < _OTHER}
+    equal = {joint for joint, more in warmer.items() if abs(more) < _MIN_DIFFERENCE}
     yield from _worn(found, equal.union(*(law.joints for law in laws)))
 
 

@@ -25,15 +25,9 @@ from armid_ros.robots import Robot
 import numpy as np
 
 SCHEMA = 'armid/diagnosis/1'
-#: Largest number of listed candidates.
-_MOST_CANDIDATES = 20
 #: Detectable size of a value, in its standard deviations. On a two-link arm, effects of one to
 #: four times this size were named, and effects of half this size were not.
-SHOWS = 5.0
-#: Smallest resolution of an identifiable value; two inseparable values have at most 0.5 each.
-_IDENTIFIABLE = 0.9
-#: Largest detectable size over the largest typical value; above, torques are rounding errors.
-_ROUNDING = 1e-6
+DETECTABLE_Z = 5.0
 
 
 def diagnosis_document(diagnosis: Diagnosis, model: str = 'model.yaml') -> dict[str, Any]:
@@ -178,7 +172,7 @@ def _candidates(diagnosis: Diagnosis) -> list[dict[str, Any]]:
             'min_detectable': _finite(_said_size(trial, explanation.given)[1]),
             'adjusted_p': trial.p,
         }
-        for trial in explanation.candidates[:_MOST_CANDIDATES]
+        for trial in explanation.candidates[:20]
     ]
 
 
@@ -227,8 +221,9 @@ def _sizes(trial: Trial, robot: Robot) -> Iterator[tuple[int, float]]:
     """Yield every identifiable parameter of a cause with its smallest detectable size."""
     rows = zip(trial.kept, trial.std, trial.resolution, trial.least, strict=True)
     for index, std, resolution, least in rows:
-        size = max(SHOWS * float(std), float(least))
-        if resolution > _IDENTIFIABLE and is_possible(trial.effect, index, size, robot):
+        size = max(DETECTABLE_Z * float(std), float(least))
+        # two inseparable values have a resolution of at most 0.5 each
+        if resolution > 0.9 and is_possible(trial.effect, index, size, robot):
             yield index, size
 
 
@@ -266,7 +261,7 @@ def is_possible(effect: Effect, index: int, size: float, robot: Robot) -> bool:
     owner, which = divmod(index, len(effect.quantities))
     quantity = effect.quantities[which]
     largest = quantity.typical[1] if quantity.typical else 1.0
-    return size <= quantity.largest(effect.owners[owner], robot) and _ROUNDING * size < largest
+    return size <= quantity.largest(effect.owners[owner], robot) and 1e-6 * size < largest
 
 
 def detectable(explanation: Explanation | None) -> tuple[Detectable, ...]:

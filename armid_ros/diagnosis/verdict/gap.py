@@ -13,11 +13,6 @@ from armid_ros.diagnosis.verdict.finding import Gap, Overlay
 from armid_ros.motion import FloatArray
 import numpy as np
 
-#: Relative excess of squared residual over squared floor above which a joint has a gap.
-_A_GAP = 0.2
-#: Number of recordings from which the mean of slow differences of periods is tested as well.
-_SEVERAL = 3
-
 
 def measure_gap(explanation: Explanation, unseen: Evidence | None) -> Gap:
     """
@@ -33,20 +28,17 @@ def measure_gap(explanation: Explanation, unseen: Evidence | None) -> Gap:
     """
     before, after = explanation.reference.arm, explanation.fitted.arm
     evidence = explanation.evidence if unseen is None else unseen
+    residuals = [evidence.residuals(arm) for arm in (before, after)]
     overlays = []
-    for part, sigma in zip(evidence.data, evidence.sigma, strict=True):
+    for part, sigma, *rows in zip(evidence.data, evidence.sigma, *residuals, strict=True):
         measured = part.torque
-        without, patched = (measured - part.residual(arm) for arm in (before, after))
-        overlays.append(Overlay(part.source, part, measured, without, patched, sigma))
-    residuals = [
-        [o.measured - o.before for o in overlays],
-        [o.measured - o.after for o in overlays],
-    ]
+        predictions = (measured - residual for residual in rows)
+        overlays.append(Overlay(part.source, part, measured, *predictions, sigma))
     power = [evidence.power(rows) for rows in residuals]
     floor = evidence.power([np.broadcast_to(o.sigma, o.measured.shape) for o in overlays])
-    beyond = [np.maximum(own - floor, 0.0) / np.maximum(floor, 1e-24) for own in power]
-    gap = beyond[0] > _A_GAP
-    closed = 1.0 - beyond[1][gap].sum() / beyond[0][gap].sum() if gap.any() else 0.0
+    excess = [np.maximum(own - floor, 0.0) / np.maximum(floor, 1e-24) for own in power]
+    gap = excess[0] > 0.2  # in other joints, squares beyond the floor are random
+    closed = 1.0 - excess[1][gap].sum() / excess[0][gap].sum() if gap.any() else 0.0
     return Gap(
         np.sqrt(power[0]),
         np.sqrt(power[1]),
@@ -81,9 +73,8 @@ def not_repeating(
     ]
     if not known:
         return []
-    odd_ones = [structure >= thresholds.one_period for structure in known]
-    often = np.sum(odd_ones, axis=0) >= max(1, len(known) / 2)
-    if len(known) >= _SEVERAL:
+    often = np.sum(np.array(known) >= thresholds.one_period, axis=0) >= max(1, len(known) / 2)
+    if len(known) >= 3:
         mean = np.exp(np.mean(np.log(known), axis=0))
-        often = often | (mean > thresholds.one_period_on_average)
+        often |= mean > thresholds.one_period_on_average
     return np.flatnonzero(often).tolist()

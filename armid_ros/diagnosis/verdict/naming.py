@@ -23,11 +23,6 @@ from armid_ros.motion import FloatArray
 from armid_ros.robots.ties import Tie
 import numpy as np
 
-#: Slope above which a translated value depends on an undetermined fitted value.
-_ALONG = 1e-6
-#: Largest number of listed rivals of a cause: longer lists do not help.
-_RIVALS = 2
-
 
 @dataclass(frozen=True)
 class _Translation:
@@ -51,41 +46,47 @@ def findings(
     Findings of the same cause have the common share of all their causes.
 
     """
-    said = _in_words(explanation, arm)
-    given = zip(explanation.given.parameters, explanation.given.theta.tolist(), strict=True)
-    had = {(parameter.name, parameter.joint): value for parameter, value in given}
+    translated = _in_catalogue(explanation, arm)
+    known = zip(explanation.given.parameters, explanation.given.theta.tolist(), strict=True)
+    given = {(parameter.name, parameter.joint): value for parameter, value in known}
     merged: dict[str, list[int]] = {}
-    for index, parts in enumerate(said):
+    for index, parts in enumerate(translated):
         for part in parts:
             merged.setdefault(part.effect.name, []).append(index)
     result = []
     for name, own in merged.items():
         together = [other for other, where in merged.items() if set(own) & set(where)]
         indices = sorted({k for other in together for k in merged[other]})
-        parts = [part for k in indices for part in said[k] if part.effect.name == name]
+        parts = [part for k in indices for part in translated[k] if part.effect.name == name]
         steps = [explanation.steps[k] for k in own]
         joints = _joints([part.effect.joints for part in parts], arm)
         order = [joint for joint in arm.robot.all_joints if joint in joints]
-        rows = _rows(parts)
-        places = [*order, '']
-        rows.sort(key=lambda row: places.index(row[0].joint) if row[0].joint in places else 0)
+        sums = _sums(parts)
+        ranks = {joint: k for k, joint in enumerate([*order, ''])}
+        names = sorted(sums, key=lambda parameter: ranks.get(parameter.joint, 0))
+        ties = {
+            tie.joint: tie
+            for part in parts
+            if isinstance(part.effect, Tied)
+            for tie in part.effect.ties
+        }
         rivals = _rivals(steps, Rival(name, joints), set(merged) - {name}, arm)
         result.append(
             Finding(
                 name,
                 joints,
-                tuple(row[0] for row in rows),
-                tuple(row[1] for row in rows),
-                tuple(row[2] for row in rows),
+                tuple(names),
+                tuple(sums[parameter][0] for parameter in names),
+                tuple(sums[parameter][1] for parameter in names),
                 attribution.share(indices),
                 attribution.interval(indices, rng),
                 max(trial.p for trial in steps),
                 rivals,
                 parts[0].effect.traits.sign,
-                _ties([part.effect for part in parts], order),
+                tuple(ties[joint] for joint in order if joint in ties),
                 parts[0].effect.traits.weighs,
                 tuple(other for other in together if other != name),
-                tuple(had.get((row[0].name, row[0].joint), 0.0) for row in rows),
+                tuple(given.get((p.name, p.joint), 0.0) for p in names),
                 explanation.fitted.named[own[0]].effect.traits.look_at
                 if len(together) > 1
                 else '',
@@ -95,15 +96,15 @@ def findings(
     return tuple(sorted(result, key=lambda one: -one.share))
 
 
-def _rows(parts: Sequence[_Translation]) -> list[tuple[ParameterName, float, float]]:
-    """Return each parameter once, with the sum and standard deviation of its values."""
-    rows: dict[ParameterName, tuple[float, float]] = {}
+def _sums(parts: Sequence[_Translation]) -> dict[ParameterName, tuple[float, float]]:
+    """Return the sum of the values of each parameter, and its standard deviation."""
+    sums: dict[ParameterName, tuple[float, float]] = {}
     for part in parts:
         for parameter, value, std in zip(part.parameters, part.values, part.std, strict=True):
             if np.isfinite(std):
-                before, wide = rows.get(parameter, (0.0, 0.0))
-                rows[parameter] = before + float(value), float(np.hypot(wide, std))
-    return [(parameter, *numbers) for parameter, numbers in rows.items()]
+                before, wide = sums.get(parameter, (0.0, 0.0))
+                sums[parameter] = before + float(value), float(np.hypot(wide, std))
+    return sums
 
 
 def small_print(explanation: Explanation) -> tuple[Finding, ...]:
@@ -140,28 +141,21 @@ def small_print(explanation: Explanation) -> tuple[Finding, ...]:
     return tuple(result)
 
 
-def _in_words(explanation: Explanation, arm: ArmModel) -> list[list[_Translation]]:
+def _in_catalogue(explanation: Explanation, arm: ArmModel) -> list[list[_Translation]]:
     """Translate each fitted cause of an explanation into effects of the catalogue."""
-    fitted = explanation.fitted
-    covariance = fitted.estimate.covariance
+    fitted, estimate = explanation.fitted, explanation.fitted.estimate
     result = []
-    for own, place in zip(fitted.named, places(fitted.named), strict=True):
-        span = slice(place[0].start, place[1].stop)
-        words = own.effect.named_as(own.values, arm)
-        if len(words) == 1 and words[0][0] is own.effect:
-            result.append(
-                [
-                    _Translation(
-                        own.effect,
-                        fitted.estimate.parameters[span],
-                        fitted.estimate.values[span],
-                        np.sqrt(np.diag(covariance)[span]),
-                    )
-                ]
-            )
+    for own, (kept, shapes) in zip(fitted.named, places(fitted.named), strict=True):
+        span = slice(kept.start, shapes.stop)
+        covariance = estimate.covariance[span, span]
+        translations = own.effect.named_as(own.values, arm)
+        if len(translations) == 1 and translations[0][0] is own.effect:
+            std = np.sqrt(np.diag(covariance))
+            rows = estimate.parameters[span], estimate.values[span], std
+            result.append([_Translation(own.effect, *rows)])
             continue
-        parts = _translated(own, covariance[span, span], arm)
-        result.append([part for part in parts if _determined(part)] or parts[:1])
+        parts = _translated(own, covariance, arm)
+        result.append([part for part in parts if _is_significant(part)] or parts[:1])
     return result
 
 
@@ -186,7 +180,8 @@ def _translated(own: NamedEffect, covariance: FloatArray, arm: ArmModel) -> list
             ]
         )
         std = np.sqrt(np.diag(slopes @ inside @ slopes.T))
-        std[np.any(np.abs(slopes[:, ~known]) > _ALONG, axis=1)] = np.nan
+        # a value is not determined if it depends on a fitted value that is not
+        std[np.any(np.abs(slopes[:, ~known]) > 1e-6, axis=1)] = np.nan
         names = word.parameters(arm.robot)
         if word.shape:
             names += word.shape_parameters(arm.robot)
@@ -195,7 +190,7 @@ def _translated(own: NamedEffect, covariance: FloatArray, arm: ArmModel) -> list
     return parts
 
 
-def _determined(part: _Translation) -> bool:
+def _is_significant(part: _Translation) -> bool:
     """Return whether any value is significant (3 sigma) and not negligible."""
     typical = [q.typical[0] if q.typical else 0.0 for q in part.effect.quantities]
     count = len(part.values) - len(part.effect.shape)
@@ -203,16 +198,11 @@ def _determined(part: _Translation) -> bool:
     return bool(np.any((size > 3.0 * std) & (size > np.array(typical))))
 
 
-def _ties(effects: Sequence[Effect], joints: Sequence[str]) -> tuple[Tie, ...]:
-    ties = {t.joint: t for effect in effects if isinstance(effect, Tied) for t in effect.ties}
-    return tuple(ties[joint] for joint in joints if joint in ties)
-
-
 def _rivals(
     trials: Sequence[Trial], own: Rival, others: set[str], arm: ArmModel
 ) -> tuple[Rival, ...]:
     """
-    Return the likeliest rivals of an effect in its joints (`own`), with their joints.
+    Return the two likeliest rivals of an effect in its joints (`own`), with their joints.
 
     The same effect in another joint is a rival as well; effects of other findings are not.
 
@@ -234,7 +224,7 @@ def _rivals(
             likely[name],
             all(any(is_same_body(own, one, arm.robot) for own in trials) for one in best[name]),
         )
-        for name in sorted(likely, key=lambda name: -likely[name])[:_RIVALS]
+        for name in sorted(likely, key=lambda name: -likely[name])[:2]
     )
 
 

@@ -26,11 +26,9 @@ from armid_ros.motion import FloatArray
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
-#: Largest negligible relative increase of the squared residual of a joint.
-_SLIGHTLY = 0.05
 #: Largest residual at rest, divided by dry friction in motion. Breakaway friction adds two, and
 #: the model's friction, whose direction is arbitrary at rest, adds one.
-_HELD = 3.0
+_MAX_REST_OVER_FRICTION = 3.0
 #: Signature of a blocked joint.
 _WHERE = 'at rest or turning round, and more than friction: a stop, a brake or a contact'
 
@@ -108,9 +106,9 @@ class RemainingMisfit:
             total = more.sum(axis=0)
             floor = np.maximum(had.sum(axis=0), part.count)
             limit = part.misfit_limit(self.settings) + part.material_loss(self.settings)
-            surely = (total > thresholds.surely * spread) & (total > _SLIGHTLY * floor)
-            by_far = total > (thresholds.same_fit - 1.0) * floor
-            worse |= (surely | by_far) & (part.chi2_per_row(residuals[1]) > limit)
+            significant = (total > thresholds.surely * spread) & (total > 0.05 * floor)
+            large = total > (thresholds.same_fit - 1.0) * floor
+            worse |= (significant | large) & (part.chi2_per_row(residuals[1]) > limit)
         return tuple(j for j, bad in zip(self.given.robot.joints, worse, strict=True) if bad)
 
     @property
@@ -179,7 +177,7 @@ def standing(
     squares, time = np.zeros((2, joints))
     usual = np.maximum(evidence.torque_rms, 1e-300)
     for part, own, sigma in zip(evidence.data, residual, evidence.sigma, strict=True):
-        most = _HELD * friction.largest(arm.load(part.at_rows))
+        most = _MAX_REST_OVER_FRICTION * friction.largest(arm.load(part.at_rows))
         louder = np.maximum(np.abs(part.torque - own) / usual, 1.0)
         period = float(part.t[1] - part.t[0])
         shortest = max(REST_TIME, 1.0 / part.used.cutoff_hz)

@@ -31,11 +31,12 @@ from armid_ros.effects.base import Arm
 from armid_ros.motion import FloatArray, Motion
 import numpy as np
 
-#: Sizes of the usual discrepancy and of a new law, as multiples of the joint's misfit. Of 40 arms
-#: with a right name or without a change, one has log odds above 3 (6.4, of a smaller torque).
-_USUAL, _NEW = 1.0, (3.0, 10.0)
-#: Knots of positions over their range, and of velocities in each direction over the top speed.
-_POSITIONS, _SPEEDS = 12, np.array([0.03, 0.1, 0.25, 0.5, 0.75, 1.0])
+#: Sizes of a new law, as multiples of the joint's misfit, which is the size of the usual
+#: discrepancy. Of 40 arms with a right name or without a change, one has log odds above 3 (6.4, of
+#: a smaller torque).
+_LAW_SIZES = 3.0, 10.0
+#: Knots of velocities in each direction, as shares of the top speed.
+_SPEED_KNOTS = np.array([0.03, 0.1, 0.25, 0.5, 0.75, 1.0])
 
 
 @dataclass(frozen=True)
@@ -81,13 +82,13 @@ def unlisted_laws(explanation: Explanation, settings: DiagnosisSettings) -> list
         columns = [law.columns(part.at_rows, linear.arm) for part in rows.data]
         unit = np.full(len(law.knots), misfit[joint])
         cause, fits = cause_of(linear, law, (), columns, unit), []
-        for size in (_USUAL, *_NEW):
+        for size in (1.0, *_LAW_SIZES):
             with_law = linear.and_cause(cause, size)
             under = with_law.marginal(problem.setting, problem.recordings)
             fits.append(under.evidence)
         if found[law.joints] > 1:
             ratio[law.of][joint] = _instead(problem, linear, cause, settings.thresholds)
-        odds = np.logaddexp.reduce(fits[1:]) - np.log(len(_NEW)) - fits[0]
+        odds = np.logaddexp.reduce(fits[1:]) - np.log(len(_LAW_SIZES)) - fits[0]
         if odds > alarm:
             values = with_law.means(under)[with_law.spans[-1]]
             torque = np.concatenate([columns[k][:, joint] @ values for k in rows.in_question])
@@ -116,12 +117,14 @@ def _instead(problem: JointFit, linear: Nuisance, law: Cause, levels: Thresholds
     size = 1.0 + float(np.sqrt(np.mean(np.sum(made, axis=0) ** 2)))
     fits = [
         bare.and_cause(law, new * size).marginal(problem.setting, problem.recordings)
-        for new in _NEW
+        for new in _LAW_SIZES
     ]
     best = max(fits, key=lambda fit: fit.evidence)
     explained = bare.marginal(problem.setting, problem.recordings).loss - named.loss
     gained = named.loss - best.loss
-    odds = best.evidence - float(np.log(len(_NEW))) - named.evidence + float(np.log(UNLISTED))
+    odds = (
+        best.evidence - float(np.log(len(_LAW_SIZES))) - named.evidence + float(np.log(UNLISTED))
+    )
     return gained / (max(gained - odds, 0.0) + levels.inexact * max(explained, 1.0))
 
 
@@ -129,7 +132,7 @@ def _laws(motions: list[Motion], joints: tuple[str, ...]) -> Iterator[UnlistedLa
     """Yield the laws of velocity and of position of every joint."""
     q, dq = (np.concatenate([getattr(one, x) for one in motions]) for x in ('q', 'dq'))
     for k, joint in enumerate(joints):
-        speeds = float(np.abs(dq[:, k]).max()) * _SPEEDS
+        speeds = float(np.abs(dq[:, k]).max()) * _SPEED_KNOTS
         yield UnlistedLaw((joint,), of='velocity', knots=(*-speeds[::-1], *speeds))
-        knots = np.linspace(q[:, k].min(), q[:, k].max(), _POSITIONS)
+        knots = np.linspace(q[:, k].min(), q[:, k].max(), 12)
         yield UnlistedLaw((joint,), of='position', knots=tuple(knots))

@@ -16,13 +16,6 @@ from armid_ros.motion import FloatArray, read_only
 import numpy as np
 import numpy.typing as npt
 
-#: Bins of a quantity over which the residual is averaged.
-_BINS = 16
-#: Smallest share of the mean square residual that the bin means of a named quantity explain.
-_TELLING = 0.15
-#: Largest relative squared deviation of means that are constant, or proportional.
-_CURVED = 0.15
-
 
 @dataclass(frozen=True)
 class Axis:
@@ -166,11 +159,11 @@ def locate(
             break
         use = informative[:, joint]
         axes = []
-        way, torque = arm.robot.position_units[joint], arm.robot.torque_units[joint]
+        length, torque = arm.robot.position_units[joint], arm.robot.torque_units[joint]
         units = {
-            'velocity': f'{way}/s',
-            'position': way,
-            'acceleration': f'{way}/s^2',
+            'velocity': f'{length}/s',
+            'position': length,
+            'acceleration': f'{length}/s^2',
             'time': 's',
         }
         for name in rows[0]:
@@ -202,28 +195,35 @@ def _quantities(arm: ArmModel, part: Trajectory) -> dict[str, FloatArray]:
 
 
 def _axis(name: str, unit: str, x: FloatArray, residual: FloatArray) -> Axis:
-    edges = np.quantile(x, np.linspace(0.0, 1.0, _BINS + 1))
-    index = np.clip(np.searchsorted(edges, x, side='right') - 1, 0, _BINS - 1)
-    counts = np.bincount(index, minlength=_BINS)
-    safe = np.maximum(counts, 1)
-    means = np.bincount(index, residual, _BINS) / safe
-    centres = np.bincount(index, x, _BINS) / safe
-    power = float(np.sum(residual**2))
-    share = float(np.sum(counts * means**2)) / power if power > 0.0 else 0.0
+    """Average the residual over bins with equal numbers of values of a quantity x."""
+    bins = 16
+    edges = np.quantile(x, np.linspace(0.0, 1.0, bins + 1))
+    index = np.clip(np.searchsorted(edges, x, side='right') - 1, 0, bins - 1)
+    counts = np.bincount(index, minlength=bins)
     filled = counts > 0
-    return Axis(name, unit, read_only(centres[filled]), read_only(means[filled]), share)
+    centres, means = (
+        np.bincount(index, values, bins)[filled] / counts[filled] for values in (x, residual)
+    )
+    power = float(np.sum(residual**2))
+    share = float(np.sum(counts[filled] * means**2)) / power if power > 0.0 else 0.0
+    return Axis(name, unit, read_only(centres), read_only(means), share)
 
 
 def _in_words(axes: Sequence[Axis], unit: str, residual: FloatArray) -> str:
-    """Describe the residual of a joint as a function of one quantity, such as velocity."""
+    """
+    Describe the residual of a joint as a function of one quantity, such as velocity.
+
+    The bin means of the quantity explain at least 15 % of the mean square residual.
+
+    """
     best = axes[0]
-    if best.share < _TELLING:
+    if best.share < 0.15:
         rms = float(np.sqrt(np.mean(residual**2)))
         return f'a torque of {rms:.2g} {unit} rms that depends on no single quantity of the joint'
     name = 'load times direction of motion' if ' ' in best.name else best.name
     largest = int(np.argmax(np.abs(best.means)))
     most = f'{abs(best.means[largest]):.2g} {unit}'
-    size = _CURVED * float(np.sum(best.means**2))
+    size = 0.15 * float(np.sum(best.means**2))  # of deviations from a line
     slope = float(best.centres @ best.means) / max(float(best.centres @ best.centres), 1e-300)
     if np.sum((best.means - best.means.mean()) ** 2) < size:
         return f'constant torque of {best.means.mean():.2g} {unit}'

@@ -21,7 +21,7 @@ Word = Literal[
     'consistent', 'named', 'ambiguous', 'partial', 'unknown', 'not_repeatable', 'bad_data'
 ]
 #: Largest number of joints in the list of a sentence; further joints are only counted.
-_JOINTS_SAID = 3
+_MAX_JOINTS = 3
 
 
 @dataclass(frozen=True)
@@ -183,7 +183,7 @@ def names_and_places(group: Sequence[Finding]) -> str:
     """Return the names and joints of findings of one cause."""
     joints = dict.fromkeys(joint for one in group for joint in one.joints)
     names = ' and '.join(name_in_words(one.name) for one in group)
-    where = ', '.join(joints) if len(joints) <= _JOINTS_SAID else f'{len(joints)} joints'
+    where = ', '.join(joints) if len(joints) <= _MAX_JOINTS else f'{len(joints)} joints'
     return f'{names} of {where or "the whole arm"}'
 
 
@@ -211,7 +211,7 @@ def _subject(finding: Finding) -> str:
             return f'{subject} on {places[0]} (these data do not determine its mass)'
         gone = ' that was put down' if mass < 0.0 else ''
         return f'{subject} of {as_sure(abs(mass), std)} kg on {places[0]}{gone}'
-    if len(places) > _JOINTS_SAID:
+    if len(places) > _MAX_JOINTS:
         return f'{subject} in {len(places)} joints'
     where = f' in {", ".join(places)}' if places else ''
     shown = [] if len(places) > 1 else list(_values(finding))
