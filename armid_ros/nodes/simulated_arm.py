@@ -156,7 +156,7 @@ class SimulatedArmNode(ArmidNode):
         if start_ns is None and not self._follows:
             self._origin_ns = self.get_clock().now().nanoseconds
         self._pending: tuple[int, Reference] | None = None
-        self.real_time = RealTime(lambda: self._arm.state.t, self.step)
+        self.real_time = RealTime(lambda: self._arm.t, self.step)
         self._skipped = 0.0
         self._states = _samples(self, JointState, 'joint_states')
         self._message = JointState(name=list(self._arm.joints))
@@ -197,7 +197,7 @@ class SimulatedArmNode(ArmidNode):
     @property
     def stamp_ns(self) -> int:
         """Return the stamp of the present state of the arm [ns]."""
-        return (self._origin_ns or 0) + self._arm.state.steps * self._dt_ns
+        return (self._origin_ns or 0) + self._arm.steps * self._dt_ns
 
     @property
     def joint_state(self) -> JointState:
@@ -207,7 +207,7 @@ class SimulatedArmNode(ArmidNode):
     @property
     def moving(self) -> bool:
         """Return whether a trajectory is under way or about to begin."""
-        return self._pending is not None or self._arm.state.t < self._arm.ends_at
+        return self._pending is not None or self._arm.t < self._arm.ends_at
 
     @property
     def readers(self) -> int:
@@ -256,7 +256,7 @@ class SimulatedArmNode(ArmidNode):
         now = self.get_clock().now().nanoseconds
         # after a larger step, the clock was set, and the arm does not catch up
         if self._origin_ns is None or not 0 <= now - self.stamp_ns <= 60 * 10**9:
-            self._origin_ns = now - self._arm.state.steps * self._dt_ns
+            self._origin_ns = now - self._arm.steps * self._dt_ns
         while self.stamp_ns + self._stride * self._dt_ns <= now:
             self.step()
 
@@ -270,7 +270,7 @@ class SimulatedArmNode(ArmidNode):
 
     def reset(self) -> str:
         """Set the arm to its initial state; time continues."""
-        self._arm.reset(self._arm.state.steps)
+        self._arm.reset(self._arm.steps)
         self._pending = None
         return f'{self.hardware} is where it began'
 
@@ -283,7 +283,7 @@ class SimulatedArmNode(ArmidNode):
                 'other nodes'
             )
         return trouble, {
-            'simulated_time': self._arm.state.t,
+            'simulated_time': self._arm.t,
             'moving': int(self.moving),
             'skipped_real_time': self.real_time.given_up,
         }

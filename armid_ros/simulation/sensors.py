@@ -196,21 +196,35 @@ class RecentPast:
         drive = self._plant.action.drive
         if drive is not None:
             rows[3] = self._read(drive(trace.tau))
-        self._rows = np.concatenate([self._rows, rows], axis=1)[:, -self._length :]
+        self._rows = np.concatenate([self._rows[:, -self._length :], rows], axis=1)
         self._steps = trace.state.steps
 
     def _read(self, tau: FloatArray) -> FloatArray:
         """Return the torque readings at the ends of steps from the torques of the steps."""
         return (tau[1:] + tau[:-1]) / 2 if self._plant.springs is None else tau[1:]
 
-    def latest(self) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return the present readings of position, velocity and torque, each of shape (n,)."""
-        count, sensing = self._rows.shape[1], self._plant.sensing
-        q, dq, ddq, given, asked = self._rows
+    def drop(self, count: int) -> None:
+        """Remove the last samples, which are of the last trace."""
+        self._rows, self._steps = self._rows[:, :-count], self._steps - count
+
+    def latest(self, ahead: int = 0) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """
+        Return the readings of position, velocity and torque, each of shape (n,).
+
+        Parameters
+        ----------
+        ahead : int
+            Number of samples of the last trace that are later than the readings.
+
+        """
+        end = self._rows.shape[1] - ahead
+        rows, sensing = self._rows[:, max(end - self._length, 0) : end], self._plant.sensing
+        count = rows.shape[1]
+        q, dq, ddq, given, asked = rows
         late = max(-1 - self._delay, -count)
         if count == 1 or (sensing.reading is None and sensing.displacement is None):
             return q[-1], dq[-1], asked[late]
-        t = self._plant.times(self._steps - count + 1, count)
+        t = self._plant.times(self._steps - ahead - count + 1, count)
         truth = Motion(self._plant.robot.joints, t, q, dq, ddq, given)
         q, dq, tau = readings(sensing, truth, asked)
         return q[-1], dq[-1], tau[late]

@@ -20,6 +20,9 @@ import numpy.typing as npt
 
 #: Largest velocity of a trajectory at its beginning and end [rad/s or m/s].
 _AT_REST = 1e-3
+#: Steps that are simulated at once if they are compiled. Samples are cheaper than with single
+#: steps, and a block takes less time than a period at 1 kHz.
+_BLOCK = 50
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,7 +130,9 @@ class SimulatedArm:
         start = self.plant.robot.middle_pose if start is None else start
         self._compiled = CompiledLoop.of(self.plant, self.controller)
         self._home = self.plant.state(start).q
-        self._state: State
+        self._state: State  # at the end of the block
+        self._ahead: int  # number of steps from the present to the end of the block
+        self._block_start: tuple[State, FloatArray]  # with the torque of the first step
         self._reference: Reference
         self._acting: Controller
         self._targets: Motion
@@ -144,7 +149,18 @@ class SimulatedArm:
     @property
     def state(self) -> State:
         """Return the true state of the arm."""
+        self._end_block()
         return self._state
+
+    @property
+    def steps(self) -> int:
+        """Time as a number of steps of the plant."""
+        return self._state.steps - self._ahead
+
+    @property
+    def t(self) -> float:
+        """Time [s]."""
+        return self.steps * self.plant.dt
 
     @property
     def ends_at(self) -> float:
@@ -197,7 +213,7 @@ class SimulatedArm:
             If the robot is another one, or joints are elastic.
 
         """
-        now = self._state
+        now = self.state
         self.plant = self.successor(arm)
         self._state = self.plant.state(now.q, now.dq, now.ddq, now.steps)
         self._compiled = CompiledLoop.of(self.plant, self.controller)
@@ -240,6 +256,7 @@ class SimulatedArm:
             trajectory then continues.
 
         """
+        self._end_block()
         curve, now = reference.for_robot(self.plant.robot), self._desired(1)
         if curve.dq is not None:
             self._require_none('ends with', curve.dq[-1], _AT_REST, '/s', 'stop it')
@@ -270,33 +287,57 @@ class SimulatedArm:
         """
         if steps < 1:
             raise ValueError(f'an arm advances by 1 step or more, not {steps}')
-        for _ in self.traces(steps):
-            pass
+        self._ahead -= steps
+        while self._ahead < 0:
+            before = self._state, self._torque
+            missing = -self._ahead
+            trace = self._take(missing if self._compiled is None else max(missing, _BLOCK))
+            self._block_start = before
+            self._ahead += len(trace.tau) - 1
         return self.read(steps)
 
     def traces(self, steps: int) -> Iterator[Trace]:
         """Simulate some steps, and yield their traces, each of some hundred steps."""
+        self._end_block()
         while steps:
-            row = self._row + 1
-            if row >= len(self._targets):
-                self._look_ahead(self._targets.q[-1])
-                row = 1
-            taken = min(steps, len(self._targets) - row)
-            rows, arm = range(row, row + taken), (self.plant, self._acting)
-            trace = run(*arm, self._state, self._torque, self._targets, rows, self._compiled)
-            self._state, self._torque = trace.state, trace.tau[-1]
-            self._past.extend(trace)
-            steps -= taken
+            trace = self._take(steps)
+            steps -= len(trace.tau) - 1
             yield trace
+
+    def _take(self, steps: int) -> Trace:
+        """Simulate some steps, at most to the end of the targets, and return their trace."""
+        row = self._row + 1
+        if row >= len(self._targets):
+            self._look_ahead(self._targets.q[-1])
+            row = 1
+        rows = range(row, min(row + steps, len(self._targets)))
+        arm = self.plant, self._acting
+        trace = run(*arm, self._state, self._torque, self._targets, rows, self._compiled)
+        self._state, self._torque = trace.state, trace.tau[-1]
+        self._past.extend(trace)
+        return trace
+
+    def _end_block(self) -> None:
+        """Set the state to that of the present: take the steps of the block again up to it."""
+        if self._ahead <= 0:
+            return
+        (state, torque), present = self._block_start, self.steps
+        rows = range(state.steps - self._first + 1, present - self._first + 1)
+        arm = self.plant, self._acting
+        trace = run(*arm, state, torque, self._targets, rows, self._compiled)
+        self._past.drop(self._ahead)
+        self._state, self._torque, self._ahead = trace.state, trace.tau[-1], 0
 
     def read(self, steps: int = 1) -> Sample:
         """Advance some steps, and return the sensor readings."""
         state, dt = self._state, steps * self.plant.dt
-        q, dq, tau = (row[np.newaxis] for row in self._past.latest())
-        q, dq, tau = self.sensors.measure(q, dq, tau, dt, self.rng, self._previous)
+        q, dq, tau = self._past.latest(self._ahead)
+        q, dq, tau = self.sensors.measure(
+            q[np.newaxis], dq[np.newaxis], tau[np.newaxis], dt, self.rng, self._previous
+        )
         self._previous = q[0]
         if self.plant.springs is None:
-            return Sample(state.steps, state.t, q[0], dq[0], tau[0])
+            return Sample(self.steps, self.t, q[0], dq[0], tau[0])
         # link side of the springs
         at, speed, none = state.q[np.newaxis], state.dq[np.newaxis], np.zeros((1, len(state.q)))
         at, speed, _ = self.sensors.measure(at, speed, none, dt, self.rng, self._previous_link)
@@ -312,6 +353,7 @@ class SimulatedArm:
         """Start on a reference, with an empty sensor history."""
         first = reference.sample(np.zeros(1))
         self._state = self.plant.state(first.q[0], first.dq[0], first.ddq[0], steps)
+        self._ahead = 0
         self._reference, self._begun = reference, steps
         self._acting = self.controller.started()
         self._previous = self._previous_link = None

@@ -206,7 +206,9 @@ class Causes:
         rows, robot = self.nuisance.rows, self.nuisance.arm.robot
         torque = _torque_of(columns, rows)
         seen = torque.any(axis=0)
-        if not seen.any() or (effect.traits.rests and _at_rest(columns, rows) < _MIN_SHARE_AT_REST):
+        if not seen.any() or (
+            effect.traits.rests and _at_rest(columns, rows) < _MIN_SHARE_AT_REST
+        ):
             return None
         return cause_of(
             self.nuisance,
