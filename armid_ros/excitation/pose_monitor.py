@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections import deque
 from dataclasses import dataclass, field
+from operator import le
 from typing import NamedTuple
 
 from armid_ros.excitation.supervision import MeasuredPose
@@ -27,16 +28,19 @@ class _State(NamedTuple):
 
     arrived: float
     stamp_ns: int
-    q: FloatArray
-    dq: FloatArray
+    q: list[float]
+    dq: list[float]
 
 
 @dataclass
 class _Source:
-    """Messages with the same list of names: the arm's joints in them, and recent states."""
+    """Messages with the same list of names: the arm's joints in them, limits, recent states."""
 
     columns: npt.NDArray[np.int_]
-    joints: npt.NDArray[np.int_]
+    joints: list[int]
+    lower: list[float]
+    upper: list[float]
+    velocity: list[float]
     states: deque[_State] = field(default_factory=deque)
     rivals: list[_State] = field(default_factory=list)
 
@@ -59,8 +63,6 @@ class PoseMonitor:
 
     Attributes
     ----------
-    pose : MeasuredPose
-        Last accepted positions.
     rejected : int
         Number of rejected joint states.
 
@@ -68,7 +70,9 @@ class PoseMonitor:
 
     def __init__(self, robot: Robot, tolerance: float) -> None:
         limit = robot.velocity_limit
-        self.pose = MeasuredPose.unknown(robot.joints)
+        self._joints, n = robot.joints, robot.n_joints
+        # plain numbers: for a few joints, numpy takes five times as long
+        self._q, self._seen, self._stamps = [np.nan] * n, [-np.inf] * n, [0] * n
         self._units = robot.position_units
         # without a limit in the description, a turn per second is assumed
         self._velocity = np.where(np.isfinite(limit) & (limit > 0.0), limit, 2.0 * np.pi)
@@ -78,6 +82,17 @@ class PoseMonitor:
         self._sources: dict[tuple[str, ...], _Source] = {}
         self._rejections: deque[tuple[float, str]] = deque(maxlen=4 * MIN_AGREEING)
         self.rejected = 0
+
+    @property
+    def pose(self) -> MeasuredPose:
+        """Return the last accepted positions."""
+        q, seen, stamps = (np.array(values) for values in (self._q, self._seen, self._stamps))
+        return MeasuredPose(self._joints, q, seen, stamps)
+
+    @property
+    def last_stamp_ns(self) -> int:
+        """Return the oldest stamp of the accepted positions [ns]."""
+        return min(self._stamps)
 
     @property
     def sources(self) -> int:
@@ -107,17 +122,18 @@ class PoseMonitor:
             Time of arrival [s].
 
         """
-        joints = self.pose.joints
-        if names not in self._sources:
-            own = [(k, joints.index(name)) for k, name in enumerate(names) if name in joints]
-            self._sources[names] = _Source(*np.array(own, dtype=int).reshape(-1, 2).T)
-        source = self._sources[names]
-        if not len(source.joints):
+        source = self._sources.get(names)
+        if source is None:
+            own = [(k, self._joints.index(x)) for k, x in enumerate(names) if x in self._joints]
+            columns, joints = np.array(own, dtype=int).reshape(-1, 2).T
+            limits = [x[joints].tolist() for x in (self._lower, self._upper, self._velocity)]
+            source = self._sources[names] = _Source(columns, joints.tolist(), *limits)
+        if not source.joints:
             return
         q, dq = (
-            values[source.columns]
+            values[source.columns].tolist()
             if len(values) == len(names)
-            else np.full(len(source.joints), np.nan)
+            else [np.nan] * len(source.joints)
             for values in (position, velocity)
         )
         state = _State(now, stamp_ns, q, dq)
@@ -125,30 +141,32 @@ class PoseMonitor:
         if fault:
             self._reject(fault, now)
             return
-        last = source.states[-1] if source.states else None
-        if last is None:
-            seen = self.pose.seen[source.joints].max()
-            last = _State(seen, 0, self.pose.q[source.joints], dq)
-        elif state.stamp_ns == last.stamp_ns != 0 and np.array_equal(last.q, q):
-            return  # repeated message
+        if not source.states:
+            seen = max(self._seen[j] for j in source.joints)
+            last = _State(seen, 0, [self._q[j] for j in source.joints], dq)
+        else:
+            last = source.states[-1]
+            if stamp_ns == last.stamp_ns != 0 and last.q == q:
+                return  # repeated message
         fault = self._unreachable(source, state, last)
         if fault:
             self._reject(fault, now)
             if source.rivals and self._unreachable(source, state, source.rivals[-1]):
                 source.rivals.clear()
             source.rivals.append(state)
-            seen = self.pose.seen[source.joints].max()
+            seen = max(self._seen[j] for j in source.joints)
             if len(source.rivals) < MIN_AGREEING or seen >= source.rivals[0].arrived:
                 return
             source.states.clear()
         source.rivals.clear()
         states = source.states
         states.append(state)
-        while len(states) > MIN_AGREEING and state.arrived - states[1].arrived > _REJECTION_WINDOW:
+        while len(states) > MIN_AGREEING and now - states[1].arrived > _REJECTION_WINDOW:
             states.popleft()
-        q = np.full(len(self.pose.joints), np.nan)
-        q[source.joints] = state.q
-        self.pose = self.pose.updated(q, state.stamp_ns, state.arrived)
+        for j, value in zip(source.joints, q, strict=True):
+            if not stamp_ns or self._stamps[j] != stamp_ns:
+                self._q[j], self._seen[j] = value, now
+                self._stamps[j] = stamp_ns
 
     def contradiction(self, now: float, count: int = MIN_AGREEING) -> str:
         """Return why many positions of the last 0.5 s were rejected; empty if only few were."""
@@ -159,7 +177,7 @@ class PoseMonitor:
 
     def velocity(self) -> FloatArray:
         """Return the velocity of each joint, shape (n,) [rad/s or m/s]; NaN: unknown."""
-        velocity = np.full(len(self.pose.joints), np.nan)
+        velocity = np.full(len(self._joints), np.nan)
         for source in self._sources.values():
             states = source.states
             for state in reversed(states):
@@ -167,7 +185,7 @@ class PoseMonitor:
                 # time of the position differences for a velocity [s]: noise of 0.0001 rad gives
                 # 0.01 rad/s
                 if passed >= 0.01:
-                    velocity[source.joints] = (states[-1].q - state.q) / passed
+                    velocity[source.joints] = (np.array(states[-1].q) - state.q) / passed
                     break
         return velocity
 
@@ -207,19 +225,19 @@ class PoseMonitor:
                 speed = max(speed, abs(velocity))
                 if speed > REST_SPEED:
                     unit = f'{self._units[j]}/s'
-                    return f"joint '{self.pose.joints[j]}' moves at {speed:.2g} {unit}"
-            decided.update(source.joints.tolist())
-        return '' if len(decided) == len(self.pose.joints) else None
+                    return f"joint '{self._joints[j]}' moves at {speed:.2g} {unit}"
+            decided.update(source.joints)
+        return '' if len(decided) == len(self._joints) else None
 
-    def _outside(self, source: _Source, q: FloatArray) -> str:
+    def _outside(self, source: _Source, q: list[float]) -> str:
         """Return a message if a position is not finite or is outside the limits."""
-        inside = (q >= self._lower[source.joints]) & (q <= self._upper[source.joints])
-        if inside.all():
+        if all(map(le, source.lower, q)) and all(map(le, q, source.upper)):
             return ''
-        k = int(np.argmin(inside))
+        ranges = zip(source.lower, q, source.upper, strict=True)
+        k = next(k for k, (low, value, high) in enumerate(ranges) if not low <= value <= high)
         j = source.joints[k]
         return (
-            f"the position of joint '{self.pose.joints[j]}' is {q[k]:.4g} {self._units[j]}, "
+            f"the position of joint '{self._joints[j]}' is {q[k]:.4g} {self._units[j]}, "
             f'outside its limits {self._lower[j]:.4g} to {self._upper[j]:.4g} {self._units[j]}'
         )
 
@@ -236,16 +254,21 @@ class PoseMonitor:
             between = (state.stamp_ns - last.stamp_ns) * 1e-9
             # transport delay: stamps may differ by this time more than arrivals [s]
             passed = max(passed, min(between, passed + 0.1))
-        step = np.abs(state.q - last.q)
+        allowed = max(passed, 0.0)
         # encoder noise, added to the change of position that the velocity limit allows [rad or m]
-        beyond = step - 0.02 - self._velocity[source.joints] * max(passed, 0.0)
+        beyond = [
+            abs(q - before) - 0.02 - velocity * allowed
+            for q, before, velocity in zip(state.q, last.q, source.velocity, strict=True)
+        ]
+        if max(beyond) <= 0.0:
+            return ''
         k = int(np.argmax(beyond))
         if not beyond[k] > 0.0:  # NaN before the first position
             return ''
         j = source.joints[k]
         unit = self._units[j]
         return (
-            f"the position of joint '{self.pose.joints[j]}' goes from {last.q[k]:.4g} to "
+            f"the position of joint '{self._joints[j]}' goes from {last.q[k]:.4g} to "
             f'{state.q[k]:.4g} {unit} within {passed:.3g} s, faster than its limit of '
             f'{self._velocity[j]:.3g} {unit}/s: is there another publisher?'
         )

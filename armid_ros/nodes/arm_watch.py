@@ -79,10 +79,7 @@ class ArmWatch:
 
     def now(self) -> float:
         """Return the time of the steady or simulated clock, for the age of messages [s]."""
-        clock = self._node.get_clock()
-        if not clock.ros_time_is_active:
-            return float(self._steady.now().nanoseconds * 1e-9)
-        return float((clock.now().nanoseconds - self._stepped_ns) * 1e-9)
+        return self._age_clock(self._node.get_clock().now().nanoseconds)
 
     def catch_up(self) -> None:
         """Process the joint states that arrived during a long callback."""
@@ -146,14 +143,21 @@ class ArmWatch:
             f'({clock - late:.3f} s and {clock:.3f} s), more than {difference:.3g} s: {remedy}'
         )
 
+    def _age_clock(self, clock_ns: int) -> float:
+        """Return `now`, given the time of the node's clock [ns]."""
+        if not self._node.get_clock().ros_time_is_active:
+            return float(self._steady.now().nanoseconds * 1e-9)
+        return (clock_ns - self._stepped_ns) * 1e-9
+
     def _on_clock_step(self, jump: Any) -> None:
         self._stepped_ns += jump.delta.nanoseconds
 
     def _on_joint_states(self, data: bytes) -> None:
         message = self._messages.read(data)
         stamp = message.sec * 10**9 + message.nanosec
-        now = self.now()
+        clock_ns = self._node.get_clock().now().nanoseconds
+        now = self._age_clock(clock_ns)
         self.monitor.update(message.names, message.position, message.velocity, stamp, now)
-        self.stamps.take(stamp)
+        self.stamps.take(stamp, clock_ns)
         self._efforts = message.names, message.effort
         self._on_state(now)

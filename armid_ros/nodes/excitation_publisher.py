@@ -124,7 +124,7 @@ class ExcitationPublisherNode(ArmidNode):
     @property
     def last_stamp_ns(self) -> int:
         """Return the oldest stamp of the accepted joint positions [ns]."""
-        return int(self._arm.monitor.pose.stamps.min())
+        return self._arm.monitor.last_stamp_ns
 
     @property
     def elapsed(self) -> float | None:

@@ -66,9 +66,9 @@ class StampDifference:
         """Return the smallest difference of clock and recent stamps [s]."""
         return min(self._recent, key=abs, default=0.0)
 
-    def take(self, stamp_ns: int) -> None:
-        """Register the stamp of a message received now [ns]; 0: no stamp."""
-        now = self._clock.now().nanoseconds
+    def take(self, stamp_ns: int, now_ns: int | None = None) -> None:
+        """Register the stamp of a message [ns]; 0: no stamp. By default it was received now."""
+        now = self._clock.now().nanoseconds if now_ns is None else now_ns
         self._late = (now - stamp_ns) * 1e-9 if stamp_ns and now else 0.0
         self._recent.append(self._late)
 

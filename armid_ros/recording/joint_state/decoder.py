@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import math
 from typing import NamedTuple
 
-from armid_ros.motion import FloatArray, Samples
+from armid_ros.motion import FloatArray, read_only, Samples
 from armid_ros.recording.joint_state.layout import JointStateLayout, MalformedMessage
 from armid_ros.recording.message_types import QUANTITIES
 from armid_ros.recording.source import IntArray, MessageBlock, records_at
@@ -238,6 +238,10 @@ class _Plan:
         )
 
 
+#: Values of a quantity that a message does not have.
+_NONE = read_only(np.empty(0))
+
+
 class JointStateValues(NamedTuple):
     """
     Values of one JointState message.
@@ -277,14 +281,15 @@ class JointStateMessages:
             The bytes are no JointState.
 
         """
-        layout = next((one for one in self._known if one.is_of(data)), None)
-        if layout is None:
+        for layout in self._known:
+            if layout.is_of(data):
+                break
+        else:
             layout = JointStateLayout.of(data)
             self._known = [layout, *self._known[:7]]  # one layout per sender on a topic
-        row = np.frombuffer(data, layout.record, 1)[0]
-        position, velocity, effort = (
-            row[name] if count else np.empty(0)
-            for name, count in zip(QUANTITIES, layout.counts, strict=True)
-        )
-        stamp = int(row['sec']), int(row['nanosec'])
-        return JointStateValues(*stamp, layout.names, position, velocity, effort)
+        sec, nanosec = layout.stamp.unpack_from(data, 4)
+        position, velocity, effort = [
+            np.frombuffer(data, layout.number, count, begin) if count else _NONE
+            for count, begin in layout.values
+        ]
+        return JointStateValues(sec, nanosec, layout.names, position, velocity, effort)

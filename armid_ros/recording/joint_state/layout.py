@@ -160,6 +160,21 @@ class JointStateLayout:
         return self.dtype(self.end)
 
     @cached_property
+    def stamp(self) -> struct.Struct:
+        """Format of the stamp: seconds and nanoseconds."""
+        return struct.Struct(self.order + 'iI')
+
+    @cached_property
+    def number(self) -> np.dtype[np.float64]:
+        """Format of a value."""
+        return np.dtype(self.order + 'f8')
+
+    @cached_property
+    def values(self) -> tuple[tuple[int, int], ...]:
+        """Number and offset of positions, velocities and efforts."""
+        return tuple((n, begin) for n, (_, begin) in zip(self.counts, self.places, strict=True))
+
+    @cached_property
     def fixed(self) -> tuple[npt.NDArray[np.void], npt.NDArray[np.void]]:
         """Values that are equal in all messages of this layout, and a mask of their bits, (1,)."""
         expected, mask = np.zeros((2, 1), self.record)

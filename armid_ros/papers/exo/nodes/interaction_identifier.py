@@ -11,7 +11,7 @@ from typing import Any
 
 from armid_msgs.msg import ParameterEstimate
 from armid_ros.errors import ArmidError, RecordingError
-from armid_ros.identification.rows.causal import LARGEST
+from armid_ros.identification.rows.causal import MAX_MAGNITUDE
 from armid_ros.identification.samples.joint_merge import joint_places
 from armid_ros.identification.samples.spikes import SpikeGate
 from armid_ros.identification.samples.straight_line import StreamSample
@@ -177,7 +177,7 @@ class InteractionIdentifierNode(ArmidNode):
                 if len(part) != len(message.name):
                     raise RecordingError(f'{len(message.name)} names but {len(part)} of {name}')
             signal = np.concatenate([part[order] for part in parts])
-            if not np.all(np.abs(signal) <= LARGEST):
+            if not np.all(np.abs(signal) <= MAX_MAGNITUDE):
                 raise RecordingError('implausibly large values')
             stamp = message.header.stamp
             if stamp.sec < 0 or stamp.nanosec >= 10**9:
