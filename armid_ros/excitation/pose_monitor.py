@@ -122,12 +122,7 @@ class PoseMonitor:
             Time of arrival [s].
 
         """
-        source = self._sources.get(names)
-        if source is None:
-            own = [(k, self._joints.index(x)) for k, x in enumerate(names) if x in self._joints]
-            columns, joints = np.array(own, dtype=int).reshape(-1, 2).T
-            limits = [x[joints].tolist() for x in (self._lower, self._upper, self._velocity)]
-            source = self._sources[names] = _Source(columns, joints.tolist(), *limits)
+        source = self._sources.get(names) or self._new_source(names)
         if not source.joints:
             return
         q, dq = (
@@ -141,13 +136,9 @@ class PoseMonitor:
         if fault:
             self._reject(fault, now)
             return
-        if not source.states:
-            seen = max(self._seen[j] for j in source.joints)
-            last = _State(seen, 0, [self._q[j] for j in source.joints], dq)
-        else:
-            last = source.states[-1]
-            if stamp_ns == last.stamp_ns != 0 and last.q == q:
-                return  # repeated message
+        last = source.states[-1] if source.states else self._accepted(source, dq)
+        if stamp_ns == last.stamp_ns != 0 and last.q == q:
+            return  # repeated message
         fault = self._unreachable(source, state, last)
         if fault:
             self._reject(fault, now)
@@ -167,6 +158,18 @@ class PoseMonitor:
             if not stamp_ns or self._stamps[j] != stamp_ns:
                 self._q[j], self._seen[j] = value, now
                 self._stamps[j] = stamp_ns
+
+    def _new_source(self, names: tuple[str, ...]) -> _Source:
+        own = [(k, self._joints.index(x)) for k, x in enumerate(names) if x in self._joints]
+        columns, joints = np.array(own, dtype=int).reshape(-1, 2).T
+        limits = [x[joints].tolist() for x in (self._lower, self._upper, self._velocity)]
+        self._sources[names] = _Source(columns, joints.tolist(), *limits)
+        return self._sources[names]
+
+    def _accepted(self, source: _Source, dq: list[float]) -> _State:
+        """Return the last accepted state of the joints of a source that is new."""
+        seen = max(self._seen[j] for j in source.joints)
+        return _State(seen, 0, [self._q[j] for j in source.joints], dq)
 
     def contradiction(self, now: float, count: int = MIN_AGREEING) -> str:
         """Return why many positions of the last 0.5 s were rejected; empty if only few were."""

@@ -32,8 +32,8 @@ def measure_gap(explanation: Explanation, unseen: Evidence | None) -> Gap:
     overlays = []
     for part, sigma, *rows in zip(evidence.data, evidence.sigma, *residuals, strict=True):
         measured = part.torque
-        predictions = (measured - residual for residual in rows)
-        overlays.append(Overlay(part.source, part, measured, *predictions, sigma))
+        unpatched, patched = (measured - residual for residual in rows)
+        overlays.append(Overlay(part.source, part, measured, unpatched, patched, sigma))
     power = [evidence.power(rows) for rows in residuals]
     floor = evidence.power([np.broadcast_to(o.sigma, o.measured.shape) for o in overlays])
     excess = [np.maximum(own - floor, 0.0) / np.maximum(floor, 1e-24) for own in power]

@@ -20,7 +20,6 @@ from armid_ros.effects.tied import Tied
 from armid_ros.estimate import ParameterName
 from armid_ros.identification.fitting.identifiability import excludes_zero
 from armid_ros.motion import FloatArray
-from armid_ros.robots.ties import Tie
 import numpy as np
 
 
