@@ -273,8 +273,9 @@ def posteriors(
         each = nothing[:, n, np.newaxis] + explained - 0.5 * np.sum(np.log(wide), axis=2)
         changed[:, n] = np.logaddexp.reduce(each, axis=1) - np.log(len(SIZES))
         tried.append((each, explained, own, to))
-    # All values of a cause vary with one misfit, so only recordings are independent.
-    weight = prior + (changed - prior) / p
+    # The values of a cause vary with the misfit of a recording: between one and all p of them
+    # independently. The number of independent ones is taken as the geometric mean.
+    weight = prior + (changed - prior) / np.sqrt(p)
     weight -= np.logaddexp.reduce(weight, axis=1, keepdims=True)
     factor = -np.logaddexp.reduce(weight + nothing - changed, axis=1)
     every, parts, owns, aims = (np.array(x) for x in zip(*tried, strict=True))
