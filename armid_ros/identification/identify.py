@@ -13,7 +13,6 @@ from armid_ros.estimate import Estimate
 from armid_ros.identification.fitting.held_out import (
     cutoff_of_torques,
     halves_error,
-    HalvesError,
     scatter,
 )
 from armid_ros.identification.fitting.identifiability import (
@@ -143,7 +142,7 @@ class Identification:
         Settings of the fit.
     notes : tuple of str
         Notes for the user: joints at rest, outliers, grouped parameters.
-    halves : HalvesError
+    halves : Score
         Torque error when either half of the data predicts the other.
     scatter : ndarray, shape (K, r)
         Jackknife changes of the values without each recording; see `scatter`.
@@ -166,7 +165,7 @@ class Identification:
     used: Conditioning
     settings: IdentificationSettings
     notes: tuple[str, ...]
-    halves: HalvesError
+    halves: Score
     scatter: FloatArray
     physical: PhysicalCertificate | None = None
     bodies_cost: float | None = None

@@ -81,8 +81,10 @@ def identification_document(
         'training': {
             'bags': list(dict.fromkeys(fit.source for fit in result.training)),
             **_score(result, result.training),
-            'halves_error_percent': result.halves.whole,
-            'joint_halves_error_percent': _by_joint(result, result.halves.joints),
+            'halves_error_percent': result.halves.relative_error_percent,
+            'joint_halves_error_percent': _by_joint(
+                result, result.halves.joint_relative_error_percent
+            ),
         },
         'validation': [{'bag': bag, **_score(result, fits)} for bag, fits in validation.items()],
         'residual_std': _by_joint(result, result.joint_std),

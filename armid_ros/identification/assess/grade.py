@@ -119,7 +119,7 @@ def grade(
     worst: dict[str | None, _Worst] = {
         bag: _worst(Score.of(fits).joint_relative_error_percent, fits, result)
         for bag, fits in validation.items()
-    } or {None: _worst(result.halves.joints, result.training, result)}
+    } or {None: _worst(result.halves.joint_relative_error_percent, result.training, result)}
     reasons = [
         *faults,
         *_errors(result, worst, [fit for fits in validation.values() for fit in fits]),
@@ -206,7 +206,7 @@ def _worst(errors: FloatArray, fits: Sequence[Fit], result: Identification) -> _
 def _halves(result: Identification, word: Word, error: str) -> Fault:
     """Grade by the error with which each half of the data predicts the other."""
     training = Score.of(result.training).joint_relative_error_percent
-    every = result.halves.joints
+    every = result.halves.joint_relative_error_percent
     text = f'cross-check between the halves of the data: {error}'
     undetermined = every > np.maximum(LIMITS.undetermined * training, 100.0 * LIMITS.floor)
     undetermined &= beyond_noise(every, result.training, result.used) > 0.0

@@ -16,7 +16,7 @@ held-out torques.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from armid_ros.arm import ArmModel
 from armid_ros.errors import IdentificationError
@@ -25,7 +25,7 @@ from armid_ros.identification.fitting.least_squares import (
     informative_solution,
     NormalEquations,
 )
-from armid_ros.identification.rows.regression import by_stretch, Regression, regressions
+from armid_ros.identification.rows.regression import by_stretch, Regression, regressions, Score
 from armid_ros.identification.rows.signals import Conditioning, TORQUE_RESOLUTION
 from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording
@@ -37,30 +37,12 @@ import numpy.typing as npt
 _MAX_ROWS = 6000
 
 
-@dataclass(frozen=True)
-class HalvesError:
-    """
-    Relative torque error when either half of the data predicts the other.
-
-    Attributes
-    ----------
-    whole : float
-        Error of all joints together [%].
-    joints : ndarray, shape (n,)
-        Error of each joint, as a share of its own torque [%].
-
-    """
-
-    whole: float
-    joints: FloatArray
-
-
 def halves_error(
     problem: Sequence[Regression],
     weights: FloatArray,
     described: FloatArray,
     spread: FloatArray | None = None,
-) -> HalvesError:
+) -> Score:
     """
     Cross-validate with two halves: fit one and predict the other.
 
@@ -77,17 +59,17 @@ def halves_error(
 
     Returns
     -------
-    HalvesError
+    Score
         Errors of the predicted torque.
 
     """
     # about fifty rows for every parameter of seven joints
     step, columns, tau, target, informative = _some_rows(problem, 4000)
-    rest, weight = target - columns @ described, weights[::step]
-    most = np.full(len(described), np.inf) if spread is None else spread
+    difference, weight = target - columns @ described, weights[::step]
+    expected = np.full(len(described), np.inf) if spread is None else spread
     middle = len(tau) // 2
     halves = slice(0, middle), slice(middle, None)
-    left = np.zeros_like(tau)
+    residual = np.zeros_like(tau)
     for fitted, predicted in (halves, halves[::-1]):
         # Bayesian estimate in units of the residual. The prior deviation is the expected error
         # of the description, or the size of the torque. Without it, parameters that a half does
@@ -97,14 +79,9 @@ def halves_error(
         size = np.sqrt(np.mean((columns[fitted] * own[:, :, np.newaxis]) ** 2, axis=(0, 1)))
         torque = np.sqrt(np.mean((tau[fitted] * own) ** 2))
         share = np.where(size > 0.0, size, 1.0) / max(torque, 1.0)
-        change = _fit(columns[fitted], rest[fitted], own, share**2 + most**-2.0)
-        left[predicted] = rest[predicted] - columns[predicted] @ change
-    error, length = (np.linalg.norm(informative * rows, axis=0) for rows in (left, tau))
-    whole = float(np.linalg.norm(length))
-    return HalvesError(
-        float(100.0 * np.linalg.norm(error) / whole) if whole > 0.0 else 0.0,
-        100.0 * np.divide(error, length, out=np.zeros_like(error), where=length > 0.0),
-    )
+        change = _fit(columns[fitted], difference[fitted], own, share**2 + expected**-2.0)
+        residual[predicted] = difference[predicted] - columns[predicted] @ change
+    return Score.of_rows(residual, tau, informative)
 
 
 def scatter(problem: Sequence[Regression], weights: FloatArray, values: FloatArray) -> FloatArray:

@@ -206,14 +206,20 @@ class Score:
     @staticmethod
     def of(fits: Sequence[Fit]) -> Score:
         """Return the common score of one or more stretches."""
-        used = np.concatenate([fit.informative for fit in fits])
-        residual = used * np.concatenate([fit.residual for fit in fits])
-        tau = used * np.concatenate([fit.tau for fit in fits])
-        lengths, count = np.linalg.norm(tau, axis=0), np.maximum(used.sum(axis=0), 1)
+        names = 'residual', 'tau', 'informative'
+        return Score.of_rows(*(np.concatenate([getattr(f, one) for f in fits]) for one in names))
+
+    @staticmethod
+    def of_rows(
+        residual: FloatArray, tau: FloatArray, informative: npt.NDArray[np.bool_]
+    ) -> Score:
+        """Return the score of informative rows of residuals and torques, each (N, n)."""
+        errors, lengths = (np.linalg.norm(informative * x, axis=0) for x in (residual, tau))
+        count, whole = np.maximum(informative.sum(axis=0), 1), np.linalg.norm(lengths)
         return Score(
-            float(100.0 * np.linalg.norm(residual) / np.linalg.norm(tau)),
-            100.0 * np.linalg.norm(residual, axis=0) / np.where(lengths > 0.0, lengths, np.inf),
-            np.linalg.norm(residual, axis=0) / np.sqrt(count),
+            float(100.0 * np.linalg.norm(errors) / whole) if whole > 0.0 else 0.0,
+            100.0 * errors / np.where(lengths > 0.0, lengths, np.inf),
+            errors / np.sqrt(count),
             lengths / np.sqrt(count),
         )
 

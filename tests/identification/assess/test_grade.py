@@ -147,7 +147,7 @@ def test_without_held_out_data_halves_of_the_recording_judge_each_other(structur
     found, result = graded(structure, [run])
     assert found.word == 'good'
     assert 'halves' in found.reasons[0]
-    assert result.halves.whole < 5.0
+    assert result.halves.relative_error_percent < 5.0
 
 
 def test_two_seconds_of_data_are_too_little(arm, structure):
@@ -155,7 +155,7 @@ def test_two_seconds_of_data_are_too_little(arm, structure):
     found, result = graded(structure, [record(arm, 1, duration=2.0)])
     assert found.word != 'good'
     assert 'record longer' in found.reasons[0]
-    assert result.halves.joints.max() > LIMITS.poor
+    assert result.halves.joint_relative_error_percent.max() > LIMITS.poor
 
 
 @pytest.mark.parametrize('held_out', [False, True])

@@ -91,7 +91,7 @@ def test_data_without_noise_that_cannot_tell_two_parameters_apart_predict_themse
     columns = np.concatenate([one, 2.0 * one], axis=2)
     tau = columns @ np.array([1.0, 2.0])
     weights = np.full(tau.shape, 1e12)
-    assert halves_error(problem(columns, tau), weights, np.zeros(2)).whole < 1e-6
+    assert halves_error(problem(columns, tau), weights, np.zeros(2)).relative_error_percent < 1e-6
 
 
 def test_an_error_is_that_of_the_noise():
@@ -101,8 +101,8 @@ def test_an_error_is_that_of_the_noise():
     tau = torque + 0.1 * rng.normal(size=torque.shape)
     error = halves_error(problem(columns, tau), np.full(tau.shape, 10.0), np.zeros(3))
     expected = 100.0 * 0.1 / np.sqrt(np.mean(tau**2, axis=0))
-    assert error.joints == pytest.approx(expected, rel=0.05)
-    assert error.whole == pytest.approx(np.mean(expected), rel=0.05)
+    assert error.joint_relative_error_percent == pytest.approx(expected, rel=0.05)
+    assert error.relative_error_percent == pytest.approx(np.mean(expected), rel=0.05)
 
 
 def test_the_error_of_a_joint_is_a_share_of_its_own_torque():
@@ -112,5 +112,5 @@ def test_the_error_of_a_joint_is_a_share_of_its_own_torque():
     columns[:, 0, 0], columns[:, 1, 1] = rng.normal(size=(2, 4000))
     tau = columns @ np.array([100.0, 0.0]) + [0.0, 0.1] * rng.normal(size=(4000, 2))
     error = halves_error(problem(columns, tau), np.full(tau.shape, 10.0), np.zeros(2))
-    assert error.whole < 1.0
-    assert error.joints == pytest.approx([0.0, 100.0], abs=1.0)
+    assert error.relative_error_percent < 1.0
+    assert error.joint_relative_error_percent == pytest.approx([0.0, 100.0], abs=1.0)
