@@ -129,13 +129,12 @@ class FleetFit:
     def estimate(self, normal: NormalEquations, noise: FloatArray) -> FleetEstimate:
         """Return the estimate, given the noise products of the same rows."""
         some, inverse = normal.restrict(self.kept), self.fit.inverse
-        squares = some.squares(self.fit.values).sum() / some.target_squares.sum()
         return FleetEstimate(
             self.base.parameters,
             self.fit.values,
             np.sqrt(np.diag(sandwich(inverse @ inverse.T, noise))),
             some.joint_std(self.fit.values),
-            float(100.0 * np.sqrt(squares)),
+            some.relative_error_percent(self.fit.values),
             float(np.linalg.cond(self.fit.factor)),
         )
 

@@ -10,11 +10,7 @@ from dataclasses import dataclass, field, replace
 from armid_ros.arm import ArmModel
 from armid_ros.errors import IdentificationError
 from armid_ros.estimate import Estimate
-from armid_ros.identification.fitting.held_out import (
-    cutoff_of_torques,
-    halves_error,
-    scatter,
-)
+from armid_ros.identification.fitting.held_out import cutoff_of_torques, halves_error, scatter
 from armid_ros.identification.fitting.identifiability import (
     base_spread,
     determined,
@@ -82,7 +78,8 @@ class IdentificationSettings:
     physical : PhysicalSettings or None
         Constraints for a physically consistent fit; None for an unconstrained fit.
     prefers_bodies : bool
-        Whether to fit physically consistent links if the torque error grows by a tenth at most.
+        Whether to fit physically consistent links if the torque error grows by a tenth at most:
+        simulators need such links, and a model that lacks an effect costs more.
 
     """
 
@@ -256,7 +253,6 @@ def identify(
     else:
         data = base, problem, recordings, used
         bodies = _among_bodies(arm, theory, data, settings, rng)
-        # simulators need physically consistent links; a model that lacks an effect costs more
         if bodies is not None and (settings.physical or bodies[3].cost <= 0.1):
             settings, theory, fit, _ = bodies
             notes += bodies[3].sentences()

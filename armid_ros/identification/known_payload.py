@@ -20,11 +20,7 @@ from armid_ros.arm import ArmModel
 from armid_ros.errors import IdentificationError, meant
 from armid_ros.files.cells import listed, parted
 from armid_ros.identification.rows.regression import predictions, regressions
-from armid_ros.identification.rows.signals import (
-    conditioning,
-    segments,
-    SignalSettings,
-)
+from armid_ros.identification.rows.signals import conditioning, segments, SignalSettings
 from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording
 from armid_ros.robots import Robot

@@ -22,6 +22,7 @@ from armid_ros.estimate import parameter_table
 from armid_ros.files import is_file, json_text, read_text, reading, write_file
 from armid_ros.identification.assess.grade import Grade
 from armid_ros.identification.assess.verification import Verification
+from armid_ros.identification.fitting.instruments import NoiseCheck
 from armid_ros.identification.identify import Identification
 from armid_ros.identification.rows.regression import Fit, Score
 from armid_ros.motion import FloatArray
@@ -103,16 +104,7 @@ def identification_document(
     if verification is not None:
         noise = verification.noise
         document['verification'] = {
-            'encoder_noise': noise
-            and {
-                'statistic': noise.statistic,
-                'degrees_of_freedom': noise.freedom,
-                'p_value': noise.p_value,
-                'position_noise': _by_joint(result, noise.position_noise),
-                'bias': noise.bias.tolist(),
-                'bias_std': noise.bias_std.tolist(),
-                'largest_bias_in_deviations': float(np.abs(noise.relative_bias).max(initial=0.0)),
-            },
+            'encoder_noise': None if noise is None else _noise(result, noise),
             'forward': [pair.document() for pair in verification.forward],
             'left_out': list(verification.left_out),
         }
@@ -244,6 +236,18 @@ def _names(document: Mapping[str, Any]) -> list[str]:
     """Return the recordings that a document names, held-out ones last."""
     validation = (row['bag'] for row in document.get('validation', []))
     return [str(name) for name in (*document['training']['bags'], *validation) if name]
+
+
+def _noise(result: Identification, noise: NoiseCheck) -> dict[str, Any]:
+    return {
+        'statistic': noise.statistic,
+        'degrees_of_freedom': noise.freedom,
+        'p_value': noise.p_value,
+        'position_noise': _by_joint(result, noise.position_noise),
+        'bias': noise.bias.tolist(),
+        'bias_std': noise.bias_std.tolist(),
+        'largest_bias_in_deviations': float(np.max(np.abs(noise.relative_bias), initial=0.0)),
+    }
 
 
 def _score(result: Identification, fits: Sequence[Fit]) -> dict[str, Any]:

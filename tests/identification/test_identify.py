@@ -5,13 +5,7 @@ import re
 
 from armid_ros.arm import ArmModel
 from armid_ros.errors import IdentificationError
-from armid_ros.identification import (
-    grade,
-    IdentificationSettings,
-    identify,
-    Score,
-    SignalSettings,
-)
+from armid_ros.identification import grade, IdentificationSettings, identify, Score, SignalSettings
 from armid_ros.model import random_motion
 from armid_ros.robots import robot_from_urdf
 import numpy as np

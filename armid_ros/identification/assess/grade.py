@@ -19,11 +19,7 @@ from typing import get_args, NamedTuple
 from armid_ros.arm import ArmModel
 from armid_ros.identification.assess.grade_limits import by_error, LIMITS, Word
 from armid_ros.identification.assess.mistakes import shared_mistakes
-from armid_ros.identification.assess.sensor_faults import (
-    Fault,
-    sensor_faults,
-    units_beyond_drives,
-)
+from armid_ros.identification.assess.sensor_faults import Fault, sensor_faults, units_beyond_drives
 from armid_ros.identification.identify import Identification
 from armid_ros.identification.rows.checks import moving
 from armid_ros.identification.rows.damage import without_damage

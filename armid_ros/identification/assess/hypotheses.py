@@ -18,12 +18,7 @@ from typing import Literal
 from armid_ros.arm import ArmModel
 from armid_ros.identification.assess.grade_limits import LIMITS
 from armid_ros.identification.assess.prediction_error import common_values, thinned
-from armid_ros.identification.rows.checks import (
-    FORCE_UNITS,
-    torque_factors,
-    TORQUE_UNITS,
-    unit_of,
-)
+from armid_ros.identification.rows.checks import FORCE_UNITS, torque_factors, TORQUE_UNITS, unit_of
 from armid_ros.model import gravity_sensitivity, inverse_dynamics
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.robots import GRAVITIES, Robot

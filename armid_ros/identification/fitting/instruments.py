@@ -21,15 +21,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
-from typing import NamedTuple, TYPE_CHECKING
+from typing import NamedTuple
 
 from armid_ros.arm import ArmModel
 from armid_ros.errors import IdentificationError
 from armid_ros.estimate import Estimate
 from armid_ros.identification.fitting.covariance import noise_products, sandwich
 from armid_ros.identification.fitting.identifiability import bounds
-from armid_ros.identification.fitting.least_squares import solve, within
+from armid_ros.identification.fitting.least_squares import Method, solve, within
 from armid_ros.identification.fitting.nonlinear import (
     FittedValues,
     linearised,
@@ -51,9 +50,6 @@ import numpy as np
 from scipy import signal
 import scipy.linalg
 from scipy.stats import chi2
-
-if TYPE_CHECKING:
-    from armid_ros.identification.identify import Identification
 
 
 class _Instrumented(NamedTuple):
@@ -86,7 +82,7 @@ def fit_by_instruments(
     calm = _smoothed(recordings, used)
     # the torque of an arm may be nonlinear in its parameters
     for _ in range(4):
-        exact = _linear_problem(fit.arm, base, calm, used, linear=linear)
+        exact = linear_problem(fit.arm, base, calm, used, linear=linear)
         found = _by_instruments(fit.problem, [part.columns for part in exact], weights, limits)
         step = np.abs(found.values - fit.values) / np.sqrt(np.diag(found.covariance))
         solution = replace(fit.solution, values=found.values, covariance=found.covariance)
@@ -163,7 +159,7 @@ def _smoothed(recordings: Sequence[Recording], used: Conditioning) -> list[Recor
     return calm
 
 
-def _linear_problem(
+def linear_problem(
     arm: ArmModel,
     base: BaseParameters,
     recordings: Sequence[Recording],
@@ -265,8 +261,11 @@ class NoiseCheck:
 
 
 def check_noise(
-    result: Identification,
+    problem_of: Callable[[Sequence[Recording]], Sequence[Regression]],
+    estimate: Estimate,
+    method: Method,
     recordings: Sequence[Recording],
+    used: Conditioning,
     *,
     rng: np.random.Generator,
     repeats: int = 6,
@@ -277,10 +276,16 @@ def check_noise(
 
     Parameters
     ----------
-    result : Identification
-        The identification.
+    problem_of : callable
+        Function that returns the linear problem of recordings; see `linear_problem`.
+    estimate : Estimate
+        Estimate of the identification.
+    method : {'ols', 'wls', 'irls'}
+        Weights of the fit.
     recordings : sequence of Recording
         Recordings of the fit.
+    used : Conditioning
+        Filters.
     rng : numpy.random.Generator
         Generator of the noise of the simulations.
     repeats : int
@@ -289,14 +294,11 @@ def check_noise(
         Called with the finished share, 0 to 1.
 
     """
-    about = partial(
-        _linear_problem, result.arm, result.base, used=result.used, linear=result.passes == 1
-    )
-    problem = about(recordings)
+    problem = problem_of(recordings)
     progress(1.0 / (repeats + 2))
-    weights = solve(problem, result.settings.least_squares).weights
-    calm = _smoothed(recordings, result.used)
-    exact = about(calm)
+    weights = solve(problem, method).weights
+    calm = _smoothed(recordings, used)
+    exact = problem_of(calm)
     progress(2.0 / (repeats + 2))
     found = _by_instruments(problem, [part.columns for part in exact], weights)
     unit = 1.0 / np.sqrt(np.diag(found.covariance))
@@ -311,7 +313,7 @@ def check_noise(
     # The estimate beta_hat is M times the truth, so its bias is beta_hat - M^-1 beta_hat. This
     # is M^-1 V^+ times the difference of its torques along the exact and the noisy motion.
     noise = np.sqrt(np.mean([position_noise(r) ** 2 for r in recordings], axis=0))
-    values, std = result.estimate.values, result.estimate.std
+    values, std = estimate.values, estimate.std
     scale = np.where(std > 0.0, std, 1.0)
 
     def torque(problem: Sequence[Regression]) -> FloatArray:
@@ -321,7 +323,7 @@ def check_noise(
     w, exact_torque = weighted_rows(exact, weights)[0] * scale, torque(exact)
     biases = []
     for k in range(repeats):
-        noisy = about([replace(r, q=r.q + noise * rng.normal(size=r.q.shape)) for r in calm])
+        noisy = problem_of([replace(r, q=r.q + noise * rng.normal(size=r.q.shape)) for r in calm])
         both = np.column_stack([w, exact_torque - torque(noisy)])
         gain = np.linalg.lstsq(weighted_rows(noisy, weights)[0] * scale, both, rcond=None)[0]
         biases.append(np.linalg.solve(gain[:, :-1], gain[:, -1]))
@@ -330,7 +332,7 @@ def check_noise(
         statistic=statistic,
         freedom=freedom,
         p_value=float(chi2.sf(statistic, freedom)),
-        instrumental=Estimate(result.base.parameters, found.values, found.covariance),
+        instrumental=Estimate(estimate.parameters, found.values, found.covariance),
         position_noise=noise,
         bias=scale * np.mean(biases, axis=0),
         bias_std=scale * np.std(biases, axis=0, ddof=1) / np.sqrt(repeats),

@@ -138,11 +138,6 @@ class NormalEquations:
         """Return the number of columns r."""
         return int(self.products.shape[2]) - 1
 
-    @property
-    def target_squares(self) -> FloatArray:
-        """Sum of the squared targets of each joint, shape (n,) [(N m)^2]."""
-        return np.asarray(self.products[:, -1, -1])
-
     def summed(self, scale: npt.ArrayLike = 1.0) -> FloatArray:
         """Return the sum over joints, each divided by a scale (n,), shape (r + 1, r + 1)."""
         weight = np.broadcast_to(np.asarray(scale, dtype=float), self.counts.shape) ** -2.0
@@ -155,6 +150,11 @@ class NormalEquations:
         return np.asarray(
             np.maximum(self.products @ ends @ ends, 1e-12 * self.products[:, -1, -1])
         )
+
+    def relative_error_percent(self, values: FloatArray) -> float:
+        """Return 100 |residual| / |target| over all joints."""
+        whole = self.products[:, -1, -1].sum()
+        return float(100.0 * np.sqrt(self.squares(values).sum() / whole))
 
     def joint_std(self, values: FloatArray) -> FloatArray:
         """Return the standard deviation of the residual of each joint, shape (n,) [N m]."""

@@ -22,11 +22,7 @@ from armid_ros.estimate import ParameterName
 from armid_ros.identification.fitting.identifiability import bounds, excited
 from armid_ros.identification.fitting.least_squares import informative_solution, Method, solve
 from armid_ros.identification.fitting.nonlinear import agree, FittedValues, through, torques
-from armid_ros.identification.physical.physical_program import (
-    Box,
-    box_conditions,
-    PhysicalProgram,
-)
+from armid_ros.identification.physical.physical_program import Box, box_conditions, PhysicalProgram
 from armid_ros.identification.rows.regression import regressions, weighted_rows
 from armid_ros.identification.rows.signals import Conditioning, TORQUE_RESOLUTION
 from armid_ros.model import BaseParameters

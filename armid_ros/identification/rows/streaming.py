@@ -18,10 +18,7 @@ from pathlib import Path
 from armid_ros.arm import ArmModel
 from armid_ros.identification.rows.damage import without_damage
 from armid_ros.identification.rows.regression import Regression, regressions
-from armid_ros.identification.rows.signals import (
-    Conditioning,
-    EDGE_PERIODS,
-)
+from armid_ros.identification.rows.signals import Conditioning, EDGE_PERIODS
 from armid_ros.identification.rows.stamps import check_recordings
 from armid_ros.recording import ReadSettings, Recording
 from armid_ros.recording.reader import read_pieces

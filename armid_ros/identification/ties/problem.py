@@ -185,13 +185,11 @@ def interaction_problem(
     geometry = tie_geometry(robot, motion.q, other, other_motion.q, ties)
     springs = geometry.pulled(slack)
     by_both = tie_columns_derivatives(robot, slow.q, other, far.q, ties, slack)
-    by_angles = np.concatenate(by_both, axis=3)
-    springs_by = np.pad(by_angles, ((0, 0), (0, 0), (0, 0), (0, 2 * by_angles.shape[3])))
+    count, base = slow.n_joints + far.n_joints, None
+    springs_by = np.pad(np.concatenate(by_both, axis=3), ((0, 0),) * 3 + ((0, 2 * count),))
     if not separate:
         springs, springs_by = (x.sum(axis=2, keepdims=True) for x in (springs, springs_by))
     names = tuple(tie.name for tie in ties) if separate else ('all',)
-    count = springs_by.shape[3] // 3
-    base = None
     if inertias == 'known':
         known = inverse_dynamics(robot, motion)
         known_by = _placed(np.stack(inverse_dynamics_derivatives(robot, slow), axis=2), count)
@@ -204,7 +202,7 @@ def interaction_problem(
         columns_by = np.concatenate([springs_by, body_by], axis=2)
         spread = base.grouping * robot.described_spread.ravel()
     tau, alone = motion.tau, np.zeros(springs.shape[2])  # springs have no prior
-    passed, left = _passed(used)
+    motion_lags, torque_lags = _passed(used)
     if used is not None:
         tau, known, columns = (decimate(values, used) for values in (tau, known, columns))
     deviation = np.broadcast_to(np.asarray(noise[0], dtype=float), (count,))
@@ -214,9 +212,9 @@ def interaction_problem(
         columns,
         known_by,
         columns_by,
-        np.asarray(np.kron(passed, np.diag(deviation**2))),
-        left / left[0],
-        np.sqrt(left[0]) * np.broadcast_to(np.asarray(noise[1], float), tau.shape[1:]),
+        np.asarray(np.kron(motion_lags, np.diag(deviation**2))),
+        torque_lags / torque_lags[0],
+        np.sqrt(torque_lags[0]) * np.broadcast_to(np.asarray(noise[1], float), tau.shape[1:]),
         names,
         tuple(tie.joint for tie in ties) if separate else ('',),
         base.parameters if base else (),

@@ -7,10 +7,7 @@ import re
 
 from armid_ros.arm import ArmModel
 from armid_ros.effects import make_effect
-from armid_ros.identification.assess.hypotheses import (
-    in_unit,
-    other_gravity,
-)
+from armid_ros.identification.assess.hypotheses import in_unit, other_gravity
 from armid_ros.identification.assess.mistakes import find_mistake
 from armid_ros.identification.rows.checks import unit_of
 from armid_ros.identification.rows.signals import conditioning, SignalSettings

@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 from dataclasses import replace
 
-from armid_ros.identification import IdentificationSettings, identify, SignalSettings
-from armid_ros.identification.fitting.instruments import check_noise, position_noise
+from armid_ros.identification import IdentificationSettings, identify, SignalSettings, verify
+from armid_ros.identification.fitting.instruments import position_noise
 import numpy as np
 import pytest
 
@@ -20,8 +20,8 @@ def motion(arm):
 def checked(arm, structure, motion, torque_noise, position_noise, seed=0):
     recording = recorded(arm, motion, seed, torque_noise, position_noise)
     result = identify(structure, [recording], SETTINGS, rng=np.random.default_rng(0))
-    check = check_noise(result, [recording], rng=np.random.default_rng(seed), repeats=3)
-    return result, check
+    found = verify(result, structure, [recording], [], rng=np.random.default_rng(seed))
+    return result, found.noise
 
 
 def test_without_encoder_noise_the_test_finds_nothing(arm, structure, motion):
@@ -72,5 +72,5 @@ def test_samples_that_are_missing_are_no_noise_of_encoders(arm, structure, motio
     recording = whole.select(np.delete(np.arange(len(whole)), lost))
     np.testing.assert_allclose(position_noise(recording), position_noise(whole), rtol=0.2)
     result = identify(structure, [recording], SETTINGS, rng=np.random.default_rng(0))
-    check = check_noise(result, [recording], rng=np.random.default_rng(0), repeats=2)
+    check = verify(result, structure, [recording], [], rng=np.random.default_rng(0)).noise
     assert check.harmless, check.findings()

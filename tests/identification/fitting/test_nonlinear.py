@@ -7,11 +7,7 @@ from itertools import pairwise
 
 from armid_ros.arm import ArmModel
 from armid_ros.effects import CATALOGUE, make_effect
-from armid_ros.identification import (
-    IdentificationSettings,
-    identify,
-    Score,
-)
+from armid_ros.identification import IdentificationSettings, identify, Score
 from armid_ros.motion import Temperatures
 import numpy as np
 import pytest

@@ -7,9 +7,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from armid_ros.errors import IdentificationError
-from armid_ros.identification.ties.problem import (
-    interaction_problem,
-)
+from armid_ros.identification.ties.problem import interaction_problem
 from armid_ros.identification.ties.recorded import recorded_interaction_problem
 from armid_ros.identification.ties.stiffness import identify_interaction, Interaction
 from armid_ros.model.spring_ties import TiedMachines

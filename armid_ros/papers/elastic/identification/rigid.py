@@ -110,9 +110,8 @@ def fit_rigid(runs: Sequence[ElasticRun]) -> RigidFit:
     middle = score_products(by_stretch(problem, scores), 2 * _KEPT)
     freedom = len(rows) / max(len(rows) - rows.shape[1], 1)
     bread = np.asarray(np.linalg.inv(rows.T @ rows), dtype=np.float64)
-    left = normal.squares(solution.values).sum() / normal.target_squares.sum()
     estimate = Estimate(names, solution.values, freedom * sandwich(bread, middle))
-    return RigidFit(estimate, 100.0 * float(np.sqrt(left)))
+    return RigidFit(estimate, normal.relative_error_percent(solution.values))
 
 
 def _rows(run: ElasticRun, source: str) -> list[Regression]:
