@@ -168,8 +168,12 @@ class NullCalibration:
         factors[valid] = np.exp(value + shrinkage * (middle - value)).clip(1.0)
         yield
         # 99 % quantile of the statistics, each over its quantile in white noise; zero: no data
-        relative = later[:, valid] / (factors * self._tail_quantile)[valid]
-        tail = float(np.quantile(relative[relative > 0.0], 1.0 - _TAIL_PROBABILITY))
+        relative = (later[:, valid] / (factors * self._tail_quantile)[valid]).ravel()
+        count = np.count_nonzero(relative)
+        place = len(relative) - count + (1.0 - _TAIL_PROBABILITY) * (count - 1)
+        # a partition takes less time than numpy's quantile
+        largest = np.sort(np.partition(relative, int(place))[int(place) :])
+        tail = float(np.interp(place % 1.0, np.arange(len(largest)), largest))
         self.factors, self._tail = factors, max(1.0, tail)
         self._freedom = np.zeros(len(self._sizes))
         self._freedom[valid] = 2.0 / remaining  # a mean square of k degrees varies by 2 / k
