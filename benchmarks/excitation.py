@@ -28,7 +28,6 @@ from armid_ros.excitation import (
     FourierTrajectory,
     random_feasible,
 )
-from armid_ros.excitation.feasibility import position_range
 from armid_ros.robots import collision_model, load_robot
 import numpy as np
 
@@ -101,7 +100,7 @@ def humanoid(seed):
 
 def narrow(arm, problem, clearance, rng):
     """Draw a collision-free trajectory over the middle 20 % of every joint's range."""
-    lower, upper = position_range(problem.limits.lower, problem.limits.upper)
+    lower, upper = problem.limits.position_range()
     while True:
         a, b = rng.normal(size=(2, len(lower), 3)) * np.arange(1, 4)
         raw = FourierTrajectory(problem.limits.joints, 20.0, np.zeros(len(lower)), a, b)

@@ -7,7 +7,7 @@ from pathlib import Path
 import armid_ros as ar
 from armid_ros.papers.elastic.identification.joints import fit_springs
 from armid_ros.simulation import Reference, Sensors
-from armid_ros.simulation.elastic import make_elastic_arm
+from armid_ros.simulation.elastic import make_simulated_arm
 from armid_ros.simulation.run import record
 import numpy as np
 
@@ -18,7 +18,8 @@ compliance = 'joint_elasticity:compliance=0.00025'
 robot = ar.ArmModel.of(URDF, effects=[compliance, 'rotor_inertia:rotor_inertia=0.5'])
 plan = ar.design_excitation(URDF, duration=12.0, starts=1, iterations=10)
 encoders = Sensors(position_noise=1e-5, torque_noise=0.05)
-elastic = make_elastic_arm(robot, rng=np.random.default_rng(1), sensors=encoders)
+rng = np.random.default_rng(1)
+elastic = make_simulated_arm(robot, rng=rng, warn=print, sensors=encoders)
 run = record(elastic, Reference.of(plan.motion(1000.0)), rate=500.0).sides
 
 motors, links = (

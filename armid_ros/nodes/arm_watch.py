@@ -20,6 +20,9 @@ from rclpy.duration import Duration
 from rclpy.qos import qos_profile_sensor_data
 from sensor_msgs.msg import JointState
 
+#: Time for which an arm must be at rest before a run starts [s].
+_REST = 0.25
+
 
 class ArmWatch:
     """
@@ -118,11 +121,10 @@ class ArmWatch:
         if fault:
             return fault
         now, monitor = self.now(), self.monitor
-        rest = 0.25  # for which the arm must be at rest [s]
-        fault = monitor.contradiction(now, 1) or self.staleness(timeout) or monitor.unsteady(rest)
+        fault = monitor.contradiction(now, 1) or self.staleness(timeout) or monitor.unsteady(_REST)
         if fault is None:
             fault = (
-                f'fewer than {MIN_AGREEING} new joint states, or less than {rest:g} s of them, '
+                f'fewer than {MIN_AGREEING} new joint states, or less than {_REST:g} s of them, '
                 'were received: whether the arm is at rest is unknown'
             )
         if fault:
