@@ -158,8 +158,7 @@ def run_lockstep(
             return stamp
 
         stage.spin_until(connected, 'discovery')
-        # the publisher requires an arm at rest for 0.25 s
-        for _ in range(max(math.ceil(0.26 * rate), MIN_AGREEING) + 1):
+        for _ in range(max(math.ceil(0.26 * rate), MIN_AGREEING) + 1):  # 0.25 s at rest
             begun = step()
             stage.spin_until(lambda begun=begun: publisher.last_stamp_ns == begun, 'joint_states')
         publisher.start()

@@ -21,14 +21,15 @@ FOUND = {
     'askew_base': r'tilt|gravity',
     'elastic_joints': r'elbow +(39|40)\d\d N m/rad',
     'exoskeleton': r'^(99|100)\d\d ± \d+ N/m',
-    'from_csv': r'arm: 0\.\d+ % relative error',
+    'from_csv': r'GOOD: Cross-check between the halves of the data: \d',
     'gravity_of_the_moon': r'gravity',
     'hidden_effect_in_mujoco': r'elbow.*spring',
     'inspect_recording': r'velocities of waist.*degrees/s',
     'own_effect': r'stiffness 1\.[45]\d+',
-    'own_urdf': r'GOOD: arm: 0\.\d+ % relative error',
+    'own_urdf': r'GOOD: Torque error on simulation 2, held out: \d',
     'payload_between_days': r'added: 0\.40 kg',
     'physical_urdf': r'together +5\.000 kg',
+    'positions_alone': r'friday_positions\.npz: \d+ samples',
 }
 LONGEST = 60
 
