@@ -20,18 +20,18 @@ from armid_ros.diagnosis.data.evidence import Evidence, noise_floor
 from armid_ros.diagnosis.data.trajectory import trajectories, Trajectory
 from armid_ros.diagnosis.doubt import doubt_of, doubted
 from armid_ros.diagnosis.prepare import choose_filters, mended, prepare, with_friction
-from armid_ros.diagnosis.search.choice import Explainer
+from armid_ros.diagnosis.search.explainer import Explainer
 from armid_ros.diagnosis.search.explanation import Explanation, NOISE
 from armid_ros.diagnosis.search.spans import acting_spans, Span
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.diagnosis.ties.ties import diagnose_ties
 from armid_ros.diagnosis.verdict.attribution import headline
+from armid_ros.diagnosis.verdict.bodies import as_placed_bodies
 from armid_ros.diagnosis.verdict.data_remarks import data_remarks
 from armid_ros.diagnosis.verdict.finding import Diagnosis, Finding
 from armid_ros.diagnosis.verdict.gap import measure_gap, not_repeating
 from armid_ros.diagnosis.verdict.naming import findings, small_print
 from armid_ros.diagnosis.verdict.remaining_misfit import places_held, RemainingMisfit
-from armid_ros.diagnosis.verdict.same_body import as_placed_bodies
 from armid_ros.diagnosis.verdict.where import where_it_is, where_left
 from armid_ros.diagnosis.verdict.words import decide, Verdict
 from armid_ros.errors import IdentificationError

@@ -36,7 +36,7 @@ import numpy as np
 import numpy.typing as npt
 
 #: Smallest number of rows of a joint for a map.
-_FEW = 100
+_MIN_ROWS = 100
 
 
 @dataclass(frozen=True)
@@ -324,7 +324,7 @@ def _learned(
     torque is below a material torque [N m] and it predicts no held-out recording.
 
     """
-    if len(rows) < _FEW:
+    if len(rows) < _MIN_ROWS:
         return None
     learned, predicted = learn_map(rows, rng)
     # a map must reduce the error of held-out blocks, even without the best block
@@ -334,7 +334,7 @@ def _learned(
         return None
     parts = [(rows.residual, predicted)]
     near = None if unseen is None else unseen.select(near_data(learned, unseen))
-    if near is not None and len(near) >= _FEW:
+    if near is not None and len(near) >= _MIN_ROWS:
         parts.append((near.residual, learned.torque(near.inputs)))
     residual, torque = (np.concatenate(one) for one in zip(*parts, strict=True))
     gain = share_of(residual, torque)

@@ -8,7 +8,7 @@ from armid_ros.arm import ArmModel
 from armid_ros.diagnosis import diagnose
 from armid_ros.diagnosis.search.explanation import Explanation
 from armid_ros.diagnosis.search.trial import Trial
-from armid_ros.diagnosis.verdict.same_body import is_same_body, on_outer_link
+from armid_ros.diagnosis.verdict.bodies import is_same_body, on_outer_link
 from armid_ros.effects.load import PayloadChange
 from armid_ros.identification import identify
 from armid_ros.model import inverse_dynamics

@@ -29,10 +29,10 @@ def excess(bench, ratio, more=''):
     return Excess(np.ones(bench.robot.n_joints) * ratio, 'in the recordings', more)
 
 
-def verdict(bench, *findings, left=0.5, as_it_is=None, minor=()):
+def verdict(bench, *findings, left=0.5, given_body=None, minor=()):
     """Decide between a closed gap, by default, and an open one."""
-    as_it_is = None if as_it_is is None else excess(bench, as_it_is)
-    return decide(findings, (), [excess(bench, left)], bench.arm, FLOOR, as_it_is, minor)
+    given_body = None if given_body is None else excess(bench, given_body)
+    return decide(findings, (), [excess(bench, left)], bench.arm, FLOOR, given_body, minor)
 
 
 def finding(bench, share=0.3, name='encoder_offset', values=(0.1,), joints=('elbow',), **more):
@@ -43,18 +43,20 @@ def finding(bench, share=0.3, name='encoder_offset', values=(0.1,), joints=('elb
     return Finding(name, joints, *numbers, sign=effect.traits.sign, **more)
 
 
-@pytest.mark.parametrize(('as_it_is', 'fitted'), [(None, False), (0.8, False), ([0.8, 4.0], True)])
-def test_a_body_that_has_to_be_fitted_is_stated(bench, as_it_is, fitted):
+@pytest.mark.parametrize(
+    ('given_body', 'fitted'), [(None, False), (0.8, False), ([0.8, 4.0], True)]
+)
+def test_a_body_that_has_to_be_fitted_is_stated(bench, given_body, fitted):
     for named, word in (((), 'consistent'), ((finding(bench),), 'named')):
-        found = verdict(bench, *named, as_it_is=as_it_is)
+        found = verdict(bench, *named, given_body=given_body)
         assert found.word == word and FLOOR in found.summary
         assert ('fitted' in found.summary) == fitted
 
 
-@pytest.mark.parametrize('as_it_is', [None, 4.0])
+@pytest.mark.parametrize('given_body', [None, 4.0])
 @pytest.mark.parametrize(('share', 'mentioned'), [(0.45, True), (0.001, False)])
-def test_small_print_of_no_size_is_not_read_out(bench, as_it_is, share, mentioned):
-    text = verdict(bench, as_it_is=as_it_is, minor=[finding(bench, share)]).summary
+def test_small_print_of_no_size_is_not_read_out(bench, given_body, share, mentioned):
+    text = verdict(bench, given_body=given_body, minor=[finding(bench, share)]).summary
     assert ('encoder offset' in text) == ('45 %' in text) == mentioned
 
 
@@ -153,10 +155,10 @@ def test_what_does_not_repeat_has_to_matter(bench):
     closed = excess(bench, 0.5)
 
     def word(least):
-        strange = [
+        not_repeating = [
             bench.robot.joints[k] for k in not_repeating([floor] * 3, Thresholds(), least * one)
         ]
-        return decide((), strange, [closed], bench.arm, FLOOR)
+        return decide((), not_repeating, [closed], bench.arm, FLOOR)
 
     assert word(0.1).word == 'not_repeatable'
     assert 'elbow' in word(0.1).summary and 'shoulder' not in word(0.1).summary

@@ -166,19 +166,19 @@ def explain(
     means = result.nuisance.means(result.under)
     for one, span in zip(result.accepted, result.nuisance.spans, strict=True):
         trial = replace(
-            one.look.worth(one.best, material),
-            rivals=tuple(one.look.worth(other, material) for other in one.tied),
+            one.look.trial(one.best, material),
+            rivals=tuple(one.look.trial(other, material) for other in one.tied),
         )
         cause = one.best.cause
-        made = np.max(np.abs(means[span]) * cause.torque, axis=1)
-        if not np.any(made >= material * result.nuisance.rows.torque):
+        torque = np.max(np.abs(means[span]) * cause.torque, axis=1)
+        if not np.any(torque >= material * result.nuisance.rows.torque):
             small.append(trial)
             continue
         named.append(cause.at(means[span], robot))
         steps.append(trial)
-    there = [trial for trial in _open(result, unknown, settings) if trial.odds > alarm]
-    large = {t.effect.name for t in there if np.any(np.abs(t.values) >= t.least)}
-    for trial in there:  # fit it in all joints, or its torque biases other values
+    unset = [trial for trial in _unset(result, unknown, settings) if trial.odds > alarm]
+    large = {t.effect.name for t in unset if np.any(np.abs(t.values) >= t.least)}
+    for trial in unset:  # fit it in all joints, or its torque biases other values
         if trial.effect.name in large:
             named.append(NamedEffect(trial.effect, trial.kept, trial.values))
             steps.append(trial)
@@ -197,7 +197,7 @@ def explain(
     )
 
 
-def _open(
+def _unset(
     result: Result, unknown: Sequence[Effect], settings: DiagnosisSettings
 ) -> Iterator[Trial]:
     """
@@ -213,7 +213,7 @@ def _open(
     means, spread = turn @ values[:rank], turn @ covariance[:rank, :rank] @ turn.T
     today, joints = np.flatnonzero(nuisance.rows.today).tolist(), nuisance.arm.robot.joints
     back = np.linalg.inv(turn)
-    left = float(sum(np.sum(nuisance.rest(values, k) ** 2) for k in today))
+    residual = float(sum(np.sum(nuisance.rest(values, k) ** 2) for k in today))
     names = [(one.name, one.joint) for one in nuisance.base.parameters]
     for effect in unknown:
         parameter = effect.parameters(nuisance.arm.robot)[0]
@@ -227,20 +227,20 @@ def _open(
         sigma = float(nuisance.rows.sigma[-1][joint])
         rms = sigma * np.sqrt(square / count)
         variance = float(spread[k, k])
-        held = max(float(nuisance.described[k, k]), 1e-12)
-        odds = 0.5 * (means[k] ** 2 / variance + np.log(held * variance))
-        seen = float(np.clip(1.0 - variance * held, 0.0, 1.0))
+        precision = max(float(nuisance.described[k, k]), 1e-12)  # of the prior
+        odds = 0.5 * (means[k] ** 2 / variance + np.log(precision * variance))
+        resolution = float(np.clip(1.0 - variance * precision, 0.0, 1.0))
         yield Trial(
             effect,
             (0,),
             means[k : k + 1],
             np.sqrt([variance]),
-            np.array([seen]),
+            np.array([resolution]),
             np.array([settings.material * nuisance.rows.torque[joint] / max(rms, 1e-300)]),
-            np.sqrt(seen),
+            np.sqrt(resolution),
             2.0 * odds,
             odds,
-            min(means[k] ** 2 * square / max(left, 1e-300), 1.0),
+            min(means[k] ** 2 * square / max(residual, 1e-300), 1.0),
             len(today),
         )
 
@@ -258,9 +258,9 @@ def survey(
     look = replace(look, under=under)
     ranking = sorted(look.ranking, key=lambda one: one.cause.key not in named)
     every = [
-        *(look.worth(replace(one, under=under), material) for one in ranking),
+        *(look.trial(replace(one, under=under), material) for one in ranking),
         *(look.trial(one, material) for one in look.others),
-        *_open(result, unknown, settings),
+        *_unset(result, unknown, settings),
     ]
     seen = tuple(one for one in every if one.visible >= settings.thresholds.least_visible)
     keys = {one.key[:2] for one in seen}

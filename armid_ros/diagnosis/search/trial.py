@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import TypeAlias
 
@@ -168,40 +168,38 @@ class Look:
     under: Marginal
     usual: float
 
-    def worth(self, one: Ranked, material: float) -> Trial:
-        """Convert a ranked cause to a trial, with its odds and probability."""
-        own = self.trial(one.cause, material, one.under)
-        return replace(own, gain=2.0 * one.data, odds=one.odds, probability=one.probability)
-
-    def trial(self, cause: Cause, material: float, under: Marginal | None = None) -> Trial:
+    def trial(self, one: Ranked | Cause, material: float) -> Trial:
         """
-        Convert a cause to a trial, with its values, visibility and evidence.
+        Evaluate a cause: its values, visibility and evidence.
 
         Parameters
         ----------
-        cause : Cause
-            The cause.
+        one : Ranked or Cause
+            The cause; one that was ranked keeps its odds and its probability.
         material : float
             Share of the torque of a joint that matters.
-        under : Marginal, optional
-            Fit of the nuisance parameters; that of the likeliest setting by default.
 
         """
-        nuisance = self.nuisance
-        known = CauseInformation.of(cause, nuisance, under or self.under)
-        spread = np.array([self.usual if nuisance.rows.before else 0.0])
-        fit = odds(cause, nuisance, known, self.usual, spread)
-        each = len(known.today)
-        blocks = known.matrix.reshape(each, known.size, each, known.size)
+        nuisance, usual = self.nuisance, self.usual
+        cause, under = (one.cause, one.under) if isinstance(one, Ranked) else (one, self.under)
+        known = CauseInformation.of(cause, nuisance, under)
+        fit = odds(cause, nuisance, known, usual, np.array([usual * (nuisance.rows.before > 0)]))
+        groups = len(known.today)
+        blocks = known.matrix.reshape(groups, known.size, groups, known.size)
         x = fit.values / cause.unit
         gains = [
-            2.0 * x @ known.vector.reshape(each, -1)[g] - x @ blocks[g, :, g] @ x
+            2.0 * x @ known.vector.reshape(groups, -1)[g] - x @ blocks[g, :, g] @ x
             for g in np.flatnonzero(known.today)
         ]
-        places = max(len(cause.effect.places(nuisance.arm.robot)), 1)
         today = np.flatnonzero(nuisance.rows.today).tolist()
-        made = float(sum(fit.values @ cause.own[k] @ fit.values for k in today))
+        explained = float(sum(fit.values @ cause.own[k] @ fit.values for k in today))
         torque = cause.torque * known.visible / nuisance.rows.torque[:, np.newaxis]
+        if isinstance(one, Ranked):
+            factor, log_odds, probability = one.data, one.odds, one.probability
+        else:
+            places = max(len(cause.effect.places(nuisance.arm.robot)), 1)
+            factor, probability = fit.factor, 0.0
+            log_odds = factor - float(np.log(cause.shapes * places))
         return Trial(
             cause.effect,
             cause.kept,
@@ -210,14 +208,15 @@ class Look:
             fit.resolution,
             np.asarray(material / np.maximum(torque.max(axis=0), 1e-300)),
             float(known.visible),
-            2.0 * fit.factor,
-            fit.factor - float(np.log(cause.shapes * places)),
-            min(made / self._left, 1.0),
+            2.0 * factor,
+            log_odds,
+            min(explained / self.residual_squares, 1.0),
             int(np.sum(np.array(gains) > 0.0)),
+            probability,
         )
 
     @cached_property
-    def _left(self) -> float:
+    def residual_squares(self) -> float:
         """Sum of squares of the weighted residual of the diagnosed day."""
         values = self.nuisance.means(self.under)
         today = np.flatnonzero(self.nuisance.rows.today).tolist()

@@ -19,8 +19,8 @@ from armid_ros.arm.memoized_arm import memoized_arm
 from armid_ros.diagnosis.data.days import Rows
 from armid_ros.diagnosis.data.evidence import Evidence, noise_floor
 from armid_ros.diagnosis.search.cause import NamedEffect
-from armid_ros.diagnosis.search.choice import Explainer
 from armid_ros.diagnosis.search.comparison import settings_alone
+from armid_ros.diagnosis.search.explainer import Explainer
 from armid_ros.diagnosis.search.explanation import at_floor, explain, Explanation, survey
 from armid_ros.diagnosis.search.patch import places
 from armid_ros.diagnosis.search.posterior import Fitted, JointFit
@@ -251,7 +251,7 @@ def _as_one_cause(
     assert cause is not None
     one = comparison.ranked(cause, nuisance)
     look, material = result.first, settings.material
-    rivals = [look.worth(other, material) for other in look.ranking if other.data >= one.data]
+    rivals = [look.trial(other, material) for other in look.ranking if other.data >= one.data]
     candidates, invisible = survey(result, settings)
-    trial = replace(look.worth(one, material), probability=1.0 / (1.0 + len(rivals)))
+    trial = replace(look.trial(one, material), probability=1.0 / (1.0 + len(rivals)))
     return (replace(trial, rivals=tuple(rivals)), *candidates), invisible

@@ -30,10 +30,11 @@ def measure_gap(explanation: Explanation, unseen: Evidence | None) -> Gap:
     evidence = explanation.evidence if unseen is None else unseen
     residuals = [evidence.residuals(arm) for arm in (before, after)]
     overlays = []
-    for part, sigma, *rows in zip(evidence.data, evidence.sigma, *residuals, strict=True):
-        measured = part.torque
-        unpatched, patched = (measured - residual for residual in rows)
-        overlays.append(Overlay(part.source, part, measured, unpatched, patched, sigma))
+    for part, sigma, given, patched in zip(evidence.data, evidence.sigma, *residuals, strict=True):
+        torque = part.torque
+        overlays.append(
+            Overlay(part.source, part, torque, torque - given, torque - patched, sigma)
+        )
     power = [evidence.power(rows) for rows in residuals]
     floor = evidence.power([np.broadcast_to(o.sigma, o.measured.shape) for o in overlays])
     excess = [np.maximum(own - floor, 0.0) / np.maximum(floor, 1e-24) for own in power]

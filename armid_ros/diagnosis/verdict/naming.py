@@ -13,8 +13,8 @@ from armid_ros.diagnosis.search.explanation import Explanation
 from armid_ros.diagnosis.search.patch import places, room
 from armid_ros.diagnosis.search.trial import Trial
 from armid_ros.diagnosis.verdict.attribution import Attribution
+from armid_ros.diagnosis.verdict.bodies import is_same_body
 from armid_ros.diagnosis.verdict.finding import Finding, Rival
-from armid_ros.diagnosis.verdict.same_body import is_same_body
 from armid_ros.effects import Effect
 from armid_ros.effects.tied import Tied
 from armid_ros.estimate import ParameterName

@@ -44,11 +44,11 @@ class Verdict:
 
 def decide(
     findings: Sequence[Finding],
-    strange: Sequence[str],
-    left: Sequence[Excess],
+    not_repeating: Sequence[str],
+    excesses: Sequence[Excess],
     arm: ArmModel,
-    floor_in_words: str,
-    as_it_is: Excess | None = None,
+    floor: str,
+    given_body: Excess | None = None,
     minor: Sequence[Finding] = (),
     gap: Gap | None = None,
 ) -> Verdict:
@@ -59,31 +59,36 @@ def decide(
     ----------
     findings : sequence of Finding
         Findings of the headline.
-    strange : sequence of str
+    not_repeating : sequence of str
         Joints whose equal periods differ; see `not_repeating`.
-    left : sequence of Excess
+    excesses : sequence of Excess
         Losses of the model with the named effects over their limits, for each set of data.
     arm : ArmModel
         Arm with the names of the joints.
-    floor_in_words : str
-        The floor of the gap: noise, or a misfit.
-    as_it_is : Excess or None
-        Losses with the rigid body as given, if ``left`` is with a refitted one.
+    floor : str
+        The floor of the gap in words: noise, or a misfit.
+    given_body : Excess or None
+        Losses with the rigid body as given, if ``excesses`` are with a refitted one.
     minor : sequence of Finding
         Minor findings, the most important first.
     gap : Gap, optional
         Errors of the model with the findings, and their floor.
 
     """
-    worst = max(left, key=lambda one: float(one.ratio.max()))
+    worst = max(excesses, key=lambda one: float(one.ratio.max()))
     open_gap = bool(worst.ratio.max() > 1.0)
-    joint = arm.robot.joints[int(np.argmax(worst.ratio))]
-    if strange and (not findings or open_gap):
-        return Verdict('not_repeatable', _strange(strange, findings))
-    error = f'the error of {joint} {worst.where}'
-    size = larger(np.sqrt(worst.ratio.max())) + f' expected from {floor_in_words}{worst.more}'
-    no_larger = f'is no larger than {floor_in_words}'
-    refit = _refit(as_it_is, arm.robot, floor_in_words)
+    if not_repeating and (not findings or open_gap):
+        names = ', '.join(name_in_words(finding.name) for finding in findings)
+        text = (
+            f'Equal periods differ in {", ".join(not_repeating)} by more than noise, independent '
+            'of time and velocity. Something acts that does not repeat, such as contact or a '
+            f'person. {f"{names} is provisional" if names else "No effect of the arm is named"}.'
+        )
+        return Verdict('not_repeatable', text)
+    error = f'the error of {arm.robot.joints[int(np.argmax(worst.ratio))]} {worst.where}'
+    size = larger(np.sqrt(worst.ratio.max())) + f' expected from {floor}{worst.more}'
+    no_larger = f'is no larger than {floor}'
+    refit = _refit(given_body, arm.robot, floor)
     shown = bool(minor) and minor[0].share >= 0.01  # of the gap
     small = sentence(minor[0], 'the gap' if open_gap else 'the remaining error') if shown else ''
     if not findings:
@@ -99,35 +104,31 @@ def decide(
         text = f'The model explains the recordings: the remaining error{number} {no_larger}'
         text += f', or too small to matter. {small}' if small else '.'
         return Verdict('consistent', f'{refit}{text}')
-    said, tied = _sentences(findings), _rivals_in_words(findings)
-    if open_gap:
-        if sum(group[0].share for group in by_cause(findings)) < 0.5:
-            said = said.replace(' explains ', ' explains only ')
-        first = f'{said} {tied}'.rstrip()
-        return Verdict('partial', f'{first} {refit}There is more: {error} is {size}.')
-    if tied:
-        return Verdict('ambiguous', f'{tied} {said} {refit}'.rstrip())
-    return Verdict('named', f'{said} {refit}The remaining error {no_larger}.')
-
-
-def _rivals_in_words(findings: Sequence[Finding]) -> str:
-    """Return a sentence for each name with rivals; empty without rivals."""
-    return ' '.join(
+    causes = _sentences(findings)
+    rivals = ' '.join(
         f'Either {_alternatives(one)}: these data cannot separate them.'
         for one in findings
         if one.other_causes
     )
+    if open_gap:
+        if sum(group[0].share for group in by_cause(findings)) < 0.5:
+            causes = causes.replace(' explains ', ' explains only ')
+        first = f'{causes} {rivals}'.rstrip()
+        return Verdict('partial', f'{first} {refit}There is more: {error} is {size}.')
+    if rivals:
+        return Verdict('ambiguous', f'{rivals} {causes} {refit}'.rstrip())
+    return Verdict('named', f'{causes} {refit}The remaining error {no_larger}.')
 
 
-def _refit(as_it_is: Excess | None, robot: Robot, floor_in_words: str) -> str:
+def _refit(given_body: Excess | None, robot: Robot, floor: str) -> str:
     """Return a sentence on the refit, with the error of body and friction as given."""
-    if as_it_is is None or as_it_is.ratio.max() <= 1.0:
+    if given_body is None or given_body.ratio.max() <= 1.0:
         return ''
-    worst = int(np.argmax(as_it_is.ratio))
-    times = larger(np.sqrt(as_it_is.ratio.max()))
+    worst = int(np.argmax(given_body.ratio))
+    times = larger(np.sqrt(given_body.ratio.max()))
     return (
         f'Rigid body and friction were refitted: as given, the error of {robot.joints[worst]} is '
-        f'{times} expected from {floor_in_words}. armid check ROBOT BAG compares the links, '
+        f'{times} expected from {floor}. armid check ROBOT BAG compares the links, '
         f'{robot.links[worst]} first. '
     )
 
@@ -210,7 +211,7 @@ def _subject(finding: Finding) -> str:
         if not abs(mass) > HALF_WIDTH * std:
             return f'{subject} on {places[0]} (these data do not determine its mass)'
         gone = ' that was put down' if mass < 0.0 else ''
-        return f'{subject} of {as_sure(abs(mass), std)} kg on {places[0]}{gone}'
+        return f'{subject} of {with_half_width(abs(mass), std)} kg on {places[0]}{gone}'
     if len(places) > _MAX_JOINTS:
         return f'{subject} in {len(places)} joints'
     where = f' in {", ".join(places)}' if places else ''
@@ -236,7 +237,11 @@ def _values(finding: Finding) -> Iterator[str]:
     for p, value, std, had in not_zero or every:
         name = '' if p.name == before else f'{p.words} '
         added = f', added to {had:.4g}' if had and not abs(had) < HALF_WIDTH * std else ''
-        yield f'{name}{_with_degrees(value, std, p.unit)}{added}'
+        text = f'{with_half_width(value, std)} {p.unit}'.strip()
+        if p.unit == 'rad':
+            degrees, *_ = with_half_width(np.rad2deg(value), np.rad2deg(std)).split(' ')
+            text += f', {degrees} degrees'
+        yield f'{name}{text}{added}'
         before = p.name
 
 
@@ -247,24 +252,6 @@ def vague(finding: Finding, parameter: ParameterName, value: float, std: float) 
         if shape.name == parameter.name:
             return not shape.determined(value, HALF_WIDTH * std)
     return not np.isfinite(std)
-
-
-def _with_degrees(value: float, std: float, unit: str) -> str:
-    """Format a value with its interval; angles also in degrees."""
-    text = f'{as_sure(value, std)} {unit}'.strip()
-    degrees, *_ = as_sure(np.rad2deg(value), np.rad2deg(std)).split(' ')
-    return f'{text}, {degrees} degrees' if unit == 'rad' else text
-
-
-def _strange(joints: Sequence[str], findings: Sequence[Finding]) -> str:
-    text = (
-        f'Equal periods differ in {", ".join(joints)} by more than noise, independent of '
-        'time and velocity. Something acts that does not repeat, such as contact or a person. '
-    )
-    if findings:
-        names = ', '.join(name_in_words(finding.name) for finding in findings)
-        return text + f'{names} is provisional.'
-    return text + 'No effect of the arm is named.'
 
 
 def _alternatives(finding: Finding) -> str:
@@ -280,7 +267,7 @@ def _alternatives(finding: Finding) -> str:
     return words.replace('(', '(probability ', 1)
 
 
-def as_sure(value: float, std: float) -> str:
+def with_half_width(value: float, std: float) -> str:
     """Format a value with the half-width of its 95 % interval, to two digits of the half-width."""
     wide = HALF_WIDTH * std
     if not 0.0 < wide < np.inf:
