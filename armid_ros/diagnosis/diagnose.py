@@ -24,7 +24,7 @@ from armid_ros.diagnosis.search.explainer import Explainer
 from armid_ros.diagnosis.search.explanation import Explanation, NOISE
 from armid_ros.diagnosis.search.spans import acting_spans, Span
 from armid_ros.diagnosis.settings import DiagnosisSettings
-from armid_ros.diagnosis.ties.ties import diagnose_ties
+from armid_ros.diagnosis.ties import diagnose_ties
 from armid_ros.diagnosis.verdict.attribution import headline
 from armid_ros.diagnosis.verdict.bodies import as_placed_bodies
 from armid_ros.diagnosis.verdict.data_remarks import data_remarks

@@ -4,7 +4,7 @@
 
 from armid_ros.diagnosis.data.evidence import Evidence, noise_floor
 from armid_ros.diagnosis.search.cause import NamedEffect
-from armid_ros.diagnosis.search.patch import Patch, patch_columns
+from armid_ros.diagnosis.search.patch import patch_columns
 from armid_ros.diagnosis.search.posterior import JointFit
 from armid_ros.effects import CATALOGUE
 import numpy as np
@@ -40,8 +40,8 @@ def test_columns_of_a_shape_are_the_derivative_of_the_torque(bench, name, shape,
     (part,) = cut(bench.recordings()[:1])
     effect = CATALOGUE[name].on(bench.robot, ('elbow',)).with_shape(shape)
     kept = tuple(range(len(values)))
-    state = Patch(bench.arm, (NamedEffect(effect, kept, np.array(values)),))
-    columns = patch_columns(state, part)[0][:, :, len(values) :]
+    named = NamedEffect(effect, kept, np.array(values))
+    columns = patch_columns(bench.arm, [named], part)[0][:, :, len(values) :]
     for index in range(len(shape)):
         step = 1e-3 * max(abs(shape[index]), 0.01) * np.eye(len(shape))[index]
         ahead, behind = (

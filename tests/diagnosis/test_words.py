@@ -155,10 +155,10 @@ def test_what_does_not_repeat_has_to_matter(bench):
     closed = excess(bench, 0.5)
 
     def word(least):
-        not_repeating = [
+        different = [
             bench.robot.joints[k] for k in not_repeating([floor] * 3, Thresholds(), least * one)
         ]
-        return decide((), not_repeating, [closed], bench.arm, FLOOR)
+        return decide((), different, [closed], bench.arm, FLOOR)
 
     assert word(0.1).word == 'not_repeatable'
     assert 'elbow' in word(0.1).summary and 'shoulder' not in word(0.1).summary

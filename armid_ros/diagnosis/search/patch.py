@@ -1,12 +1,11 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""An arm with named effects: the state of a Gauss-Newton fit of their values and shapes."""
+"""An arm with named effects, and the Jacobian of its torque by their values and shapes."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from functools import cached_property
+from dataclasses import replace
 
 from armid_ros.arm import ArmModel
 from armid_ros.arm.memoized_arm import memoized_arm
@@ -16,63 +15,49 @@ from armid_ros.diagnosis.search.cause import NamedEffect
 from armid_ros.effects import Effect, TorqueReading
 from armid_ros.estimate import ParameterName
 from armid_ros.motion import FloatArray, Motion
+from armid_ros.robots import Robot
 import numpy as np
 
 
-@dataclass(frozen=True)
-class Patch:
-    """
-    An arm and the named effects at the present values.
+def patched_arm(arm: ArmModel, named: Sequence[NamedEffect]) -> ArmModel:
+    """Return an arm with named effects."""
+    for own in named:
+        arm = with_named(arm, own.effect, own.values)
+    return arm
 
-    Attributes
-    ----------
-    arm : ArmModel
-        The arm without the named effects.
-    named : tuple of NamedEffect
-        Effects, with their present shapes and values.
 
-    """
+def moved(
+    arm: ArmModel, named: Sequence[NamedEffect], change: FloatArray
+) -> tuple[NamedEffect, ...]:
+    """Return the named effects after a step of all fitted parameters, within bounds."""
+    found = []
+    for own, (place, shapes) in zip(named, places(named), strict=True):
+        effect = own.effect
+        lower, upper = room(effect, arm)
+        values = own.values.copy()
+        values[list(own.kept)] += change[list(place)]
+        if shapes:
+            low, high, step = _shape_bounds(effect)
+            shape = np.array(effect.shape)
+            # the search has refined the shape, so a step is small
+            limit = np.maximum(0.1 * np.abs(shape), 30.0 * step)
+            shape = shape + np.clip(change[list(shapes)], -limit, limit)
+            effect = effect.with_shape(np.clip(shape, low, high))
+        found.append(NamedEffect(effect, own.kept, np.clip(values, lower, upper)))
+    return tuple(found)
 
-    arm: ArmModel
-    named: tuple[NamedEffect, ...]
 
-    @cached_property
-    def model(self) -> ArmModel:
-        """Return the arm with the named effects."""
-        model = self.arm
-        for own in self.named:
-            model = with_named(model, own.effect, own.values)
-        return model
-
-    def moved(self, change: FloatArray) -> Patch:
-        """Return the patch after a step of all fitted parameters, within bounds."""
-        named = list[NamedEffect]()
-        for own, (place, shapes) in zip(self.named, places(self.named), strict=True):
-            effect, kept = own.effect, list(own.kept)
-            lower, upper = room(effect, self.arm)
-            values = own.values.copy()
-            values[kept] += change[list(place)]
-            if shapes:
-                low, high, step = _shape_bounds(effect)
-                shape = np.array(effect.shape)
-                # the search has refined the shape, so a step is small
-                limit = np.maximum(0.1 * np.abs(shape), 30.0 * step)
-                shape = shape + np.clip(change[list(shapes)], -limit, limit)
-                effect = effect.with_shape(np.clip(shape, low, high))
-            named.append(NamedEffect(effect, own.kept, np.clip(values, lower, upper)))
-        return Patch(self.arm, tuple(named))
-
-    def parameters(self) -> tuple[tuple[ParameterName, ...], FloatArray]:
-        """Return names and values of the fitted parameters of each effect, its shapes last."""
-        names: list[ParameterName] = []
-        numbers: list[float] = []
-        for own in self.named:
-            all_names = own.effect.parameters(self.arm.robot)
-            names += [all_names[k] for k in own.kept]
-            numbers += [float(own.values[k]) for k in own.kept]
-            names += own.effect.shape_parameters(self.arm.robot)
-            numbers += list(own.effect.shape)
-        return tuple(names), np.array(numbers)
+def fitted_parameters(
+    robot: Robot, named: Sequence[NamedEffect]
+) -> tuple[tuple[ParameterName, ...], FloatArray]:
+    """Return names and values of the fitted parameters of each effect, its shapes last."""
+    names: list[ParameterName] = []
+    numbers: list[float] = []
+    for own in named:
+        every = own.effect.parameters(robot)
+        names += [*(every[k] for k in own.kept), *own.effect.shape_parameters(robot)]
+        numbers += [*own.values[list(own.kept)].tolist(), *own.effect.shape]
+    return tuple(names), np.array(numbers)
 
 
 def places(named: Sequence[NamedEffect]) -> list[tuple[range, range]]:
@@ -108,14 +93,15 @@ def _shape_bounds(effect: Effect) -> tuple[FloatArray, FloatArray, FloatArray]:
     return low, high, 1e-3 * np.maximum(np.abs(np.array(effect.shape)), 0.1 * size)
 
 
-def patch_columns(state: Patch, part: Trajectory) -> list[FloatArray]:
+def patch_columns(
+    arm: ArmModel, named: Sequence[NamedEffect], part: Trajectory
+) -> list[FloatArray]:
     """Return the Jacobian of values and shapes of each named effect in rows, (M, n, p) each."""
-    model, blocks = memoized_arm(state.model), []
-    motion = part.motion
-    for named in state.named:
-        columns = [model.columns_of(named.effect, motion)[:, :, list(named.kept)]]
-        if named.effect.shape:
-            columns.append(_shape_columns(model, named.effect, motion))
+    model, blocks = memoized_arm(patched_arm(arm, named)), []
+    for own in named:
+        columns = [model.columns_of(own.effect, part.motion)[:, :, list(own.kept)]]
+        if own.effect.shape:
+            columns.append(_shape_columns(model, own.effect, part.motion))
         blocks.append(part.reduce(np.concatenate(columns, axis=2)))
     return blocks
 

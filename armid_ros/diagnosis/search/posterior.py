@@ -22,7 +22,13 @@ from armid_ros.diagnosis.data.evidence import Evidence
 from armid_ros.diagnosis.search.candidates import cause_of, value_unit
 from armid_ros.diagnosis.search.cause import Cause, NamedEffect
 from armid_ros.diagnosis.search.nuisance import Nuisance
-from armid_ros.diagnosis.search.patch import Patch, patch_columns, places
+from armid_ros.diagnosis.search.patch import (
+    fitted_parameters,
+    moved,
+    patch_columns,
+    patched_arm,
+    places,
+)
 from armid_ros.diagnosis.search.setting import LASTING, Setting
 from armid_ros.effects.gravity import GravityVector
 from armid_ros.estimate import Estimate
@@ -133,25 +139,24 @@ class JointFit:
             The effects at their initial values.
 
         """
-        state = Patch(self.arm, tuple(named))
-        linear = self.linear(named)
+        linear, named = self.linear(named), tuple(named)
         under = linear.marginal(self.setting, self.recordings)
-        loss = self._loss(state)
+        loss = self._loss(named)
         # the comparison has refined the shapes, so four Gauss-Newton steps suffice
         for _ in range(4 if named else 0):
             means = linear.means(under)
             step = means[linear.spans[0].start : linear.spans[len(named) - 1].stop]
-            for own, (kept, _) in zip(state.named, places(named), strict=True):
+            for own, (kept, _) in zip(named, places(named), strict=True):
                 step[kept.start : kept.stop] -= own.values[list(own.kept)]
             before = loss
             for share in (1.0, 0.5, 0.2):  # line search
-                moved = state.moved(share * step)
-                loss = self._loss(moved)
+                tried = moved(self.arm, named, share * step)
+                loss = self._loss(tried)
                 if loss < before:
                     break
             else:
                 break
-            state, linear = moved, self.linear(moved.named)
+            named, linear = tried, self.linear(tried)
             under = linear.marginal(self.setting, self.recordings)
             if before - loss < 1e-4 * max(abs(loss), 1e-12):
                 break
@@ -164,23 +169,21 @@ class JointFit:
         undetermined = np.diag(posterior)[size:] > 0.5 * units**2
         covariance[undetermined], covariance[:, undetermined] = 0.0, 0.0
         covariance[undetermined, undetermined] = np.inf
-        estimate = Estimate(*state.parameters(), covariance)
-        return Fitted(self._arm(state, means), state.named, estimate, means[:size])
+        estimate = Estimate(*fitted_parameters(self.arm.robot, named), covariance)
+        return Fitted(self._arm(named, means), named, estimate, means[:size])
 
-    def _arm(self, state: Patch, means: FloatArray) -> ArmModel:
+    def _arm(self, named: Sequence[NamedEffect], means: FloatArray) -> ArmModel:
         """Return the arm with the named causes, and with fitted body and friction if stated."""
         change = self.nuisance.turn @ means[: self.nuisance.rank]
-        if not (self.stated and np.any(change)):
-            return state.model
-        base, theta = self.nuisance.base, self.arm.theta
-        moved = self.arm.with_theta(base.lift(base.values(theta) + change, theta))
-        return Patch(moved, state.named).model
+        arm, base, theta = self.arm, self.nuisance.base, self.arm.theta
+        if self.stated and np.any(change):
+            arm = arm.with_theta(base.lift(base.values(theta) + change, theta))
+        return patched_arm(arm, named)
 
     def with_names_at(self, named: Sequence[NamedEffect]) -> ArmModel:
         """Return the arm with named causes at given values, all other parameters fitted."""
-        state = Patch(self.arm, tuple(named))
-        nuisance = self.with_model(state.model)
-        return self._arm(state, nuisance.means(nuisance.marginal(self.setting, self.recordings)))
+        nuisance = self.with_model(patched_arm(self.arm, named))
+        return self._arm(named, nuisance.means(nuisance.marginal(self.setting, self.recordings)))
 
     def as_described(self) -> JointFit:
         """Return the fit with the body fixed to the description."""
@@ -230,9 +233,10 @@ class JointFit:
             )
         ]
 
-    def _loss(self, state: Patch) -> float:
+    def _loss(self, named: Sequence[NamedEffect]) -> float:
         """Return the negative log likelihood, the nuisance parameters integrated out."""
-        return self.with_model(state.model).marginal(self.setting, self.recordings).loss
+        nuisance = self.with_model(patched_arm(self.arm, named))
+        return nuisance.marginal(self.setting, self.recordings).loss
 
     def _change_by_first_day(self, linear: Nuisance, means: FloatArray) -> FloatArray:
         """
@@ -258,10 +262,10 @@ class JointFit:
         """Return the columns of nuisance parameters and named causes, linearised at values."""
         if not named:
             return self.nuisance
-        state = Patch(self.arm, tuple(named))
+        model = patched_arm(self.arm, named)
         rows, result = self.nuisance.rows, self.nuisance
         fitted = [k for k, part in enumerate(rows.data) if part.fold in self.recordings]
-        blocks = {k: patch_columns(state, rows.data[k]) for k in fitted}
+        blocks = {k: patch_columns(self.arm, named, rows.data[k]) for k in fitted}
         made = list[Cause]()
         torque = [np.zeros((*part.unsure.shape, 1)) for part in rows.data]
         for n, own in enumerate(named):
@@ -284,7 +288,7 @@ class JointFit:
         for cause in made:
             known = None
             if self.gravity is not None and isinstance(cause.effect, GravityVector):
-                now = state.model.body.gravity
+                now = model.body.gravity
                 along = now / np.linalg.norm(now)
                 more = self.gravity - float(along @ self.arm.body.gravity)
                 known = along, more, SAME_GRAVITY * self.gravity
@@ -294,7 +298,7 @@ class JointFit:
             [
                 rest + x[:, :, 0] if today else rest
                 for rest, x, today in zip(
-                    self._weighted_residual(state.model), present, rows.today, strict=True
+                    self._weighted_residual(model), present, rows.today, strict=True
                 )
             ]
         )
