@@ -44,7 +44,7 @@ def covariance(nuisance, setting, more=()):
     flat = [x.reshape(-1, x.shape[2]) for x in nuisance.columns]
     rank, functions = nuisance.rank, nuisance.discrepancy.shape[1]
     body = np.linalg.inv(
-        nuisance.turn.T @ nuisance.described @ nuisance.turn + 1e-12 * np.eye(rank)
+        nuisance.transform.T @ nuisance.prior_precision @ nuisance.transform + 1e-12 * np.eye(rank)
     )
     unit = np.repeat(MISFIT, functions)
     whole = np.concatenate(flat)

@@ -74,14 +74,14 @@ class Rows:
         return 0 < self.before and len(self.today) > 2
 
     @cached_property
-    def in_question(self) -> list[int]:
+    def today_parts(self) -> list[int]:
         """Return the indices of the trajectories of the diagnosed day."""
         return [k for k, part in enumerate(self.data) if self.today[part.fold]]
 
     @cached_property
     def informative(self) -> FloatArray:
         """Return the number of informative rows of the diagnosed day, at least 1, (n,)."""
-        count = np.sum([(self.weight[k] > 0.0).sum(axis=0) for k in self.in_question], axis=0)
+        count = np.sum([(self.weight[k] > 0.0).sum(axis=0) for k in self.today_parts], axis=0)
         return np.asarray(np.maximum(count, 1), dtype=float)
 
     @cached_property

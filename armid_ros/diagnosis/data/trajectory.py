@@ -176,17 +176,23 @@ def trajectories(
     """
     result = []
     for fold, recording in enumerate(recordings):
-        least = _REVERSAL_NOISE * velocity_error(recording, used)
-        stretches = segments(recording, used)
-        found = [_trajectory(recording, fold, m, used, least) for m in stretches]
-        if not found:
+        slowest = _REVERSAL_NOISE * velocity_error(recording, used)
+        motions = segments(recording, used)
+        if not motions:
             check_stamps([recording], used)
             raise no_stretch(recording, used)
         sensors = None
         if recording.partner is not None and arm is not None:
             sensors = SensorNoise(arm.robot, recording, used)
-        limits = found[0].allowed if allowed is None else allowed
-        result += [replace(part, allowed=limits, sensors=sensors) for part in found]
+        for whole in motions:
+            motion, reduction = _thinned(whole, used)
+            rows = np.array(decimated_samples(len(motion), reduction), dtype=np.intp)
+            share = _uncertain_share(motion, reduction, slowest)
+            unsure = np.where(_at_rest(motion), np.inf, share)[rows]
+            limit = np.full(motion.n_joints, MAX_UNCERTAIN_SHARE) if allowed is None else allowed
+            source = recording.source
+            part = Trajectory(source, fold, motion, reduction, rows, unsure, limit, sensors)
+            result.append(part)
     return result
 
 
@@ -214,20 +220,16 @@ def _widest(used: Conditioning) -> int:
     return max(1, min(used.decimation // 8, fast_enough))
 
 
-def _trajectory(
-    recording: Recording, fold: int, motion: Motion, used: Conditioning, least: FloatArray
-) -> Trajectory:
+def _thinned(motion: Motion, used: Conditioning) -> tuple[Motion, Conditioning]:
+    """Decimate a motion to the rate of its columns; return it and the decimation to rows."""
     thin = max(d for d in range(1, _widest(used) + 1) if used.decimation % d == 0)
-    if thin > 1:
-        first = replace(used, decimation=thin)
-        assert motion.tau is not None
-        kept = np.array(decimated_samples(len(motion), first), dtype=np.intp)
-        motion = motion.select(kept).with_torque(decimate(motion.tau, first))
-        used = Conditioning(used.rate_hz / thin, used.cutoff_hz, used.decimation // thin)
-    rows = np.array(decimated_samples(len(motion), used), dtype=np.intp)
-    unsure = np.where(_at_rest(motion), np.inf, _unsure(motion, used, least))[rows]
-    allowed = np.full(motion.n_joints, MAX_UNCERTAIN_SHARE)
-    return Trajectory(recording.source, fold, motion, used, rows, unsure, allowed)
+    if thin == 1:
+        return motion, used
+    first = replace(used, decimation=thin)
+    assert motion.tau is not None
+    kept = np.array(decimated_samples(len(motion), first), dtype=np.intp)
+    motion = motion.select(kept).with_torque(decimate(motion.tau, first))
+    return motion, Conditioning(used.rate_hz / thin, used.cutoff_hz, used.decimation // thin)
 
 
 def _at_rest(motion: Motion) -> npt.NDArray[np.bool_]:
@@ -243,10 +245,10 @@ def _at_rest(motion: Motion) -> npt.NDArray[np.bool_]:
     return rest
 
 
-def _unsure(motion: Motion, used: Conditioning, least: FloatArray) -> FloatArray:
+def _uncertain_share(motion: Motion, used: Conditioning, slowest: FloatArray) -> FloatArray:
     """Return the share of each filtered sample with an uncertain sign of velocity, (N, n)."""
     speed = np.abs(motion.dq)
-    slow = speed < np.maximum(_REVERSAL_SPEED * speed.max(axis=0), least)
+    slow = speed < np.maximum(_REVERSAL_SPEED * speed.max(axis=0), slowest)
     slow[1:] |= np.diff(np.sign(motion.dq), axis=0) != 0
     taps = np.abs(used.taps)
     share = signal.oaconvolve(slow.astype(float), taps[:, np.newaxis], mode='same', axes=0)

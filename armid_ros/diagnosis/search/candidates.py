@@ -225,7 +225,7 @@ class Causes:
 def _torque_of(columns: Sequence[FloatArray], rows: Rows) -> FloatArray:
     """Return the rms torque per unit of each column on the diagnosed day, (n, p) [N m]."""
     squares = np.zeros((len(rows.torque), columns[0].shape[2]))
-    for k in rows.in_question:
+    for k in rows.today_parts:
         moving = rows.weight[k][:, :, np.newaxis] > 0.0
         squares += np.sum(columns[k] ** 2, axis=0, where=moving)
     return np.asarray(np.sqrt(squares / rows.informative[:, np.newaxis]))

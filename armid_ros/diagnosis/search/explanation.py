@@ -208,11 +208,11 @@ def _unset(
 
     """
     nuisance = result.nuisance
-    rank, turn = nuisance.rank, nuisance.turn
+    rank, transform = nuisance.rank, nuisance.transform
     values, covariance = nuisance.whole(result.under)
-    means, spread = turn @ values[:rank], turn @ covariance[:rank, :rank] @ turn.T
+    means, spread = transform @ values[:rank], transform @ covariance[:rank, :rank] @ transform.T
     today, joints = np.flatnonzero(nuisance.rows.today).tolist(), nuisance.arm.robot.joints
-    back = np.linalg.inv(turn)
+    back = np.linalg.inv(transform)
     residual = float(sum(np.sum(nuisance.rest(values, k) ** 2) for k in today))
     names = [(one.name, one.joint) for one in nuisance.base.parameters]
     for effect in unknown:
@@ -227,7 +227,7 @@ def _unset(
         sigma = float(nuisance.rows.sigma[-1][joint])
         rms = sigma * np.sqrt(square / count)
         variance = float(spread[k, k])
-        precision = max(float(nuisance.described[k, k]), 1e-12)  # of the prior
+        precision = max(float(nuisance.prior_precision[k, k]), 1e-12)  # of the prior
         odds = 0.5 * (means[k] ** 2 / variance + np.log(precision * variance))
         resolution = float(np.clip(1.0 - variance * precision, 0.0, 1.0))
         yield Trial(

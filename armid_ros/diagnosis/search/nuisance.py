@@ -52,17 +52,17 @@ class Nuisance:
         The model, with friction in all joints, given or not.
     base : BaseParameters
         The r parameters b of its body and friction.
-    turn : ndarray, shape (r, r)
-        Matrix from the coordinates x of the body columns to b, b = turn x.
-    described : ndarray, shape (r, r)
+    transform : ndarray, shape (r, r)
+        Matrix from the coordinates x of the body columns to b, b = transform x.
+    prior_precision : ndarray, shape (r, r)
         Prior precision of b.
-    open : ndarray of bool, shape (r,)
+    unset : ndarray of bool, shape (r,)
         Whether each of b has no given value.
     columns : tuple of ndarray, each (n, M, q)
         Weighted columns of each recording: body, and the discrepancy of one joint after the other.
     residual : tuple of ndarray, each (n, M)
         Weighted residual of the model.
-    fixed : (ndarray, shape (K, q, q), ndarray, shape (K, q))
+    column_products : (ndarray, shape (K, q, q), ndarray, shape (K, q))
         Products of these columns with each other and with the residual, in each recording.
     accepted : tuple of CauseTerm
         Accepted causes.
@@ -72,12 +72,12 @@ class Nuisance:
     rows: Rows
     arm: ArmModel
     base: BaseParameters
-    turn: FloatArray
-    described: FloatArray
-    open: npt.NDArray[np.bool_]
+    transform: FloatArray
+    prior_precision: FloatArray
+    unset: npt.NDArray[np.bool_]
     columns: tuple[FloatArray, ...]
     residual: tuple[FloatArray, ...]
-    fixed: tuple[FloatArray, FloatArray]
+    column_products: tuple[FloatArray, FloatArray]
     accepted: tuple[CauseTerm, ...] = ()
 
     @classmethod
@@ -113,18 +113,18 @@ class Nuisance:
         free = np.setdiff1d(np.arange(len(arm.parameters)), held)
         felt = arm if gravity is None else replace(arm, robot=arm.robot.with_gravity(gravity))
         base, columns = excited(felt, felt.base_parameters(rng, free), rows.data)
-        described = described_precision(base, arm, known)
+        prior_precision = described_precision(base, arm, known)
         rigid = len(arm.robot.rigid_parameters)
         values = arm.theta[base.independent]
         unset = (base.independent >= rigid) & (values == 0.0)  # noqa: RUF069 - no given value
         given = (base.independent >= rigid) & ~unset
-        described[given, given] += (_RELATIVE_PRIOR_STD * values[given]) ** -2.0
+        prior_precision[given, given] += (_RELATIVE_PRIOR_STD * values[given]) ** -2.0
         joints = range(arm.robot.n_joints)
         flat = [x.reshape(-1, base.rank) for x in rows.weighted(columns, joints)]
-        turn = _orthonormal_transform(np.concatenate(flat), described, unset)
+        transform = _orthonormal_transform(np.concatenate(flat), prior_precision, unset)
         functions = discrepancy_columns(rows.data, arm)
         both = [
-            np.concatenate([x @ turn, own], axis=2)
+            np.concatenate([x @ transform, own], axis=2)
             for x, own in zip(columns, functions, strict=True)
         ]
         rest = [part.residual(arm)[:, :, np.newaxis] for part in rows.data]
@@ -136,8 +136,8 @@ class Nuisance:
             rows,
             arm,
             base,
-            turn,
-            described,
+            transform,
+            prior_precision,
             unset,
             tuple(weighted),
             tuple(residual),
@@ -147,7 +147,7 @@ class Nuisance:
     @property
     def rank(self) -> int:
         """Return the number of columns of the body."""
-        return len(self.turn)
+        return len(self.transform)
 
     @cached_property
     def discrepancy(self) -> npt.NDArray[np.intp]:
@@ -176,19 +176,21 @@ class Nuisance:
     def square(self) -> FloatArray:
         """Products of all columns of each recording, (K, q + a, q + a); causes are last."""
         if not self.accepted:
-            return self.fixed[0]
+            return self.column_products[0]
         acts = [one.acts[:, np.newaxis, np.newaxis].astype(float) for one in self.accepted]
         pairs = list(zip(acts, (one.cause for one in self.accepted), strict=True))
         border = np.concatenate([act * cause.products for act, cause in pairs], axis=2)
         within = np.concatenate([act * self._among_accepted(x) for act, x in pairs], axis=2)
         below = np.concatenate([border.swapaxes(1, 2), within], axis=2)
-        return np.concatenate([np.concatenate([self.fixed[0], border], axis=2), below], axis=1)
+        return np.concatenate(
+            [np.concatenate([self.column_products[0], border], axis=2), below], axis=1
+        )
 
     @cached_property
     def cross(self) -> FloatArray:
         """Products of all columns of each recording with its residual, (K, q + a)."""
         aims = [one.cause.aim * one.acts[:, np.newaxis] for one in self.accepted]
-        return np.concatenate([self.fixed[1], *aims], axis=1)
+        return np.concatenate([self.column_products[1], *aims], axis=1)
 
     @cached_property
     def power(self) -> FloatArray:
@@ -228,7 +230,10 @@ class Nuisance:
         aims = np.array([x.reshape(-1, x.shape[2]).T @ y.ravel() for x, y in pairs])
         accepted = tuple(replace(one, cause=one.cause.aimed_at(residual)) for one in self.accepted)
         return replace(
-            self, residual=tuple(residual), fixed=(self.fixed[0], aims), accepted=accepted
+            self,
+            residual=tuple(residual),
+            column_products=(self.column_products[0], aims),
+            accepted=accepted,
         )
 
     @property
@@ -265,14 +270,14 @@ class Nuisance:
         unit = self.rows.amplitude[0]
         rigid = self.base.independent < len(self.arm.robot.rigid_parameters)
         scale = np.where(rigid, setting.body or 1.0, 1.0)
-        body = self.turn.T @ (self.described / np.outer(scale, scale)) @ self.turn
+        body = self.transform.T @ (self.prior_precision / np.outer(scale, scale)) @ self.transform
         body += _MIN_PRECISION * np.eye(self.rank)
         size = max(setting.shared, _MIN_PRECISION) * unit[:, np.newaxis] * self.reach
         shared = size.ravel() ** -2.0
         more = [one.prior[0] for one in self.accepted]
         whole = linalg.block_diag(body, np.diag(shared), *more)
         fitted = np.ones(len(whole), dtype=bool)
-        fitted[: self.rank] = (setting.body > 0.0) | self.open
+        fitted[: self.rank] = (setting.body > 0.0) | self.unset
         fitted[self.discrepancy.ravel()] = setting.shared > 0.0
         used = np.flatnonzero(fitted)
         matrix = whole[np.ix_(used, used)]
@@ -417,12 +422,14 @@ def _orthonormal_transform(
     rows: FloatArray, precision: FloatArray, group: npt.NDArray[np.bool_]
 ) -> FloatArray:
     """Return the transform that makes columns (S, r) of two groups orthonormal, (r, r)."""
-    turn = np.zeros_like(precision)
+    transform = np.zeros_like(precision)
     for own in (np.flatnonzero(group), np.flatnonzero(~group)):
         held = precision[np.ix_(own, own)]
         scale = np.sqrt(np.sum(rows[:, own] ** 2, axis=0) + np.diag(held))
         scale = np.where(scale > 0.0, scale, 1.0)
         scaled = rows[:, own] / scale
         size, axes = np.linalg.eigh(scaled.T @ scaled + held / np.outer(scale, scale))
-        turn[np.ix_(own, own)] = axes / np.sqrt(np.maximum(size, 1e-14)) / scale[:, np.newaxis]
-    return turn
+        transform[np.ix_(own, own)] = (
+            axes / np.sqrt(np.maximum(size, 1e-14)) / scale[:, np.newaxis]
+        )
+    return transform

@@ -174,7 +174,7 @@ class JointFit:
 
     def _arm(self, named: Sequence[NamedEffect], means: FloatArray) -> ArmModel:
         """Return the arm with the named causes, and with fitted body and friction if stated."""
-        change = self.nuisance.turn @ means[: self.nuisance.rank]
+        change = self.nuisance.transform @ means[: self.nuisance.rank]
         arm, base, theta = self.arm, self.nuisance.base, self.arm.theta
         if self.stated and np.any(change):
             arm = arm.with_theta(base.lift(base.values(theta) + change, theta))

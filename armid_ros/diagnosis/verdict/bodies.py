@@ -121,14 +121,14 @@ def as_bodies(explanation: Explanation) -> tuple[Explanation, tuple[str, ...]]:
 def _products(problem: JointFit, fitted: Fitted) -> tuple[FloatArray, float]:
     """Return the products of the base columns and their target, and the number of rows."""
     nuisance, base = problem.nuisance, problem.nuisance.base
-    rank, back = nuisance.rank, np.linalg.inv(nuisance.turn)
+    rank, back = nuisance.rank, np.linalg.inv(nuisance.transform)
     then, now = (base.values(x.theta[: len(base.standard)]) for x in (problem.arm, fitted.arm))
     patched = problem.with_model(fitted.arm)
     products = np.zeros((rank + 1, rank + 1))
     for k, today in enumerate(nuisance.rows.today):
         values = now if today else then
-        square = back.T @ patched.fixed[0][k][:rank, :rank] @ back
-        residual = back.T @ patched.fixed[1][k][:rank]
+        square = back.T @ patched.column_products[0][k][:rank, :rank] @ back
+        residual = back.T @ patched.column_products[1][k][:rank]
         target = residual + square @ values
         power = patched.power[k] + (residual + target) @ values
         products += np.block([[square, target[:, np.newaxis]], [target, power]])

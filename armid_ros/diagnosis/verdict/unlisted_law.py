@@ -91,7 +91,7 @@ def unlisted_laws(explanation: Explanation, settings: DiagnosisSettings) -> list
         odds = np.logaddexp.reduce(fits[1:]) - np.log(len(_LAW_SIZES)) - fits[0]
         if odds > alarm:
             values = with_law.means(under)[with_law.spans[-1]]
-            torque = np.concatenate([columns[k][:, joint] @ values for k in rows.in_question])
+            torque = np.concatenate([columns[k][:, joint] @ values for k in rows.today_parts])
             power = np.mean(torque**2) / limit[joint]
             ratio[law.of][joint] = max(ratio[law.of][joint], power)
     return [Excess(own, f'that varies with its {of}') for of, own in ratio.items()]
