@@ -31,9 +31,9 @@ from armid_ros.diagnosis.verdict.data_remarks import data_remarks
 from armid_ros.diagnosis.verdict.finding import Diagnosis, Finding
 from armid_ros.diagnosis.verdict.gap import measure_gap, not_repeating
 from armid_ros.diagnosis.verdict.naming import findings, small_print
-from armid_ros.diagnosis.verdict.remaining_misfit import places_held, RemainingMisfit
-from armid_ros.diagnosis.verdict.where import where_it_is, where_left
-from armid_ros.diagnosis.verdict.words import decide, Verdict
+from armid_ros.diagnosis.verdict.remaining_misfit import locate_blocked_joints, RemainingMisfit
+from armid_ros.diagnosis.verdict.where import locate_gap, locate_remaining_gap
+from armid_ros.diagnosis.verdict.words import decide
 from armid_ros.errors import IdentificationError
 from armid_ros.estimate import name_in_words
 from armid_ros.identification.assess.data_faults import check_data, mistaken_recordings
@@ -136,8 +136,8 @@ def diagnose(
     known = Baseline.of(arm, before, rng) if baseline else None
     if known is not None and known.errors[0] > 1.0:
         return _bad(given, data, [_NO_MODEL.format(known.errors[0])], notes)
-    seen = trajectories(validate, prepared.used, arm, prepared.allowed)
-    explainer = Explainer(arm, prepared, known, rng, tell, settings, misfit, seen)
+    held_out = trajectories(validate, prepared.used, arm, prepared.allowed)
+    explainer = Explainer(arm, prepared, known, rng, tell, settings, misfit, held_out)
     doubt = doubt_of(given, known, baseline, misfit, settings.thresholds)
     if settings.partner is not None:
         tell(0.2, f'ties to {settings.partner.source}')
@@ -249,16 +249,16 @@ def _as_diagnosis(
     excess = RemainingMisfit(explanation, both, before, arm, settings)
     evidence, patched = explanation.evidence, explanation.fitted.arm
     found, minor = findings(explanation, shares, arm, explainer.rng), small_print(explanation)
-    worse, whole_residual = excess.worse_joints(), excess.of_residual()
+    worse, of_residual = excess.worse_joints(), excess.of_residual()
     floors = tuple(noise_floor(part, patched) for part in evidence.data)
     resting, laws = excess.at_rest(), excess.of_laws()
-    strange = not_repeating(floors, settings.thresholds, settings.material * evidence.torque_rms)
+    different = not_repeating(floors, settings.thresholds, settings.material * evidence.torque_rms)
     explanation = explanation if found else replace(explanation, reference=explanation.fitted)
     gap = measure_gap(explanation, unseen)
     word = decide(
         found,
-        [arm.robot.joints[k] for k in strange] if explanation.measured else (),
-        [*whole_residual, *resting, *laws],
+        [arm.robot.joints[k] for k in different] if explanation.measured else (),
+        [*of_residual, *resting, *laws],
         arm,
         NOISE if explanation.measured else explanation.floor,
         excess.of_given_body(),
@@ -266,21 +266,21 @@ def _as_diagnosis(
         gap,
     )
     word, doubt = doubted(word, doubt, found, given, before)
-    open_in = max(
-        zip(both, whole_residual, strict=True), key=lambda one: float(one[1].ratio.max())
+    worst_data = max(
+        zip(both, of_residual, strict=True), key=lambda one: float(one[1].ratio.max())
     )[0]
     new = np.max([np.zeros(arm.robot.n_joints), *(one.ratio for one in laws)], axis=0) > 1.0
-    places = where_it_is(explanation, (unseen or evidence) if found else open_in, settings, new)
+    places = locate_gap(explanation, (unseen or evidence) if found else worst_data, settings, new)
     explainer.tell(1.0, word.word)
     small = [one for one in found if settings.everything and one.share < least]
-    remarks = _remarks((found, patched), worse, explanation, word, doubt, explainer)
+    remarks = _remarks(found, worse, explanation, word.word, doubt, explainer)
     return Diagnosis(
         verdict=word.word,
         summary=' '.join([word.summary, *remarks]),
         findings=tuple(one for one in found if one not in small),
         minor=(*small, *minor),
-        where=places or places_held(arm, resting),
-        left=where_left(explanation, patched, open_in, settings, new),
+        where=places or locate_blocked_joints(arm, resting),
+        left=locate_remaining_gap(explanation, patched, worst_data, settings, new),
         gap=gap,
         explanation=explanation.forgetting(),
         arm=plain_arm(patched) if found and not worse else given,
@@ -307,24 +307,23 @@ def _not_visible(
 
 
 def _remarks(
-    result: tuple[Sequence[Finding], ArmModel],
+    found: Sequence[Finding],
     worse: Sequence[str],
     explanation: Explanation,
-    verdict: Verdict,
+    verdict: str,
     doubt: str,
     explainer: Explainer,
 ) -> list[str]:
     """Return remarks: why the model is doubtful or not patched, and which joints are unchecked."""
-    found, arm = result
     names = ' and '.join(name_in_words(one.name) for one in found)
     remarks = {
         f'The model is not patched: {names} would make it worse in {", ".join(worse)}.': worse,
-        explanation.untested: verdict.word == 'unknown',
-        doubt: verdict.word != 'consistent',  # then it precedes the verdict
+        explanation.untested: verdict == 'unknown',
+        doubt: verdict != 'consistent',  # then it precedes the verdict
     }
     then = () if explainer.baseline is None else explainer.baseline.data
-    of_data = data_remarks(found, arm, explainer.prepared.data, then)
-    return [*(text for text, told in remarks.items() if text and told), *of_data]
+    of_data = data_remarks(found, explanation.fitted.arm, explainer.prepared.data, then)
+    return [*(text for text, applies in remarks.items() if text and applies), *of_data]
 
 
 def _held_out_evidence(data: Sequence[Trajectory], explanation: Explanation) -> Evidence | None:

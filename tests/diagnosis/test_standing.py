@@ -8,7 +8,7 @@ from types import SimpleNamespace
 from armid_ros.diagnosis import diagnose
 from armid_ros.diagnosis.data.evidence import Evidence
 from armid_ros.diagnosis.next_run.steps import next_steps
-from armid_ros.diagnosis.verdict.remaining_misfit import standing
+from armid_ros.diagnosis.verdict.remaining_misfit import blocking_excess
 from armid_ros.motion import Motion
 from armid_ros.recording import Recording
 from armid_ros.report.diagnosis_report import tone_of
@@ -89,7 +89,9 @@ def excess_of(bench, left, torque, informative):
         used=SimpleNamespace(cutoff_hz=5.0),
     )
     evidence = Evidence((part,), (np.full(2, 0.05),), (np.full(2, 0.05),))
-    return standing(bench.arm, evidence, [np.column_stack([np.zeros(len(left)), left])], 3.0)[1]
+    return blocking_excess(
+        bench.arm, evidence, [np.column_stack([np.zeros(len(left)), left])], 3.0
+    )[1]
 
 
 def test_waves_that_a_filter_makes_of_a_jerk_are_no_stop(bench):

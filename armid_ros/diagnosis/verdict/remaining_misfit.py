@@ -135,17 +135,16 @@ class RemainingMisfit:
         arm, usual = self.explanation.fitted.arm, np.ones(self.given.robot.n_joints)
         if before is not None:  # an earlier blocking torque, such as that of a brake
             rows = Evidence.over_noise(before.data, (before.misfit,) * len(before.data))
-            earlier = standing(self.given, rows, before.residual, thresholds.surely)
+            earlier = blocking_excess(self.given, rows, before.residual, thresholds.surely)
             usual = np.maximum(thresholds.same_fit * earlier, usual)
-        ratios = (
-            standing(arm, part, part.residuals(arm), thresholds.surely) for part in self.data
-        )
+        surely = thresholds.surely
+        ratios = (blocking_excess(arm, x, x.residuals(arm), surely) for x in self.data)
         where = 'where it stands still or turns round'
         more = ' in addition to friction: a stop, a brake or a contact does that'
         return [Excess(ratio / usual, where, more) for ratio in ratios]
 
 
-def places_held(arm: ArmModel, excesses: Sequence[Excess]) -> tuple[Where, ...]:
+def locate_blocked_joints(arm: ArmModel, excesses: Sequence[Excess]) -> tuple[Where, ...]:
     """Return joints with a torque beyond friction at rest, the largest excess first."""
     excess = np.max([np.zeros(arm.robot.n_joints), *(one.ratio for one in excesses)], axis=0)
     beyond = np.where(excess > 1.0, excess, 0.0)
@@ -157,7 +156,7 @@ def places_held(arm: ArmModel, excesses: Sequence[Excess]) -> tuple[Where, ...]:
     )
 
 
-def standing(
+def blocking_excess(
     arm: ArmModel, evidence: Evidence, residual: Sequence[FloatArray], surely: float
 ) -> FloatArray:
     """
@@ -177,13 +176,13 @@ def standing(
     squares, time = np.zeros((2, joints))
     usual = np.maximum(evidence.torque_rms, 1e-300)
     for part, own, sigma in zip(evidence.data, residual, evidence.sigma, strict=True):
-        most = _MAX_REST_OVER_FRICTION * friction.largest(arm.load(part.at_rows))
-        louder = np.maximum(np.abs(part.torque - own) / usual, 1.0)
+        limit = _MAX_REST_OVER_FRICTION * friction.largest(arm.load(part.at_rows))
+        torque_ratio = np.maximum(np.abs(part.torque - own) / usual, 1.0)
         period = float(part.t[1] - part.t[0])
-        shortest = max(REST_TIME, 1.0 / part.used.cutoff_hz)
-        lasting = uniform_filter1d(own, max(round(shortest / period), 1), axis=0)
-        beyond = (lasting / (most + surely * sigma * louder)) ** 2
-        more = ~part.informative & (most > 0.0) & (beyond > 1.0)
-        time += period * more.sum(axis=0)
-        squares += period * np.sum(beyond, axis=0, where=more)
+        window = max(REST_TIME, 1.0 / part.used.cutoff_hz)
+        mean = uniform_filter1d(own, max(round(window / period), 1), axis=0)
+        ratio = (mean / (limit + surely * sigma * torque_ratio)) ** 2
+        blocked = ~part.informative & (limit > 0.0) & (ratio > 1.0)
+        time += period * blocked.sum(axis=0)
+        squares += period * np.sum(ratio, axis=0, where=blocked)
     return np.where(time > REST_TIME, squares / np.maximum(time, 1e-300), 0.0)

@@ -94,9 +94,9 @@ class Excess:
     more: str = ''
 
 
-def where_it_is(
+def locate_gap(
     explanation: Explanation,
-    shown: Evidence,
+    evidence: Evidence,
     settings: DiagnosisSettings,
     new: npt.NDArray[np.bool_],
 ) -> tuple[Where, ...]:
@@ -109,25 +109,26 @@ def where_it_is(
     """
     reference, fitted = explanation.reference.arm, explanation.fitted.arm
     if not explanation.steps:
-        return where_left(explanation, reference, shown, settings, new)
-    before, after = shown.residuals(reference), shown.residuals(fitted)
-    taken = shown.chi2_per_row(before) - shown.chi2_per_row(after)
-    least = settings.thresholds.inexact * max(float(taken.sum()), 0.0)
-    return locate(explanation.given, shown, before, np.where(taken > least, taken, 0.0))
+        return locate_remaining_gap(explanation, reference, evidence, settings, new)
+    before, after = evidence.residuals(reference), evidence.residuals(fitted)
+    explained = evidence.chi2_per_row(before) - evidence.chi2_per_row(after)
+    least = settings.thresholds.inexact * max(float(explained.sum()), 0.0)
+    gap = np.where(explained > least, explained, 0.0)
+    return locate(explanation.given, evidence, before, gap)
 
 
-def where_left(
+def locate_remaining_gap(
     explanation: Explanation,
     arm: ArmModel,
-    shown: Evidence,
+    evidence: Evidence,
     settings: DiagnosisSettings,
     new: npt.NDArray[np.bool_],
 ) -> tuple[Where, ...]:
     """Locate the residual beyond the limits of the patched model, or of a new torque law."""
-    patched, left = (shown.residuals(one) for one in (explanation.fitted.arm, arm))
-    losses, limits = shown.chi2_per_row(left), shown.limits(patched, settings)
-    beyond = np.where(new, losses, np.where(losses > limits, losses - 1.0, 0.0))
-    return locate(explanation.given, shown, left, beyond)
+    patched, residual = (evidence.residuals(one) for one in (explanation.fitted.arm, arm))
+    losses, limits = evidence.chi2_per_row(residual), evidence.limits(patched, settings)
+    gap = np.where(new, losses, np.where(losses > limits, losses - 1.0, 0.0))
+    return locate(explanation.given, evidence, residual, gap)
 
 
 def locate(
