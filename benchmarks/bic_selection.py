@@ -74,8 +74,7 @@ def bic_selection(
     chosen: list[Cause] = []
     while True:
         under = nuisance.marginal(pooled)
-        values = nuisance.means(under)
-        squares = sum(float(np.sum(nuisance.rest(values, k) ** 2)) for k in range(len(rows.today)))
+        squares = nuisance.squares_of_today(under)
         best, cause = 0.0, None
         for candidate in catalogue.causes(nuisance, under):
             known = CauseInformation.of(candidate, nuisance, under, by_day=True)

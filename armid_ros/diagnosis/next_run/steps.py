@@ -68,11 +68,11 @@ def next_steps(
     if verdict == 'not_repeatable':
         steps.append('Keep people and loose parts away from the arm, and record again.')
     motions = [run.sentence] if run else []
-    told = () if run is None else [(s.name, s.rival) for s in run.separations if s.distinct]
+    separated = () if run is None else [(s.name, s.rival) for s in run.separations if s.distinct]
     motions += [
         one.experiment
         for one in findings
-        if one.other_causes and (one.name, one.other_causes[0].name) not in told
+        if one.other_causes and (one.name, one.other_causes[0].name) not in separated
     ]
     motions += [f'{no_run[0].upper()}{no_run[1:]}.'] if no_run else []
     steps = [*motions, *steps] if verdict == 'ambiguous' else [*steps, *motions]

@@ -327,13 +327,15 @@ def _unexplained(nuisance: Nuisance, under: Marginal) -> Unexplained:
     )
     weight = np.concatenate(rows.weight)
     scale = np.where(weight > 0.0, weight, 1.0)
-    rest = np.concatenate([nuisance.rest(values, k) for k in range(len(rows.today))], axis=1).T
+    residual = np.concatenate(
+        [nuisance.residual_at(values, k) for k in range(len(rows.today))], axis=1
+    ).T
     columns = np.concatenate([x[:, :, : nuisance.rank] for x in nuisance.columns], axis=1)
     asked = np.concatenate([np.full(len(p.rows), rows.today[p.fold]) for p in rows.data])
     return Unexplained(
         Motion(motions[0].joints, *arrays),
         np.concatenate([part.at_rows.q for part in rows.data]),
-        rest / scale,
+        residual / scale,
         weight * asked[:, np.newaxis],
         columns.swapaxes(0, 1) / scale[:, :, np.newaxis],
     )

@@ -130,14 +130,16 @@ class Explainer:
         if result is not first:
             result = comparison.found(result)
         magnitude, notes = self._magnitude(result)
-        setting, held = result.under.setting, list[int]()
+        setting, constant = result.under.setting, list[int]()
         if setting.body:
             accepted = [one.cause.effect for one in result.nuisance.accepted]
             changed = [p for effect in accepted for p in effect.parameters(self.arm.robot)]
-            held = [k for k, p in enumerate(self.arm.parameters) if p in changed]
+            constant = [k for k, p in enumerate(self.arm.parameters) if p in changed]
         else:
             evidence = prepared.described
-        nuisance = Nuisance.of(rows, memoized_arm(self.arm), self.rng, held=held, gravity=gravity)
+        nuisance = Nuisance.of(
+            rows, memoized_arm(self.arm), self.rng, constant=constant, gravity=gravity
+        )
         every = tuple(range(len(rows.today)))
         problem = JointFit(nuisance.arm, nuisance, setting, every, True, gravity=magnitude)
         found = replace(explain(problem, evidence, result, settings, unknown), notes=notes)

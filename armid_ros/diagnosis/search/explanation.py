@@ -213,7 +213,7 @@ def _unset(
     means, spread = transform @ values[:rank], transform @ covariance[:rank, :rank] @ transform.T
     today, joints = np.flatnonzero(nuisance.rows.today).tolist(), nuisance.arm.robot.joints
     back = np.linalg.inv(transform)
-    residual = float(sum(np.sum(nuisance.rest(values, k) ** 2) for k in today))
+    residual = nuisance.squares_of_today(result.under)
     names = [(one.name, one.joint) for one in nuisance.base.parameters]
     for effect in unknown:
         parameter = effect.parameters(nuisance.arm.robot)[0]

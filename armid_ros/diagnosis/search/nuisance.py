@@ -87,7 +87,7 @@ class Nuisance:
         arm: ArmModel,
         rng: np.random.Generator,
         known: FloatArray | None = None,
-        held: Sequence[int] = (),
+        constant: Sequence[int] = (),
         gravity: FloatArray | None = None,
     ) -> Nuisance:
         """
@@ -103,14 +103,14 @@ class Nuisance:
             Draws the random states from which base parameters are found.
         known : ndarray, shape (P, P), optional
             Information on the first parameters of the arm, added to that of its description.
-        held : sequence of int
+        constant : sequence of int
             Parameters of the arm that are not fitted, as an accepted cause changes them.
         gravity : ndarray, shape (3,), optional
             Gravity that acts on errors of the body, if it is another than in the model [m/s^2]:
             the torque is bilinear in gravity and body.
 
         """
-        free = np.setdiff1d(np.arange(len(arm.parameters)), held)
+        free = np.setdiff1d(np.arange(len(arm.parameters)), constant)
         felt = arm if gravity is None else replace(arm, robot=arm.robot.with_gravity(gravity))
         base, columns = excited(felt, felt.base_parameters(rng, free), rows.data)
         prior_precision = described_precision(base, arm, known)
@@ -348,16 +348,16 @@ class Nuisance:
             return LogDensity(matrix, vector, normaliser, loss), None
         place, functions = self.discrepancy, self.discrepancy.shape[1]
         size = setting.own * np.array(self.rows.amplitude)[fitted]
-        held = square[:, place[:, :, np.newaxis], place[:, np.newaxis, :]] * scale
-        held += np.eye(functions) * size[:, :, np.newaxis, np.newaxis] ** -2.0
-        covariance = np.asarray(np.linalg.inv(held))
+        precision = square[:, place[:, :, np.newaxis], place[:, np.newaxis, :]] * scale
+        precision += np.eye(functions) * size[:, :, np.newaxis, np.newaxis] ** -2.0
+        covariance = np.asarray(np.linalg.inv(precision))
         border = square[:, place.ravel()][:, :, used] * scale
-        regressed = (covariance @ border.reshape(*held.shape[:3], -1)).reshape(border.shape)
+        regressed = (covariance @ border.reshape(*precision.shape[:3], -1)).reshape(border.shape)
         aim = cross[:, place] * scale
         matrix -= border.reshape(-1, len(used)).T @ regressed.reshape(-1, len(used))
         vector -= aim.ravel() @ regressed.reshape(-1, len(used))
         loss -= 0.5 * float(np.einsum('kjf,kjfg,kjg->', aim, covariance, aim))
-        normaliser -= 0.5 * float(np.linalg.slogdet(held)[1].sum())
+        normaliser -= 0.5 * float(np.linalg.slogdet(precision)[1].sum())
         normaliser -= functions * float(np.log(size).sum())
         motion = MotionDiscrepancy(covariance, aim, regressed)
         return LogDensity(matrix, vector, normaliser, loss), motion
@@ -375,28 +375,33 @@ class Nuisance:
         values[under.used] = under.values
         return values
 
-    def rest(self, values: FloatArray, k: int) -> FloatArray:
+    def residual_at(self, values: FloatArray, k: int) -> FloatArray:
         """Return the weighted residual of a recording, which includes d_k, (n, M)."""
         columns = self.columns[k]
-        rest = self.residual[k] - columns @ values[: columns.shape[2]]
+        residual = self.residual[k] - columns @ values[: columns.shape[2]]
         for one, span in zip(self.accepted, self.spans, strict=True):
             if one.acts[k]:
-                rest[list(one.cause.joints)] -= one.cause.columns[k] @ values[span]
-        return rest
+                residual[list(one.cause.joints)] -= one.cause.columns[k] @ values[span]
+        return residual
 
-    def unexplained(self, values: FloatArray, setting: Setting, k: int) -> FloatArray:
+    def squares_of_today(self, under: Marginal) -> float:
+        """Return the sum of squares of the weighted residual of the diagnosed day."""
+        values, today = self.means(under), np.flatnonzero(self.rows.today).tolist()
+        return float(sum(np.sum(self.residual_at(values, k) ** 2) for k in today))
+
+    def noise_at(self, values: FloatArray, setting: Setting, k: int) -> FloatArray:
         """Return the weighted residual of a recording minus its fitted d_k, (n, M)."""
-        rest = self.rest(values, k)
+        residual = self.residual_at(values, k)
         if not setting.own:
-            return rest
+            return residual
         size = setting.own * self.rows.amplitude[k]
         for joint, place in enumerate(self.discrepancy):
             functions = self.columns[k][joint][:, place]
-            held = setting.precision * functions.T @ functions
-            held += np.eye(len(place)) * size[joint] ** -2.0
-            aim = setting.precision * functions.T @ rest[joint]
-            rest[joint] -= functions @ np.linalg.solve(held, aim)
-        return rest
+            precision = setting.precision * functions.T @ functions
+            precision += np.eye(len(place)) * size[joint] ** -2.0
+            aim = setting.precision * functions.T @ residual[joint]
+            residual[joint] -= functions @ np.linalg.solve(precision, aim)
+        return residual
 
     def lasting(self, under: Marginal, recordings: Sequence[int], least: float) -> float:
         """
@@ -408,7 +413,7 @@ class Nuisance:
         lengths = []
         values = self.means(under)
         for k in recordings:
-            for x in self.unexplained(values, under.setting, k):
+            for x in self.noise_at(values, under.setting, k):
                 x = x[np.abs(x) > 0.0]
                 if len(x) >= 60:  # three times the largest lag
                     correlation = np.array([x[lag:] @ x[:-lag] for lag in range(1, 20)]) / (x @ x)
@@ -424,11 +429,11 @@ def _orthonormal_transform(
     """Return the transform that makes columns (S, r) of two groups orthonormal, (r, r)."""
     transform = np.zeros_like(precision)
     for own in (np.flatnonzero(group), np.flatnonzero(~group)):
-        held = precision[np.ix_(own, own)]
-        scale = np.sqrt(np.sum(rows[:, own] ** 2, axis=0) + np.diag(held))
+        block = precision[np.ix_(own, own)]
+        scale = np.sqrt(np.sum(rows[:, own] ** 2, axis=0) + np.diag(block))
         scale = np.where(scale > 0.0, scale, 1.0)
         scaled = rows[:, own] / scale
-        size, axes = np.linalg.eigh(scaled.T @ scaled + held / np.outer(scale, scale))
+        size, axes = np.linalg.eigh(scaled.T @ scaled + block / np.outer(scale, scale))
         transform[np.ix_(own, own)] = (
             axes / np.sqrt(np.maximum(size, 1e-14)) / scale[:, np.newaxis]
         )

@@ -189,7 +189,7 @@ class JointFit:
         """Return the fit with the body fixed to the description."""
         return replace(self, setting=replace(self.setting, body=0.0))
 
-    def rest(self, fitted: Fitted) -> list[FloatArray]:
+    def residual_of_day(self, fitted: Fitted) -> list[FloatArray]:
         """
         Return the residual of the diagnosed day without body and discrepancy.
 
@@ -205,7 +205,7 @@ class JointFit:
         means[: self.nuisance.rank] *= not self.stated
         found = []
         for k in np.flatnonzero(rows.today).tolist():
-            whole, start = nuisance.unexplained(means, self.setting, k), 0
+            whole, start = nuisance.noise_at(means, self.setting, k), 0
             for part, weight in zip(rows.data, rows.weight, strict=True):
                 if part.fold == k:
                     own = whole[:, start : start + len(weight)].T

@@ -218,6 +218,4 @@ class Look:
     @cached_property
     def residual_squares(self) -> float:
         """Sum of squares of the weighted residual of the diagnosed day."""
-        values = self.nuisance.means(self.under)
-        today = np.flatnonzero(self.nuisance.rows.today).tolist()
-        return max(float(sum(np.sum(self.nuisance.rest(values, k) ** 2) for k in today)), 1e-300)
+        return max(self.nuisance.squares_of_today(self.under), 1e-300)

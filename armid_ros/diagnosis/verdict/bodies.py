@@ -51,9 +51,9 @@ def is_same_body(one: Trial, other: Trial, robot: Robot) -> bool:
     if tree.model.parents[after + 1] != before + 1 or not axis.any():
         return False
     (load, std), (same, same_std) = (_values(trial) for trial in (outer, inner))
-    alike = abs(load[0] - same[0]) <= MIN_Z_SCORE * np.hypot(std[0], same_std[0])
-    aside = np.linalg.norm(np.cross(axis, load[1:4]))
-    return bool(alike and aside <= MIN_Z_SCORE * np.linalg.norm(std[1:4]))
+    same_mass = abs(load[0] - same[0]) <= MIN_Z_SCORE * np.hypot(std[0], same_std[0])
+    distance = np.linalg.norm(np.cross(axis, load[1:4]))
+    return bool(same_mass and distance <= MIN_Z_SCORE * np.linalg.norm(std[1:4]))
 
 
 def _values(trial: Trial) -> tuple[FloatArray, FloatArray]:

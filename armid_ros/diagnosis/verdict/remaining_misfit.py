@@ -70,9 +70,9 @@ class RemainingMisfit:
         explanation, problem = self.explanation, self.explanation.problem
         residuals = [part.residuals(explanation.fitted.arm) for part in self._parts]
         if problem is not None and not explanation.measured:
-            rest = problem.rest(explanation.fitted)
+            own = problem.residual_of_day(explanation.fitted)
             first = len(explanation.evidence.data)
-            residuals = [rest[:first], *(rest[first:] or one for one in residuals[1:])]
+            residuals = [own[:first], *(own[first:] or one for one in residuals[1:])]
         return list(self._over_limits(residuals))
 
     def of_laws(self) -> list[Excess]:
