@@ -9,7 +9,6 @@ It includes the smallest detectable size of each effect: smaller effects may exi
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 import math
 from typing import Any
@@ -169,7 +168,7 @@ def _candidates(diagnosis: Diagnosis) -> list[dict[str, Any]]:
             'held_out_gain': trial.gain,
             'replicated_in': trial.replicated,
             'visible_fraction': trial.visible,
-            'min_detectable': _finite(_said_size(trial, explanation.given)[1]),
+            'min_detectable': _finite(_detectable_size(trial, explanation.given)[1]),
             'adjusted_p': trial.p,
         }
         for trial in explanation.candidates[:20]
@@ -207,46 +206,29 @@ class Detectable:
     visible: float
 
 
-def smallest_size(trial: Trial, robot: Robot) -> tuple[int, float]:
+def _detectable_size(trial: Trial, arm: ArmModel) -> tuple[ParameterName, float]:
     """
-    Return the first identifiable parameter of a cause, and its smallest detectable size.
+    Return the first identifiable parameter of a cause in the catalogue, and its detectable size.
 
-    A detectable size is significant and material. It is inf if the parameter cannot reach it.
+    A detectable size is significant and material. It is inf if no possible size is detectable.
 
     """
-    return next(_sizes(trial, robot), (trial.kept[0], float('inf')))
-
-
-def _sizes(trial: Trial, robot: Robot) -> Iterator[tuple[int, float]]:
-    """Yield every identifiable parameter of a cause with its smallest detectable size."""
+    effect, names = trial.effect, trial.effect.parameters(arm.robot)
     rows = zip(trial.kept, trial.std, trial.resolution, trial.least, strict=True)
     for index, std, resolution, least in rows:
         size = max(DETECTABLE_Z * float(std), float(least))
         # two inseparable values have a resolution of at most 0.5 each
-        if resolution > 0.9 and is_possible(trial.effect, index, size, robot):
-            yield index, size
-
-
-def _said_size(trial: Trial, arm: ArmModel) -> tuple[ParameterName, float]:
-    """
-    Return a parameter of the effect under its catalogue name, with its detectable size.
-
-    The size is inf if no possible size of the effect is detectable.
-
-    """
-    effect = trial.effect
-    names = effect.parameters(arm.robot)
-    if effect.said_as == effect.name:
-        index, size = smallest_size(trial, arm.robot)
-        return names[index], size
-    for index, size in _sizes(trial, arm.robot):
+        if resolution <= 0.9 or not is_possible(effect, index, size, arm.robot):
+            continue
+        if effect.said_as == effect.name:
+            return names[index], size
         values = np.where(np.arange(len(names)) == index, size, 0.0)
-        for said, theirs in effect.named_as(values, arm):
-            most = int(np.argmax(np.abs(theirs)))
-            there = float(abs(theirs[most]))
-            called_so = said.name == effect.said_as and there > 0.0
-            if called_so and is_possible(said, most, there, arm.robot):
-                return said.parameters(arm.robot)[most], there
+        for named, translated in effect.named_as(values, arm):
+            largest = int(np.argmax(np.abs(translated)))
+            own_size = float(abs(translated[largest]))
+            wanted = named.name == effect.said_as and own_size > 0.0
+            if wanted and is_possible(named, largest, own_size, arm.robot):
+                return named.parameters(arm.robot)[largest], own_size
     return names[trial.kept[0]], float('inf')
 
 
@@ -271,7 +253,7 @@ def detectable(explanation: Explanation | None) -> tuple[Detectable, ...]:
     rows = []
     for trial in explanation.candidates:
         effect = trial.effect
-        parameter, size = _said_size(trial, explanation.given)
+        parameter, size = _detectable_size(trial, explanation.given)
         rows.append(Detectable(effect.said_as, effect.joints, parameter, size, trial.visible))
     rows += [
         Detectable(name, joints, None, float('inf'), 0.0) for name, joints in explanation.invisible
