@@ -214,6 +214,7 @@ def find_mistake(
     both = [row for row in sure if row.as_fitted >= 1.0]
     if both:
         return _first(both, 'as_described', described)
+    # the data have to be likelier too: links that absorb a missing effect leave their prior
     price = LIMITS.gain ** (LIMITS.free_body - 1.0)
     changes = [
         row
@@ -221,7 +222,7 @@ def find_mistake(
         if row.hypothesis.kind != 'unit'
         and not row.hypothesis.of_masses
         and row.as_fitted >= price
-        and near.of_data(row.fitted) >= 1.0
+        and near.of_data(row.fitted) >= LIMITS.gain**row.hypothesis.values
     ]
     if changes and alone:
         return _first(changes, 'as_fitted', near)
