@@ -233,7 +233,7 @@ def _torque_of(columns: Sequence[FloatArray], rows: Rows) -> FloatArray:
 
 def _at_rest(columns: Sequence[FloatArray], rows: Rows) -> float:
     """Return the share of the samples of the diagnosed day in which all columns are zero."""
-    zero = [~columns[k].any(axis=(1, 2)) for k in rows.in_question]
+    zero = [~columns[k].any(axis=(1, 2)) for k in rows.today_parts]
     return float(np.mean(np.concatenate(zero)))
 
 
