@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from itertools import product
 from typing import Any, ClassVar
 
-from armid_ros import ArmModel
+from armid_ros.arm import ArmModel
 from armid_ros.diagnosis import Diagnosis
 from armid_ros.diagnosis.data.evidence import torque_rms
 from armid_ros.diagnosis.data.trajectory import Trajectory

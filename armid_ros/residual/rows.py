@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from armid_ros import ArmModel
+from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.data.trajectory import Trajectory
 from armid_ros.effects.learned import weight
 from armid_ros.motion import FloatArray
