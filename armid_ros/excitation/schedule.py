@@ -88,6 +88,9 @@ class Excitation:
         before = np.maximum(self.run_in - time, 0.0) / self.run_in
         after = np.maximum(time - (self.duration - self.run_in), 0.0) / self.run_in
         phase = time - self.run_in
+        if not (before.any() or after.any()):  # within the periods
+            orbit = self.trajectory.motion(phase)
+            return Motion(self.joints, time, orbit.q, orbit.dq, orbit.ddq)
         # x = 1 - before is the completed share of the run-in; the phase rate is _step(x), and the
         # remaining phase before the first period is run_in * integral of _step from x to 1. The
         # integral of _step from 0 to 1 is a half.

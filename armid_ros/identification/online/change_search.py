@@ -258,6 +258,7 @@ class ChangeSearch:
             )
             yield
             statistics[m] = self._ratios(window), window.strength
+            yield
             if self._chance > 0.0:
                 excess = self._calibrations[m].excess(*statistics[m], self._chance)
                 positive = positive or bool(np.any(excess > 1.0))

@@ -34,7 +34,7 @@ import numpy as np
 
 #: Length of a block [s].
 BLOCK_LENGTH = 0.25
-#: Samples learned together in one piece of work; fewer arrive in the meantime.
+#: Samples in one piece of work; fewer arrive in the meantime, so that the backlog shrinks.
 _SAMPLES_PER_PIECE = 10
 Item = TypeVar('Item')
 
@@ -107,24 +107,28 @@ class NuisanceRows:
             for name in effect.parameters(arm.robot)
         )
 
-    def columns(self, some: Sequence[Row]) -> FloatArray:
-        """Return the columns of N successive rows, shape (N, n, K n)."""
-        moved = [(row.motion.q, row.motion.dq, row.motion.ddq) for row in some]
+    def columns(self, rows: Sequence[Row]) -> Pieces[FloatArray]:
+        """Compute the columns of N successive rows, shape (N, n, K n), in pieces."""
+        moved = [(row.motion.q, row.motion.dq, row.motion.ddq) for row in rows]
         q, dq, ddq = (np.stack(part) for part in zip(*moved, strict=True))
-        t = np.array([row.motion.t for row in some])
+        t = np.array([row.motion.t for row in rows])
         motion = Motion(self._arm.robot.joints, t, q, dq, ddq)
         # friction per unit of each quantity; every quantity acts on its own joint only
-        torques = np.empty((len(some), motion.n_joints, len(self._effects)))
+        torques = np.empty((len(rows), motion.n_joints, len(self._effects)))
         for k, effect in enumerate(self._effects):
+            if k % 4 == 0:  # effects in one piece of work
+                yield
             torques[:, :, k] = np.diagonal(effect.columns(motion, self._arm), axis1=1, axis2=2)
         columns = np.zeros((*torques.shape, motion.n_joints))
         own = np.einsum('sjkj->sjk', columns)
-        for row, raw, place in zip(some, torques, own, strict=True):
+        for k, (row, raw, place) in enumerate(zip(rows, torques, own, strict=True)):
+            if k % _SAMPLES_PER_PIECE == 0:
+                yield
             if row.begins:
                 self._filter.reset()
             smooth = self._filter.update(row.step, raw.reshape(-1))[2]
             np.divide(smooth.reshape(raw.shape), row.gain, out=place)
-        return columns.reshape(len(some), motion.n_joints, -1)
+        return columns.reshape(len(rows), motion.n_joints, -1)
 
 
 @dataclass(eq=False)
@@ -248,6 +252,7 @@ class ChangeWatch:
                 stretch = self._queued.popleft()
                 samples = yield from self._widened(stretch.rows)
                 before = self._wider.copied()
+                yield
                 yield from self._learn(self._wider, samples)
                 if stretch.end is None:
                     self._search.interrupt()
@@ -280,13 +285,16 @@ class ChangeWatch:
     def _widened(self, rows: Sequence[Row]) -> Pieces[list[WeightedSample]]:
         """Return successive samples with the columns of all parameters."""
         samples: list[WeightedSample] = []
-        for part in _parts(rows, 3):  # rows in one piece of work
-            own = np.stack([row.sample.rows for row in part])
-            wide = np.concatenate([own, self._nuisance.columns(part)], axis=2)
+        if not rows:
+            return samples
+        columns = yield from self._nuisance.columns(rows)
+        for first in range(0, len(rows), _SAMPLES_PER_PIECE):
+            yield
+            part, more = (x[first : first + _SAMPLES_PER_PIECE] for x in (rows, columns))
+            wide = np.concatenate([np.stack([row.sample.rows for row in part]), more], axis=2)
             samples += [
                 row.sample._replace(rows=both) for row, both in zip(part, wide, strict=True)
             ]
-            yield
         return samples
 
     def _summed(

@@ -171,6 +171,7 @@ class OnlineIdentifier:
         self.latest: tuple[OnlineSample, ...] = ()
         # of residuals: weighted squares, their weights, and the standard deviation
         self._squares, self._counts, self._deviation = np.zeros((3, self.arm.robot.n_joints))
+        self._floor: FloatArray | None = None
         self._estimator.reset()
         self._scores.reset()
         if self._watch is not None:
@@ -242,15 +243,17 @@ class OnlineIdentifier:
             if self._watch is not None:
                 self._watch.interrupt()
             self._generation = self._filter.generation
-            self._last_row = self._noise = None
+            self._last_row = self._noise = self._floor = None
             self._last_moving[:] = -np.inf
             self._last_useless[:] = motion.t
         # a joint below this velocity [rad/s or m/s] for longer than this time [s] is at rest; a
         # reversal is shorter. Dry friction may hold a joint at rest with any torque, so its torque
         # is not used.
-        self._last_moving[np.abs(motion.dq) >= 0.01] = motion.t
-        resting = motion.t - self._last_moving > 0.1
-        self._last_useless[resting & self._held] = motion.t
+        moving = np.abs(motion.dq) >= 0.01
+        self._last_moving[moving] = motion.t
+        if not moving.all():
+            resting = motion.t - self._last_moving > 0.1
+            self._last_useless[resting & self._held] = motion.t
         begins = self._last_row is None
         step = self._row_period if self._last_row is None else motion.t - self._last_row
         if step < self._row_period - 0.5 * (self._filter.period or 0.0):
@@ -416,6 +419,7 @@ class OnlineIdentifier:
         self._counts = estimator.forgetting * self._counts + sample.weights
         known = np.maximum(self._counts, _SMALLEST)
         self._deviation = np.sqrt(np.maximum(self._squares, 0.0) / known)
+        self._floor = None
         scale = estimator.scale(sample.weights)
         self._scores.add(sample.rows * scale[:, None], sample.tau * scale, estimator.values)
         return True
@@ -424,10 +428,12 @@ class OnlineIdentifier:
     def _negligible_error(self) -> FloatArray:
         """Return the largest negligible error of one sample: 0 except for torques."""
         n = self.arm.robot.n_joints
-        floor = np.zeros((3 if self.settings.measured_velocity else 2) * n)
-        if self._filter.pole is not None:
-            np.multiply(self._deviation, self._row_noise().single, out=floor[-n:])
-        return floor
+        if self._filter.pole is None:
+            return np.zeros((3 if self.settings.measured_velocity else 2) * n)
+        if self._floor is None:
+            self._floor = np.zeros((3 if self.settings.measured_velocity else 2) * n)
+            np.multiply(self._deviation, self._row_noise().single, out=self._floor[-n:])
+        return self._floor
 
     def _row_noise(self) -> RowNoise:
         """Return the noise model of rows since the start of the filters."""

@@ -212,12 +212,13 @@ def _transformed(columns: FloatArray) -> Pieces[_Bands]:
         transformed = np.concatenate(parts, axis=1) * np.sqrt(2.0 / count)
         transformed[0] *= np.sqrt(0.5)
         used = np.mean(rows.any(axis=1))
+        yield
         for band, (first, last) in enumerate(pairwise(edges)):
             part = transformed[first:last]
             both = np.concatenate([part.real, part.imag])
             products[joint, band] = both.T @ both
             counts[joint, band] = used * (2 * (last - first) - (first == 0))
-        yield
+            yield
     return _Bands(products, counts)
 
 

@@ -109,7 +109,7 @@ class JointStateReader:
             if len(message.velocity):
                 dq = self._ordered(message.names, message.velocity, 'velocity')
                 # joint_state_broadcaster publishes NaN for velocities that are not measured
-                dq = dq if math.isfinite(np.add.reduce(dq)) else None
+                dq = dq if math.isfinite(sum(dq.tolist())) else None
             tau = self._values(message.names, message.effort, 'effort')
         except (MalformedMessage, RecordingError) as error:
             self._complaints.say('joint_states', str(error))
@@ -179,7 +179,7 @@ class JointStateReader:
     def _values(self, names: Sequence[str], field: FloatArray, name: str) -> FloatArray:
         values = self._ordered(names, field, name)
         # a sum is faster than isfinite; skipped joints may be NaN
-        if not math.isfinite(np.add.reduce(values)) and not np.all(np.isfinite(values)):
+        if not math.isfinite(sum(values.tolist())) and not np.all(np.isfinite(values)):
             bad = int(np.argmin(np.isfinite(values)))
             joint = self._joints[bad if self._merger is None else self._some[bad]]
             raise RecordingError(f"joint states where the {name} of '{joint}' is not a number")

@@ -295,7 +295,7 @@ def test_columns_are_those_of_the_effects_that_the_arm_lacks():
     q, dq, ddq = np.random.default_rng(0).normal(size=(3, arm.robot.n_joints))
     nuisance = NuisanceRows(arm, 5.0)
     one = Motion(arm.robot.joints, np.zeros(1), q[None], 0.2 * dq[None], ddq[None])
-    (rows,) = nuisance.columns([unfiltered_row(q, 0.2 * dq, ddq)])
+    (rows,) = at_once(nuisance.columns([unfiltered_row(q, 0.2 * dq, ddq)]))
     expected = np.concatenate([effect.columns(one, arm)[0] for effect in lacking], axis=1)
     np.testing.assert_allclose(rows, expected, atol=1e-12)
     assert [p.joint for p in nuisance.parameters] == list(arm.robot.joints) * len(lacking)
@@ -308,4 +308,5 @@ def test_what_is_identified_is_not_nuisance():
     nuisance = NuisanceRows(everything, 5.0)
     assert nuisance.parameters == ()
     n = everything.robot.n_joints
-    assert nuisance.columns([unfiltered_row(*np.ones((3, n)))]).shape == (1, n, 0)
+    rows = at_once(nuisance.columns([unfiltered_row(*np.ones((3, n)))]))
+    assert rows.shape == (1, n, 0)
