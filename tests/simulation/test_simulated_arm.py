@@ -81,6 +81,26 @@ def test_noise_and_delay_are_those_of_simulate_sample_by_sample(model) -> None:
     np.testing.assert_allclose([s.dq for s in samples[1:]], run.dq[2:], atol=1e-6)
 
 
+def test_steps_ahead_of_the_present_change_neither_samples_nor_commands(model) -> None:
+    reference, samples = there_and_back(model.robot.joints), []
+    for looks in (False, True):  # reading the state ends the steps ahead
+        arm = SimulatedArm(model, rng=np.random.default_rng(3), sensors=SENSORS, start=MIDDLE)
+        arm.set_trajectory(reference)
+        rows = []
+        for step in range(400):
+            if step == 117:
+                arm.become(model.with_theta(1.01 * model.theta))
+            if step == 333:
+                arm.set_trajectory(Reference(arm.joints, np.array([0.5]), MIDDLE[np.newaxis]))
+            sample = arm.advance(1)
+            assert sample.steps == arm.steps == step + 1
+            rows.append(np.concatenate([sample.q, sample.dq, sample.tau]))
+            if looks:
+                assert arm.state.steps == step + 1
+        samples.append(rows)
+    np.testing.assert_array_equal(*samples)
+
+
 def test_it_follows_and_then_holds_the_last_point(arm) -> None:
     reference = there_and_back(arm.joints)
     arm.advance(200)

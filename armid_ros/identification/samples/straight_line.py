@@ -302,7 +302,9 @@ class NoiseLevel:
 
     def add_steps(self, moves: FloatArray) -> None:
         """Estimate the resolution from changes between samples, shape (k, m)."""
-        self._min_steps = smallest_steps(np.concatenate([self._min_steps, np.abs(moves)]))
+        sizes = np.abs(moves)
+        if ((sizes > 0.0) & (sizes < self._min_steps[-1])).any():  # seldom after the first samples
+            self._min_steps = smallest_steps(np.concatenate([self._min_steps, sizes]))
 
     def _min_error(self, period: float) -> FloatArray:
         """Return the smallest step of every signal, at least the finest and that of an onset."""
