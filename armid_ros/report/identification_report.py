@@ -136,9 +136,7 @@ def identification_report(
             TONES[grade.word],
             (*grade.reasons, *unlike, *judgement.sentences),
             judgement.beware,
-            error_bars(
-                described, training, validation, result.halves.joint_relative_error_percent
-            ),
+            error_bars(described, training, validation, result.halves),
             ''.join(judgement.next_steps[:1]),
             origin.step,
         ),

@@ -38,19 +38,19 @@ def by_recording(fits: Sequence[Fit]) -> dict[str, list[Fit]]:
     return found
 
 
-def error_bars(robot: Robot, training: Fits, validation: Fits, halves: FloatArray) -> BarChart:
+def error_bars(robot: Robot, training: Fits, validation: Fits, halves: Score) -> BarChart:
     """
     Return the relative error of each joint, held-out and training, the worst joint first.
 
-    Without held-out recordings the errors between the halves of the data (n,) [%] are shown.
+    Without held-out recordings the errors between the halves of the data are shown.
 
     """
 
     def errors(fits: Fits) -> FloatArray:
-        every = [fit for part in fits.values() for fit in part]
-        return Score.of(every).joint_relative_error_percent
+        return Score.of([f for part in fits.values() for f in part]).joint_relative_error_percent
 
-    test, label = (errors(validation), 'held-out') if validation else (halves, 'cross-check')
+    test = errors(validation) if validation else halves.joint_relative_error_percent
+    label = 'held-out' if validation else 'cross-check'
     shown: list[tuple[Role, str, FloatArray]] = [
         ('after', label, test),
         ('faint', 'training', errors(training)),
