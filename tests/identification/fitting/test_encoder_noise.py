@@ -25,10 +25,10 @@ def motion(arm):
 def checked(arm, structure, motion, torque_noise, position_noise, seed=0):
     recording = recorded(arm, motion, seed, torque_noise, position_noise)
     result = identify(structure, [recording], SETTINGS, rng=np.random.default_rng(0))
-    return result, tested(result, recording, seed, 3)
+    return result, noise_check(result, recording, seed, 3)
 
 
-def tested(result, recording, seed, repeats):
+def noise_check(result, recording, seed, repeats):
     linear = result.passes == 1
     problem_of = partial(linear_problem, result.arm, result.base, used=result.used, linear=linear)
     fitted = result.estimate, result.settings.least_squares, [recording], result.used
@@ -83,5 +83,5 @@ def test_samples_that_are_missing_are_no_noise_of_encoders(arm, structure, motio
     recording = whole.select(np.delete(np.arange(len(whole)), lost))
     np.testing.assert_allclose(position_noise(recording), position_noise(whole), rtol=0.2)
     result = identify(structure, [recording], SETTINGS, rng=np.random.default_rng(0))
-    check = tested(result, recording, 0, 2)
+    check = noise_check(result, recording, 0, 2)
     assert check.harmless, check.findings()
