@@ -85,7 +85,7 @@ class Explanation:
 
     @property
     def refitted(self) -> bool:
-        """Whether the rigid body is refitted."""
+        """Whether the rigid body is refitted; False in a finished diagnosis, which states it."""
         return self.problem is not None and self.problem.refits_body
 
     def without(self, *names: int) -> Explanation:

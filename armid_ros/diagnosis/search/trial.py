@@ -1,6 +1,11 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""A cause with its evidence (trial, ranked), and the comparison of all causes (look)."""
+"""
+A cause with its evidence: ranked, with its columns, and as a trial, the record without data.
+
+A look is one comparison of all causes; it evaluates a ranked or another cause as a trial.
+
+"""
 
 from __future__ import annotations
 
