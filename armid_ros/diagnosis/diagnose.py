@@ -25,7 +25,7 @@ from armid_ros.diagnosis.search.explanation import Explanation, NOISE
 from armid_ros.diagnosis.search.spans import acting_spans, Span
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.diagnosis.ties import diagnose_ties
-from armid_ros.diagnosis.verdict.attribution import headline
+from armid_ros.diagnosis.verdict.attribution import Attribution, headline
 from armid_ros.diagnosis.verdict.bodies import as_placed_bodies
 from armid_ros.diagnosis.verdict.data_remarks import data_remarks
 from armid_ros.diagnosis.verdict.finding import Diagnosis, Finding
@@ -237,14 +237,7 @@ def _as_diagnosis(
     arm, settings, before = explainer.arm, explainer.settings, explainer.baseline
     explainer.tell(0.85, 'held-out gap')
     explanation, of_bodies = as_placed_bodies(explanation)
-    unseen = _held_out_evidence(explainer.unseen, explanation)
-    least = settings.thresholds.headline
-    every = 0.0 if explanation.measured or settings.everything else least
-    explanation, shares = headline(explanation, unseen, every, settings)
-    whole = shares.share(range(len(explanation.steps)))
-    if before is not None and explanation.untested and whole <= settings.thresholds.open_share:
-        nothing = explanation.with_nothing_named()
-        explanation, shares = headline(nothing, unseen, every, settings)
+    explanation, shares, unseen = _with_shares(explanation, explainer)
     both = (explanation.evidence, *(() if unseen is None else (unseen,)))
     excess = RemainingMisfit(explanation, both, before, arm, settings)
     evidence, patched = explanation.evidence, explanation.fitted.arm
@@ -272,6 +265,7 @@ def _as_diagnosis(
     new = np.max([np.zeros(arm.robot.n_joints), *(one.ratio for one in laws)], axis=0) > 1.0
     places = locate_gap(explanation, (unseen or evidence) if found else worst_data, settings, new)
     explainer.tell(1.0, word.word)
+    least = settings.thresholds.headline
     small = [one for one in found if settings.everything and one.share < least]
     remarks = _remarks(found, worse, explanation, word.word, doubt, explainer)
     return Diagnosis(
@@ -292,6 +286,38 @@ def _as_diagnosis(
         harmful=bool(found and worse),
         doubt=doubt,
     )
+
+
+def _with_shares(
+    explanation: Explanation, explainer: Explainer
+) -> tuple[Explanation, Attribution, Evidence | None]:
+    """
+    Measure the share of each cause, and move causes with a small share to the minor ones.
+
+    Returns
+    -------
+    explanation : Explanation
+        The explanation with the causes of the headline.
+    shares : Attribution
+        Their shares: of the held-out gap, or cross-validated without held-out data.
+    unseen : Evidence or None
+        The held-out recordings, weighted by the noise, or the misfit if larger.
+
+    """
+    settings, data, unseen = explainer.settings, explainer.unseen, None
+    if data:
+        noise = tuple(noise_floor(part, explanation.fitted.arm).sigma for part in data)
+        sigma = tuple(np.maximum(one, explanation.misfit) for one in noise)
+        unseen = Evidence(tuple(data), sigma, noise, explanation.evidence.varies)
+    every = explanation.measured or settings.everything
+    least = 0.0 if every else settings.thresholds.headline
+    explanation, shares = headline(explanation, unseen, least, settings)
+    untested = explainer.baseline is not None and bool(explanation.untested)
+    whole = shares.share(range(len(explanation.steps)))
+    if untested and whole <= settings.thresholds.open_share:
+        nothing = explanation.with_nothing_named()
+        explanation, shares = headline(nothing, unseen, least, settings)
+    return explanation, shares, unseen
 
 
 def _not_visible(
@@ -324,15 +350,6 @@ def _remarks(
     then = () if explainer.baseline is None else explainer.baseline.data
     of_data = data_remarks(found, explanation.fitted.arm, explainer.prepared.data, then)
     return [*(text for text, applies in remarks.items() if text and applies), *of_data]
-
-
-def _held_out_evidence(data: Sequence[Trajectory], explanation: Explanation) -> Evidence | None:
-    """Return the held-out recordings, weighted by the noise, or the misfit if larger."""
-    if not data:
-        return None
-    noise = [noise_floor(part, explanation.fitted.arm).sigma for part in data]
-    sigma = [np.maximum(one, explanation.misfit) for one in noise]
-    return Evidence(tuple(data), tuple(sigma), tuple(noise), explanation.evidence.varies)
 
 
 def _bad(
