@@ -49,23 +49,10 @@ def test_a_payload_is_named_with_its_mass(request, arm, friction):
 
 def load_on(joint, first_moments, rivals=()):
     """Return a cause: a payload of 0.7 kg on the link of a joint."""
+    cause = PayloadChange((joint,)), tuple(range(10))
     values = np.array([0.7, *first_moments, *(6 * [0.01])])
     each = np.full(10, 1e-3)
-    return Trial(
-        PayloadChange((joint,)),
-        tuple(range(10)),
-        values,
-        each,
-        each,
-        each,
-        1.0,
-        9.0,
-        9.0,
-        1.0,
-        1,
-        0.45,
-        rivals,
-    )
+    return Trial(*cause, values, each, each, each, 1.0, 9.0, 9.0, 1.0, 1, 0.45, rivals)
 
 
 @pytest.mark.parametrize(

@@ -89,9 +89,8 @@ def excess_of(bench, left, torque, informative):
         used=SimpleNamespace(cutoff_hz=5.0),
     )
     evidence = Evidence((part,), (np.full(2, 0.05),), (np.full(2, 0.05),))
-    return blocking_excess(
-        bench.arm, evidence, [np.column_stack([np.zeros(len(left)), left])], 3.0
-    )[1]
+    residual = np.column_stack([np.zeros(len(left)), left])
+    return blocking_excess(bench.arm, evidence, [residual], 3.0)[1]
 
 
 def test_waves_that_a_filter_makes_of_a_jerk_are_no_stop(bench):

@@ -29,10 +29,10 @@ def excess(bench, ratio, more=''):
     return Excess(np.ones(bench.robot.n_joints) * ratio, 'in the recordings', more)
 
 
-def verdict(bench, *findings, left=0.5, given_body=None, minor=()):
+def verdict(bench, *findings, left=0.5, given=None, minor=()):
     """Decide between a closed gap, by default, and an open one."""
-    given_body = None if given_body is None else excess(bench, given_body)
-    return decide(findings, (), [excess(bench, left)], bench.arm, FLOOR, given_body, minor)
+    given = None if given is None else excess(bench, given)
+    return decide(findings, (), [excess(bench, left)], bench.arm, FLOOR, given, minor)
 
 
 def finding(bench, share=0.3, name='encoder_offset', values=(0.1,), joints=('elbow',), **more):
@@ -43,20 +43,18 @@ def finding(bench, share=0.3, name='encoder_offset', values=(0.1,), joints=('elb
     return Finding(name, joints, *numbers, sign=effect.traits.sign, **more)
 
 
-@pytest.mark.parametrize(
-    ('given_body', 'fitted'), [(None, False), (0.8, False), ([0.8, 4.0], True)]
-)
-def test_a_body_that_has_to_be_fitted_is_stated(bench, given_body, fitted):
+@pytest.mark.parametrize(('given', 'fitted'), [(None, False), (0.8, False), ([0.8, 4.0], True)])
+def test_a_body_that_has_to_be_fitted_is_stated(bench, given, fitted):
     for named, word in (((), 'consistent'), ((finding(bench),), 'named')):
-        found = verdict(bench, *named, given_body=given_body)
+        found = verdict(bench, *named, given=given)
         assert found.word == word and FLOOR in found.summary
         assert ('fitted' in found.summary) == fitted
 
 
-@pytest.mark.parametrize('given_body', [None, 4.0])
+@pytest.mark.parametrize('given', [None, 4.0])
 @pytest.mark.parametrize(('share', 'mentioned'), [(0.45, True), (0.001, False)])
-def test_small_print_of_no_size_is_not_read_out(bench, given_body, share, mentioned):
-    text = verdict(bench, given_body=given_body, minor=[finding(bench, share)]).summary
+def test_small_print_of_no_size_is_not_read_out(bench, given, share, mentioned):
+    text = verdict(bench, given=given, minor=[finding(bench, share)]).summary
     assert ('encoder offset' in text) == ('45 %' in text) == mentioned
 
 
