@@ -177,7 +177,7 @@ def trajectories(
     result = []
     for fold, recording in enumerate(recordings):
         slowest = _REVERSAL_NOISE * velocity_error(recording, used)
-        motions = segments(recording, used)
+        motions = list(segments(recording, used))
         if not motions:
             check_stamps([recording], used)
             raise no_stretch(recording, used)
