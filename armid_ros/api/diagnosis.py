@@ -251,7 +251,7 @@ class DiagnosisResult(ShownModel):
             result = replace(result, forward=forward, notes=(*result.notes, *left_out, *why))
         progress(1.0, 'next run')
         rng = np.random.default_rng(seed)
-        run, why = _attempt('next run', lambda: next_run(self.core, rng))
+        run, why = _attempt('planned trajectory for this', lambda: next_run(self.core, rng))
         return replace(result, next_run=run, no_run='; '.join(why))
 
     def _steps(self, model: str) -> list[str]:

@@ -21,8 +21,7 @@ DASH = '\N{EN DASH}'
 _MAX_NUMBER = 1e12
 #: Terms with a tooltip.
 TERMS = {
-    'floor': 'Error that a perfect model would have: noise, or the error of the previous model.',
-    'gap': 'Squared torque error of the given model, each joint in units of its floor.',
+    'usual error': 'Error that a perfect model would have: noise, or the earlier error.',
     'held out': 'Not used to fit the model.',
     'condition number': 'Ratio of best to worst excitation of parameters; below 100 is good.',
 }
@@ -57,11 +56,14 @@ def with_interval(value: float, std: float, unit: str) -> str:
     return text
 
 
-def value_of(finding: Finding, parameter: ParameterName, value: float, std: float) -> str:
-    """Format a value of a cause with its 95 % interval, or "not determined"."""
+def value_of(
+    finding: Finding, parameter: ParameterName, value: float, std: float, had: float = 0.0
+) -> str:
+    """Format a value with its 95 % interval, after the value that it had; or 'not determined'."""
     if words.vague(finding, parameter, value, std):
         return 'not determined'
-    return with_interval(value, std, parameter.unit)
+    start = f'{measured(had, HALF_WIDTH * std)[0]} to ' if had else ''
+    return start + with_interval(had + value, std, parameter.unit)
 
 
 def _plus_minus(value: float, std: float, unit: str) -> str:

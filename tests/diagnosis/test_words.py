@@ -13,7 +13,7 @@ from armid_ros.diagnosis.verdict.words import (
     decide,
     percent,
     sentence,
-    share_in_words,
+    share_interval_in_words,
 )
 from armid_ros.effects import CATALOGUE
 from armid_ros.report.sections.diagnosed import named_section
@@ -67,7 +67,7 @@ def test_what_is_not_explained_has_the_cause_that_explains_most_of_it(bench):
 
 
 def test_a_share_has_two_digits_and_its_interval(bench):
-    assert all(fact in share_in_words(finding(bench)) for fact in ('30 %', '20 %', '40 %'))
+    assert all(fact in share_interval_in_words(finding(bench)) for fact in ('20 %', '40 %'))
     assert [percent(x) for x in (0.957, 0.004, 0.0, -1e-5)] == ['96 %', '0.4 %', '0 %', '0 %']
 
 
@@ -114,6 +114,28 @@ def test_a_rival_in_another_joint_is_stated_with_it(bench, rivals, stated):
     others = tuple(Rival(name, (joint,), 0.4) for name, joint in rivals)
     found = verdict(bench, finding(bench, 0.9, 'torque_offset', rivals=others))
     assert found.word == 'ambiguous' and stated in found.summary
+
+
+def test_a_changed_effect_has_its_old_and_its_new_value(bench):
+    friction = finding(bench, 1.0, 'coulomb_friction', (0.25,), added_to=(0.06,))
+    text = verdict(bench, friction).summary
+    assert text.startswith('Coulomb friction of elbow rose from 0.060 to 0.310 ± 0.020 N m')
+    assert named_section((friction,)).blocks[0].rows[0][-1] == '0.060 to 0.310 ± 0.020 N m'
+    assert 'fell from 0.310 to 0.060' in sentence(
+        replace(friction, values=(-0.25,), added_to=(0.31,))
+    )
+    assert 'from' not in sentence(replace(friction, added_to=(0.01,)))  # inside its interval
+
+
+def test_the_first_sentence_has_the_two_largest_causes(bench):
+    spring = finding(bench, 0.3, 'joint_spring', (1.5,))
+    doubtful = replace(spring, rivals=(Rival('torque_offset', ('elbow',), 0.1),), probability=0.8)
+    for second in (spring, doubtful):
+        first, *_ = verdict(bench, finding(bench, 0.7), second).summary.split('. ')
+        facts = 'Encoder offset', '70 %', 'joint spring', '30 %'
+        assert all(fact in first for fact in facts)
+    assert all(fact in first for fact in ('(probability 80 %)', '(10 %)', 'another cause (10 %)'))
+    assert 'torque offset of elbow' in first
 
 
 def test_the_same_body_on_another_link_is_no_ambiguity(bench):

@@ -57,7 +57,10 @@ def next_steps(
         head, _, what = steps[0].rpartition(':')
         steps[0] = f'{head} first:{what}'
     if verdict == 'bad_data':
-        steps.append('Correct the data, or the description, and diagnose again.')
+        steps.append(
+            'Check the recording with armid inspect. Correct it or the description, and '
+            'diagnose again.'
+        )
     if verdict in ('unknown', 'partial'):
         steps += [f'Unexplained at {w.joint}: {w.signature}.' for w in diagnosis.left]
         option = '' if learned else '--residual gp, which learns that torque as a map'

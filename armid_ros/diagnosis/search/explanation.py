@@ -22,7 +22,7 @@ import numpy as np
 
 #: Floors of a gap: noise, or the misfit of the model: estimated, of a baseline, or of model.yaml.
 NOISE, ESTIMATED = 'noise', 'an estimate of the error of such a model'
-OWN_MISFIT = 'the error of the model before'
+OWN_MISFIT = 'the error in the recordings from before'
 WRITTEN_MISFIT = 'the error of the model when it was identified'
 
 

@@ -20,6 +20,7 @@ from armid_ros.diagnosis.verdict.where import Where
 from armid_ros.effects import CATALOGUE, Effect
 from armid_ros.errors import IdentificationError
 from armid_ros.estimate import Estimate, name_in_words, ParameterName
+from armid_ros.identification.fitting.identifiability import HALF_WIDTH
 from armid_ros.motion import FloatArray
 from armid_ros.robots.ties import Tie
 import numpy as np
@@ -102,8 +103,10 @@ class Finding:
 
     @property
     def had(self) -> tuple[float, ...]:
-        """Return the value of the given model for each parameter; zero where none is known."""
-        return self.added_to or (0.0,) * len(self.values)
+        """Value of the given model for each parameter; 0 if unknown or inside its interval."""
+        known = self.added_to or (0.0,) * len(self.values)
+        pairs = zip(known, self.std, strict=True)
+        return tuple(value if abs(value) > HALF_WIDTH * std else 0.0 for value, std in pairs)
 
     @property
     def other_causes(self) -> tuple[Rival, ...]:

@@ -4,11 +4,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
 from armid_ros.arm import ArmModel
+from armid_ros.diagnosis.search.explanation import ESTIMATED, NOISE
 from armid_ros.diagnosis.verdict.finding import Finding, Gap, Rival
 from armid_ros.diagnosis.verdict.where import Excess
 from armid_ros.effects import CATALOGUE
@@ -20,6 +21,8 @@ import numpy as np
 Word = Literal[
     'consistent', 'named', 'ambiguous', 'partial', 'unknown', 'not_repeatable', 'bad_data'
 ]
+#: Reference of the shares of causes.
+DIFFERENCE = 'the difference between model and measurement'
 #: Largest number of joints in the list of a sentence; further joints are only counted.
 _MAX_JOINTS = 3
 
@@ -87,10 +90,10 @@ def decide(
         return Verdict('not_repeatable', text)
     error = f'the error of {arm.robot.joints[int(np.argmax(worst.ratio))]} {worst.where}'
     size = larger(np.sqrt(worst.ratio.max())) + f' expected from {floor}{worst.more}'
-    no_larger = f'is no larger than {floor}'
+    at_floor = f'is at the level of {floor}'
     refit = _refit(given_body, arm.robot, floor)
-    shown = bool(minor) and minor[0].share >= 0.01  # of the gap
-    small = sentence(minor[0], 'the gap' if open_gap else 'the remaining error') if shown else ''
+    shown = bool(minor) and minor[0].share >= 0.01
+    small = sentence(minor[0], DIFFERENCE if open_gap else 'the remaining error') if shown else ''
     if not findings:
         if open_gap:
             text = f'No effect in the catalogue explains {error}. It is {size}.'
@@ -101,23 +104,19 @@ def decide(
             largest = int(np.argmax(gap.after / np.maximum(gap.floor, 1e-12)))
             unit = arm.robot.torque_units[largest]
             number = f' ({gap.after[largest]:.2g} {unit} in {arm.robot.joints[largest]})'
-        text = f'The model explains the recordings: the remaining error{number} {no_larger}'
+        known = floor not in (NOISE, ESTIMATED) and not refit
+        text = 'Nothing changed: the model' if known else 'The model'
+        text += f' explains the recordings. The remaining error{number} {at_floor}'
         text += f', or too small to matter. {small}' if small else '.'
         return Verdict('consistent', f'{refit}{text}')
     causes = _sentences(findings)
-    rivals = ' '.join(
-        f'Either {_alternatives(one)}: these data cannot separate them.'
-        for one in findings
-        if one.other_causes
-    )
     if open_gap:
         if sum(group[0].share for group in by_cause(findings)) < 0.5:
             causes = causes.replace(' explains ', ' explains only ')
-        first = f'{causes} {rivals}'.rstrip()
-        return Verdict('partial', f'{first} {refit}There is more: {error} is {size}.')
-    if rivals:
-        return Verdict('ambiguous', f'{rivals} {causes} {refit}'.rstrip())
-    return Verdict('named', f'{causes} {refit}The remaining error {no_larger}.')
+        return Verdict('partial', f'{causes} {refit}There is more: {error} is {size}.')
+    if any(one.other_causes for one in findings):
+        return Verdict('ambiguous', f'{causes} {refit}'.rstrip())
+    return Verdict('named', f'{causes} {refit}The remaining error {at_floor}.')
 
 
 def _refit(given_body: Excess | None, robot: Robot, floor: str) -> str:
@@ -140,20 +139,16 @@ def larger(ratio: float) -> str:
     return f'{ratio:.0f} times as large as' if ratio >= 100.0 else f'{ratio:.1f} times as large as'
 
 
-def sentence(finding: Finding, of: str = 'the gap') -> str:
+def sentence(finding: Finding, of: str = DIFFERENCE) -> str:
     """Return a sentence: the cause and the share that it explains, by default of the gap."""
-    return f'{_subject(finding)} explains {percent(finding.share)} of {of}.'
+    text = f'{_subject(finding)} explains {percent(finding.share)} of {of}.'
+    return text[:1].upper() + text[1:]
 
 
 def share_interval_in_words(finding: Finding) -> str:
     """Return the 95 % interval of a share in brackets; empty if both ends are written alike."""
     low, high = (percent(end) for end in finding.share_interval)
     return f' ({low} to {high})' if low != high else ''
-
-
-def share_in_words(finding: Finding) -> str:
-    """Return the share of the gap that a cause explains, with its 95 % interval."""
-    return f'{percent(finding.share)} of the gap{share_interval_in_words(finding)}'
 
 
 def percent(share: float) -> str:
@@ -163,24 +158,33 @@ def percent(share: float) -> str:
 
 
 def _sentences(findings: Sequence[Finding]) -> str:
-    """Return a sentence for each cause; findings of one cause have one sentence."""
-    found: list[str] = []
+    """Return a sentence on the two largest causes, and sentences on further and assumed ones."""
+    clauses: list[str] = []
+    assumed: list[str] = []
     for group in by_cause(findings):
-        first, *others = (_subject(one) for one in group)
-        names = ' and '.join([first, *(text[0].lower() + text[1:] for text in others)])
-        explain = 'together explain' if others else 'explains'
-        found.append(f'{names} {explain} {percent(group[0].share)} of the gap.')
-        found += [
+        causes = ' and '.join(map(_subject, group))
+        explains = 'together explain' if len(group) > 1 else 'explains'
+        end = ''
+        if any(one.other_causes for one in group):
+            assumed.append(f'Assumed: {causes}.')
+            causes = f'either {" and ".join(map(_alternatives, group))}'
+            end = ': these data cannot separate them'
+        elif len(group) == 1 and _change(group[0]):
+            explains = 'and explains'
+        of = '' if clauses else f' of {DIFFERENCE}'
+        clauses.append(f'{causes} {explains} {percent(group[0].share)}{of}{end}')
+        assumed += [
             f'The link of {" or ".join(rival.joints)} may carry it instead: the torques are the '
             'same. The outer link is assumed.'
             for one in group
             for rival in one.rivals
             if rival.same_body
         ]
-    return ' '.join(found)
+    parts = ['; '.join(clauses[:2]), *clauses[2:]]
+    return ' '.join([*(f'{text[:1].upper()}{text[1:]}.' for text in parts), *assumed])
 
 
-def names_and_places(group: Sequence[Finding]) -> str:
+def names_and_places(group: Sequence[Finding | Rival]) -> str:
     """Return the names and joints of findings of one cause."""
     joints = dict.fromkeys(joint for one in group for joint in one.joints)
     names = ' and '.join(name_in_words(one.name) for one in group)
@@ -202,8 +206,7 @@ def by_cause(findings: Sequence[Finding]) -> list[list[Finding]]:
 
 def _subject(finding: Finding) -> str:
     """Return name, joints and values of a cause, as the subject of a sentence."""
-    words = name_in_words(finding.name)
-    subject = words[:1].upper() + words[1:]
+    subject = name_in_words(finding.name)
     places = [finding.place_of(joint) for joint in finding.joints]
     if finding.weighs:
         rows = zip(finding.parameters, finding.values, finding.std, strict=True)
@@ -214,35 +217,38 @@ def _subject(finding: Finding) -> str:
         return f'{subject} of {with_half_width(abs(mass), std)} kg on {places[0]}{gone}'
     if len(places) > _MAX_JOINTS:
         return f'{subject} in {len(places)} joints'
+    change, meant = _change(finding), finding.sign
+    if change:
+        return f'{subject} of {places[0]} {change}' + (f' ({meant})' if meant else '')
     where = f' in {", ".join(places)}' if places else ''
-    shown = [] if len(places) > 1 else list(_values(finding))
+    shown, before = [], ''
+    for row in _rows(finding) if len(places) < 2 else ():
+        name = '' if row[0].name == before else f'{row[0].words} '  # not repeated
+        shown.append(f'{name}{_with_degrees(*row)}')
+        before = row[0].name
     shown = [shown[0], f'and {len(shown) - 1} more'] if len(shown) > 2 else shown
-    meant = f': {finding.sign}' if finding.sign else ''
-    numbers = f' ({", ".join(shown)}{meant})' if shown else ''
+    numbers = f' ({", ".join(shown)}{": " if meant else ""}{meant})' if shown else ''
     return f'{subject}{where}{numbers}'
 
 
-def _values(finding: Finding) -> Iterator[str]:
-    """
-    Yield the formatted values of a cause; repeated parameter names are left out.
+def _change(finding: Finding) -> str:
+    """Return the change of an effect that the given model has in one joint, or ''."""
+    rows = _rows(finding)
+    if finding.weighs or len(finding.joints) != 1 or len(rows) != 1 or not rows[0][3]:
+        return ''
+    return f'{"rose" if rows[0][1] > 0.0 else "fell"} {_with_degrees(*rows[0])}'
 
-    Values whose interval includes zero are left out, unless all do. Values of the given model
-    that are smaller than the interval are left out as well.
+
+def _rows(finding: Finding) -> list[tuple[ParameterName, float, float, float]]:
+    """
+    Return parameter, value, standard deviation, and value in the given model, of a cause.
+
+    Values whose interval includes zero are left out, unless all do.
 
     """
-    before = ''
     rows = zip(finding.parameters, finding.values, finding.std, finding.had, strict=True)
     every = [row for row in rows if not vague(finding, *row[:3])]
-    not_zero = [row for row in every if excludes_zero(row[1], row[2])]
-    for p, value, std, had in not_zero or every:
-        name = '' if p.name == before else f'{p.words} '
-        added = f', added to {had:.4g}' if had and not abs(had) < HALF_WIDTH * std else ''
-        text = f'{with_half_width(value, std)} {p.unit}'.strip()
-        if p.unit == 'rad':
-            degrees, *_ = with_half_width(np.rad2deg(value), np.rad2deg(std)).split(' ')
-            text += f', {degrees} degrees'
-        yield f'{name}{text}{added}'
-        before = p.name
+    return [row for row in every if excludes_zero(row[1], row[2])] or every
 
 
 def vague(finding: Finding, parameter: ParameterName, value: float, std: float) -> bool:
@@ -254,16 +260,21 @@ def vague(finding: Finding, parameter: ParameterName, value: float, std: float) 
     return not np.isfinite(std)
 
 
+def _with_degrees(parameter: ParameterName, value: float, std: float, had: float) -> str:
+    """Format a value with its interval, after the value that it had; angles also in degrees."""
+    start = f'from {with_half_width(had, std).split(" ")[0]} to ' if had else ''
+    text = f'{start}{with_half_width(had + value, std)} {parameter.unit}'.strip()
+    degrees, *_ = with_half_width(np.rad2deg(had + value), np.rad2deg(std)).split(' ')
+    return f'{text}, {degrees} degrees' if parameter.unit == 'rad' else text
+
+
 def _alternatives(finding: Finding) -> str:
-    """List a name and its rivals with probabilities, and with joints if these differ."""
-    every = (Rival(finding.name, finding.joints, finding.probability), *finding.other_causes)
-    elsewhere = len({frozenset(one.joints) for one in every}) > 1
-    words = ' or '.join(
-        name_in_words(one.name)
-        + (f' of {", ".join(one.joints)}' if elsewhere and one.joints else '')
-        + f' ({percent(one.probability)})'
-        for one in every
-    )
+    """List a name and its rivals with joints and probabilities, which add up to one."""
+    every = [Rival(finding.name, finding.joints, finding.probability), *finding.other_causes]
+    rest = 1.0 - finding.probability - sum(rival.probability for rival in finding.rivals)
+    causes = [(names_and_places([one]), one.probability) for one in every]
+    causes += [('another cause', rest)] if finding.probability and rest >= 0.01 else []
+    words = ' or '.join(f'{cause} ({percent(share)})' for cause, share in causes)
     return words.replace('(', '(probability ', 1)
 
 
