@@ -9,11 +9,11 @@ from dataclasses import dataclass, field, replace
 import re
 from typing import ClassVar
 
-from armid_ros.diagnosis import Diagnosis, Finding
+from armid_ros.diagnosis import Diagnosis
 from armid_ros.diagnosis.data.trajectory import trajectories
 from armid_ros.diagnosis.verdict.document import detectable
 from armid_ros.diagnosis.verdict.finding import Gap, Overlay
-from armid_ros.diagnosis.verdict.words import by_cause, names_and_places, share_in_words
+from armid_ros.diagnosis.verdict.words import by_cause, names_and_places, share_interval_in_words
 from armid_ros.estimate import name_in_words
 from armid_ros.identification.assess.verification import ForwardValidation
 from armid_ros.identification.rows.signals import conditioning, SignalSettings
@@ -49,36 +49,30 @@ from armid_ros.report.sections.diagnosed import (
     gap_section,
     minor_section,
     named_section,
+    pattern_of,
     share_bars,
     share_of,
 )
 from armid_ros.report.sections.fit import forward_section, ZOOM
 import numpy as np
 
-#: Colour of each verdict; the others are bad.
-_TONES = {'consistent': 'good', 'named': 'good', 'ambiguous': 'fair', 'partial': 'fair'}
+#: Colour of each verdict; the others are bad. A named change needs attention.
+_TONES = {'consistent': 'good', 'named': 'fair', 'ambiguous': 'fair', 'partial': 'fair'}
 #: Largest number of joints with a gap that are listed one by one.
 _MAX_LISTED_JOINTS = 2
 
 
-def tone_of(diagnosis: Diagnosis, worse: Sequence[str] = ()) -> str:
-    """
-    Return the colour of a verdict.
-
-    A good verdict is only fair if the model is doubted or not patched with the named effects, if
-    a joint is not checked, or if some joints simulate worse than before.
-
-    """
+def tone_of(diagnosis: Diagnosis) -> str:
+    """Return the colour of a verdict; good only without doubt and with all joints checked."""
     tone = _TONES.get(diagnosis.verdict, 'bad')
-    open_ends = diagnosis.not_checked, diagnosis.doubt, diagnosis.harmful
-    return 'fair' if tone == 'good' and (any(open_ends) or worse) else tone
+    return 'fair' if tone == 'good' and (diagnosis.not_checked or diagnosis.doubt) else tone
 
 
 def cause_sentences(diagnosis: Diagnosis) -> list[str]:
     """Return sentences on the shares of the causes, and on minor effects."""
     shares = [
-        f'{names_and_places(group)}: {share_in_words(group[0])}'
-        + (', together' if len(group) > 1 else '')
+        f'{names_and_places(group)}: {percent(group[0].share)} of the difference'
+        f'{share_interval_in_words(group[0])}{", together" * (len(group) > 1)}'
         for group in by_cause(diagnosis.findings)
     ]
     minor = [
@@ -93,7 +87,7 @@ def cause_sentences(diagnosis: Diagnosis) -> list[str]:
 #: Uses of recordings, and the words for some of them.
 _ROLES = (
     ('training', 'recording', '{}'),
-    ('held-out', 'held-out recording', '{}'),
+    ('held-out', 'recording', '{} not used for the fit'),
     ('baseline', 'recording', '{} from before'),
     ('simulator', 'recording', '{} of a simulator'),
 )
@@ -170,7 +164,7 @@ def diagnosis_report(
             replace(pair, after=replace(pair.after, source=source))
             for pair, source in zip(forward, sources, strict=True)
         ]
-        sections.append(forward_section(arm.robot, pairs, ('as it was', 'patched')))
+        sections.append(forward_section(arm.robot, pairs, ('given model', 'patched model')))
     quality = [(one, role, ()) for one, role in recordings]
     at_fault = _at_fault(diagnosis, read, names)
     sections.append(data_quality_section(quality, at_fault=at_fault, names=names))
@@ -201,7 +195,6 @@ def _at_fault(
 def _verdict(
     diagnosis: Diagnosis, names: Mapping[str, str], worse: Sequence[str], step: str
 ) -> VerdictSection:
-    tone = tone_of(diagnosis, worse)
     notes = [
         with_names(f'{note[0].upper()}{note[1:].rstrip(".")}.', names) for note in diagnosis.notes
     ]
@@ -215,7 +208,9 @@ def _verdict(
     if diagnosis.gap is not None and diagnosis.verdict != 'bad_data':
         bars = share_bars(diagnosis) if diagnosis.findings else gap_bars(diagnosis, diagnosis.gap)
     sentences = [first + stop.rstrip(), *filter(None, [more])]
-    return VerdictSection(badge, tone, sentences, notes, bars, with_names(step, names))
+    return VerdictSection(
+        badge, tone_of(diagnosis), sentences, notes, bars, with_names(step, names)
+    )
 
 
 @dataclass(frozen=True)
@@ -240,16 +235,18 @@ class Story(Section):
 
     @property
     def drawing(self) -> ArmDrawing:
-        """Draw the arm in a recorded pose, with the joints of the largest cause coloured."""
+        """Draw the arm in a recorded pose, with the joints of the causes coloured."""
         data, robot = self.diagnosis.data, self.diagnosis.arm.robot
-        cause: list[Finding] = next(iter(by_cause(self.diagnosis.findings)), [])
-        names = ', '.join(name_in_words(one.name) for one in cause)
-        found = [place.joint for place in self.diagnosis.where]
-        named = {joint for one in cause for joint in one.joints}
-        joints = [joint for joint in robot.all_joints if joint in named] if cause else found[:1]
-        caption = f'coloured: {", ".join(joints)} ({names or "the largest gap"})'
-        if any(not one.joints for one in cause):
-            joints, caption = list(robot.joints), f'coloured: the whole arm ({names})'
+        causes = self.diagnosis.findings
+        largest = [place.joint for place in self.diagnosis.where[:1]]
+        named = {joint for one in causes for joint in one.joints or robot.joints}
+        joints = [joint for joint in robot.all_joints if joint in named] if causes else largest
+        places = [
+            f'{", ".join(one.joints) or "the whole arm"} ({name_in_words(one.name)})'
+            for one in causes
+        ]
+        places = places or [f'{joint} (the largest error)' for joint in largest]
+        caption = f'coloured: {", ".join(places)}'
         q = np.concatenate([part.at_rows.q for part in data]) if data else None
         return draw_arm(robot, joints, q, caption if joints else 'no joint stands out')
 
@@ -267,7 +264,7 @@ class Story(Section):
             ('When', spans),
             ('Where', self._where()),
             ('Patch', self._patch()),
-            ('Gap', self._gap()),
+            ('Error', self._errors()),
             ('Unexplained', unexplained if self.diagnosis.findings else []),
         ]
         return [(question, answer) for question, answer in answers if answer]
@@ -275,7 +272,8 @@ class Story(Section):
     def _where(self) -> list[str]:
         places, whole = self.diagnosis.where, share_of(self.diagnosis)
         lines = [
-            f'{place.joint}: {percent(place.share_of_gap)} of {whole}, {place.signature}'
+            f'{place.joint}: {percent(place.share_of_gap)} of {whole}, '
+            f'{pattern_of(self.diagnosis, place)}'
             for place in places[:_MAX_LISTED_JOINTS]
         ]
         if len(places) > _MAX_LISTED_JOINTS:
@@ -283,9 +281,9 @@ class Story(Section):
             others = ', '.join(place.joint for place in places[_MAX_LISTED_JOINTS:])
             lines.append(f'{others}: {percent(rest)}')
         if not lines and self.diagnosis.verdict != 'consistent':
-            return ['No joint is far above its floor.']
+            return ['No joint is far above its usual error.']
         unseen = self.diagnosis.not_checked
-        none = 'No joint that was checked has a gap.' if unseen else 'No joint has a gap.'
+        none = f'No joint{" that was checked" * bool(unseen)} exceeds its usual error.'
         return [*(lines or [none]), *([f'Not checked: {", ".join(unseen)}.'] if unseen else [])]
 
     def _patch(self) -> list[str]:
@@ -306,7 +304,7 @@ class Story(Section):
         more = ', with rigid body and friction refitted' * (diagnosis.refitted and patched)
         return [f'model.yaml is the model with {" and ".join(added)}{more}.', *explained]
 
-    def _gap(self) -> list[str]:
+    def _errors(self) -> list[str]:
         gap, robot = self.diagnosis.gap, self.diagnosis.arm.robot
         assert gap is not None
         j = int(np.argmax(gap.chi2_before))
@@ -314,11 +312,11 @@ class Story(Section):
             f'{digits(float(x[j]))} {robot.torque_units[j]}'
             for x in (gap.before, gap.after, gap.floor)
         )
-        where = 'on held-out recordings' if gap.predicted else f'on {gap.data}'
+        where = 'on recordings not used for the fit' if gap.predicted else f'on {gap.data}'
         change = f'{before} before, {after} after' if self.diagnosis.findings else after
         return [
             f'{robot.joints[j]}: {change}, {where}.',
-            f'The floor, {floor}, is {self.diagnosis.baseline}.',
+            f'Usual error: {floor} ({self.diagnosis.baseline}).',
             *(
                 f'{joint}: the map predicts {percent(gain)} of the residual without a known cause.'
                 for joint, gain in self.gains.items()
@@ -359,10 +357,11 @@ def overlay_section(diagnosis: Diagnosis, gap: Gap, names: Mapping[str, str]) ->
 
     def models(first: FloatArray, second: FloatArray) -> list[Series]:
         if not patched:
-            return [Series('model', second[kept], 'before')]
-        return [Series('before', first[kept], 'before'), Series('after', second[kept], 'after')]
+            return [Series('model', second[kept], 'after')]
+        given = Series('given model', first[kept], 'before')
+        return [given, Series('with the named cause', second[kept], 'after')]
 
-    dashes = ', dashes on it are the model after' * patched
+    dashes = ', dashes on it are the model with the named cause' * patched
     return ContentSection(
         'Measured and modelled',
         [
@@ -378,7 +377,7 @@ def overlay_section(diagnosis: Diagnosis, gap: Gap, names: Mapping[str, str]) ->
             Chart(
                 t[kept],
                 [
-                    Series('twice the floor', -band, 'floor', 'band', band),
+                    Series('twice the usual error', -band, 'floor', 'band', band),
                     *models(measured - before, measured - after),
                 ],
                 'time [s]',

@@ -156,13 +156,24 @@ class ForwardValidation:
 
     def sentence(self) -> str:
         """Return a sentence on the position errors of the simulations."""
-        before = '' if self.before is None else f'{self.before.worst} before, '
         comment = self.comment()
         return (
             f'simulated in closed loop along {np.ptp(self.after.motion.t):.0f} s of '
-            f'{self.after.source}: position error at most {before}{self.after.worst} after'
+            f'{self.after.source}: position error at most {self.errors()}'
             f'{"; " if comment else ""}{comment}'
         )
+
+    @property
+    def same(self) -> bool:
+        """Whether both models are the same, so that their errors are equal."""
+        before = self.before
+        return before is not None and np.array_equal(before.simulated, self.after.simulated)
+
+    def errors(self) -> str:
+        """Return the largest error of the model, or of both models."""
+        if self.before is None or self.same:
+            return self.after.worst
+        return f'{self.before.worst} before, {self.after.worst} after'
 
     @property
     def worse(self) -> tuple[str, ...]:

@@ -13,6 +13,7 @@ from armid_ros.diagnosis.search.patch import room
 from armid_ros.diagnosis.search.trial import Trial
 from armid_ros.diagnosis.verdict.document import Detectable
 from armid_ros.diagnosis.verdict.finding import Gap
+from armid_ros.diagnosis.verdict.where import Where
 from armid_ros.diagnosis.verdict.words import by_cause, share_interval_in_words
 from armid_ros.estimate import name_in_words
 from armid_ros.identification.fitting.identifiability import excludes_zero, HALF_WIDTH
@@ -51,7 +52,13 @@ _DETECTABLE = (
 
 def share_of(diagnosis: Diagnosis) -> str:
     """Return the reference of the shares of joints: the gap, or its explained part."""
-    return 'the explained part' if diagnosis.findings else 'the gap'
+    return 'the explained part' if diagnosis.findings else 'the difference'
+
+
+def pattern_of(diagnosis: Diagnosis, place: Where) -> str:
+    """Return the named effects of a joint, or otherwise the pattern of its residual."""
+    named = [name_in_words(one.name) for one in diagnosis.findings if place.joint in one.joints]
+    return ' and '.join(named) or place.signature
 
 
 def share_bars(diagnosis: Diagnosis) -> BarChart:
@@ -69,8 +76,8 @@ def share_bars(diagnosis: Diagnosis) -> BarChart:
     rows.append(('unexplained (noise included)', [Bar(rest, 'floor', percent(rest))]))
     # the gap is the sum of squares, each joint in units of its floor; noise is part of it
     held_out = diagnosis.gap is not None and diagnosis.gap.predicted
-    data = 'held-out recordings' if held_out else 'cross-validation'
-    legend = f'share of the gap explained ({data}; 95 % intervals)'
+    data = 'recordings not used for the fit' if held_out else 'cross-validation'
+    legend = f'share of the difference explained ({data}; 95 % intervals)'
     return BarChart(rows, [('after', legend)], full=1.0)
 
 
@@ -90,7 +97,9 @@ def named_rows(
     """
     rows = []
     for finding in findings:
-        values = list(zip(finding.parameters, finding.values, finding.std, strict=True))
+        values = list(
+            zip(finding.parameters, finding.values, finding.std, finding.had, strict=True)
+        )
         if certain:
             values = [row for row in values if excludes_zero(row[1], row[2])] or values
         rows += [
@@ -98,11 +107,11 @@ def named_rows(
                 name_in_words(finding.name),
                 name.words,
                 finding.place_of(name.joint) or 'whole arm',
-                value_of(finding, name, value, std),
+                value_of(finding, name, value, std, had),
             )
-            for name, value, std in values
+            for name, value, std, had in values
         ]
-        masses = [row[1] for row in values if row[0].unit == 'kg' and excludes_zero(*row[1:])]
+        masses = [row[1] for row in values if row[0].unit == 'kg' and excludes_zero(*row[1:3])]
         rows += [
             (
                 name_in_words(finding.name),
@@ -110,7 +119,7 @@ def named_rows(
                 finding.place_of(name.joint) or 'whole arm',
                 with_interval(value / masses[0], std / abs(masses[0]), 'm'),
             )
-            for name, value, std in values
+            for name, value, std, _ in values
             if finding.weighs and masses and name.unit == 'kg m' and not certain
         ]
     return rows
@@ -154,7 +163,7 @@ def evidence_section(diagnosis: Diagnosis) -> ContentSection:
         share = f'{100 * place.share_of_gap:.0f} % of {share_of(diagnosis)}'
         folds.append(
             Fold(
-                f'{place.joint}: {share}, {place.signature}',
+                f'{place.joint}: {share}, {pattern_of(diagnosis, place)}',
                 [*blocks, Panels(panels)],
                 opened=number == 0,
             )
@@ -174,7 +183,7 @@ def minor_section(diagnosis: Diagnosis, patched: bool) -> ContentSection:
         )
         for one in diagnosis.minor
     ]
-    share = 'Share of the gap' if diagnosis.findings else 'Share of the remaining error'
+    share = 'Share of the difference' if diagnosis.findings else 'Share of the remaining error'
     outside = '' if patched else ' None of them is in model.yaml.'
     return ContentSection(
         'Minor effects',
@@ -323,14 +332,14 @@ def _candidate_value(diagnosis: Diagnosis, trial: Trial) -> str:
 def gap_section(diagnosis: Diagnosis, gap: Gap) -> ContentSection:
     """Return the errors of each joint before and after, in units of its noise floor."""
     floor, harmful = diagnosis.baseline, bool(diagnosis.harmful)
-    where = 'recordings that were not used' if gap.predicted else gap.data
-    kept = ' "After" includes the named effect, which model.yaml does not have.' * harmful
+    where = 'recordings not used for the fit' if gap.predicted else gap.data
+    kept = ' The model in model.yaml does not have the named cause.' * harmful
     return ContentSection(
         'Gap',
         [
             Paragraph(
                 f'Root mean square error of each joint on {where}, the worst joint first. '
-                f"Each bar is in units of the joint's floor. The floor is {floor}.{kept}"
+                f'Each bar is in units of the usual error of the joint, which is {floor}.{kept}'
             ),
             gap_bars(diagnosis, gap),
         ],
@@ -341,12 +350,11 @@ def gap_bars(diagnosis: Diagnosis, gap: Gap) -> BarChart:
     """Return the errors of each joint over its floor, the largest first."""
     robot = diagnosis.arm.robot
     roles: list[tuple[Role, str, FloatArray]] = [
-        ('before', 'before', gap.before),
-        ('after', 'after', gap.after),
-        ('floor', 'floor', gap.floor),
+        ('before', 'given model', gap.before),
+        ('after', 'with the named cause' if diagnosis.findings else 'error', gap.after),
+        ('floor', 'usual error', gap.floor),
     ]
-    if not diagnosis.findings:
-        roles = [('before', 'error', gap.after), roles[-1]]
+    roles = roles if diagnosis.findings else roles[1:]
     rows, first = [], roles[0][2]
     for joint in np.argsort(-first / np.maximum(gap.floor, 1e-12)):
         name = robot.joints[joint]
