@@ -16,6 +16,7 @@ from armid_ros.api.arguments import (
     Rng,
     robot_of,
     RobotLike,
+    source_of,
     topics_of,
     USUAL,
 )
@@ -47,6 +48,7 @@ from armid_ros.report.inspection_report import (
     link_rows,
     recording_facts,
 )
+from armid_ros.report.notation import robot_label
 from armid_ros.report.provenance import DEFAULT_ORIGIN, ResultOrigin
 from armid_ros.robots import Robot
 import numpy as np
@@ -104,9 +106,9 @@ class InspectionResult(Shown):
     def summary(self) -> Summary:
         """Return verdict, table of joints, remarks and sampling."""
         heads, found = joint_heads(self.core), self.core
-        refused, trial = bool(found.trial and found.trial.refused), found.trial
-        good = trial and not refused and trial.grade != 'unusable'
-        again = 'inspect' if found.robot is None else 'check'
+        trial = found.trial
+        good = trial is not None and not trial.refused and trial.grade != 'unusable'
+        fix = 'Correct these faults or record again, and inspect the new recording.'
         topics = [
             f'{one.name}: {one.count} x {one.type_name}'
             + ' (read)' * (one.name == found.recording.topic)
@@ -122,8 +124,8 @@ class InspectionResult(Shown):
                 *(f'{name}: {value}' for name, value in recording_facts(found)),
                 *topics,
             ),
-            steps=['Correct these faults, and inspect the recording again.'] if refused else (),
-            then='' if refused else 'identify' if good else again,
+            steps=[] if good or trial is None else [fix],
+            then='identify' if good else 'inspect' if found.robot is None else '',
         )
 
 
@@ -251,13 +253,18 @@ class CheckResult(Shown):
             else [(links.links[k], *row[1:5][columns]) for k, row in enumerate(link_rows(links))]
         )
         first, *others = headline(self.remarks, links)
-        lines = [*others, *(one.text for one in self.remarks)]
+        lines = [*others, *(one.text for one in self.remarks if one.weight == 'note')]
         heads = (HEADS[0], *HEADS[1:5][columns]) if rows else ()
         then = 'excite' if links is None else 'inspect' if links.fault else 'identify'
-        if any(one.weight == 'bad' for one in self.remarks):
-            then = 'check'
+        steps, source = [], robot_label(source_of(self.robot))
+        impossible = [one.text.split(':')[0] for one in self.remarks if one.weight == 'bad']
+        if impossible:
+            where = ', '.join(dict.fromkeys(impossible))
+            steps, then = [f'Correct {where} in {source}, and check it again.'], ''
+            if links is None:
+                steps.append(f'Then check the masses with a recording: armid check {source} BAG.')
         word = check_word(self.remarks, links)
-        return Summary(first, word, heads, rows, lines, then=then)
+        return Summary(first, word, heads, rows, lines, steps, then)
 
 
 def check(

@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -24,7 +23,7 @@ from armid_ros.report.blocks import (
     VerdictSection,
 )
 from armid_ros.report.charts import Chart, Series, thinned
-from armid_ros.report.notation import counted, digits, plain, robot_label
+from armid_ros.report.notation import counted, digits, plain, pretty, robot_label
 from armid_ros.report.page import Page, Section, Templated
 from armid_ros.report.provenance import DEFAULT_ORIGIN, ResultOrigin
 import numpy as np
@@ -66,7 +65,7 @@ def inspection_report(found: Inspection, origin: ResultOrigin = DEFAULT_ORIGIN) 
     first = 1 if grade == 'ready' else 2
     texts = [remark.text for remark in found.remarks]
     texts.insert(first - 1, found.verdict)  # not worse than the worst remark
-    sentences = [_ended(text[0].upper() + text[1:].replace('`', '')) for text in texts]
+    sentences = [_sentence(text.replace('`', '')) for text in texts]
     sections: list[Section] = [
         VerdictSection(
             grade, _TONES[grade], sentences[:first], sentences[first:], step=origin.step
@@ -100,21 +99,18 @@ def check_word(remarks: Sequence[Remark], found: LinkCheck | None) -> str:
 
 
 def headline(remarks: Sequence[Remark], found: LinkCheck | None) -> tuple[str, ...]:
-    """Return the finding in one sentence, then its numbers."""
-    count = Counter(one.weight for one in remarks)
-    values = 'No impossible or suspicious value in the description.'
-    if count['doubt']:
-        values = f'Suspicious in the description: {counted(count["doubt"], "value")}.'
-    if count['bad']:
-        values = f'Impossible in the description: {counted(count["bad"], "value")}.'
+    """Return the finding in one sentence, then its numbers and further suspicious values."""
+    suspicious = [pretty(_sentence(one.text)) for one in remarks if one.weight != 'note']
+    impossible = [one for one in remarks if one.weight == 'bad']
+    values = suspicious or ['No impossible or suspicious value in the description.']
     if found is None:
-        return values, 'Add a recording to check the masses.'
+        return (*values, *([] if impossible else ['Add a recording to check the masses.']))
     errors = (
         f'Torque error: {digits(found.error_percent)} % with the links of the URDF, '
         f'{digits(found.fitted_error_percent)} % with fitted links.'
     )
     if found.fault:
-        first = f'The recording cannot check the links: {_ended(found.fault)}'
+        first = f'The recording cannot check the links: {_sentence(found.fault)}'
     elif found.agrees:
         first = 'The links of the URDF agree with the recording.'
     elif found.explained < 0.9:  # with a smaller share, links are not the cause
@@ -126,12 +122,13 @@ def headline(remarks: Sequence[Remark], found: LinkCheck | None) -> tuple[str, .
             known.append(f'has a wrong mass distribution at {" and ".join(others)}')
         rivals = ''.join(f' or {found.joints[k]}' for k in found.rivals)
         first = f'The URDF {" and ".join(known)}{rivals}, if the other links are right.'
-    if found.wrong and not (count['doubt'] or count['bad']):
+    if found.wrong and not suspicious:
         return first, errors
-    return first, errors, values
+    return (*values, first, errors) if impossible else (first, errors, *values)
 
 
-def _ended(text: str) -> str:
+def _sentence(text: str) -> str:
+    text = text[:1].upper() + text[1:]
     return text if text.endswith('?') else f'{text.rstrip(".")}.'
 
 
@@ -174,16 +171,16 @@ def description_check_report(
 ) -> str:
     """Return the page of a check, one HTML file that loads nothing."""
     first, *others = headline(remarks, links)
-    grade, texts = check_word(remarks, links), [one.text for one in remarks]
-    bars = None
+    grade, bars = check_word(remarks, links), None
+    notes = [_sentence(one.text) for one in remarks if one.weight == 'note']
     if links is not None and not links.fault:
-        others = others[1:]  # the torque errors are bars
+        others = [text for text in others if not text.startswith('Torque error')]  # bars
         errors = links.error_percent, links.fitted_error_percent
         before, after = (Bar(error, 'after', f'{digits(error)} %') for error in errors)
         rows = [('with the links of the URDF', [before]), ('with fitted links', [after])]
         bars = BarChart(rows, [('after', 'torque error, rms')])
     sections: list[Section] = [
-        VerdictSection(grade, _TONES[grade], [first, *others], texts, bars, origin.step)
+        VerdictSection(grade, _TONES[grade], [first, *others], notes, bars, origin.step)
     ]
     if links is not None:
         hint = (
@@ -236,7 +233,7 @@ def _contents_section(found: Inspection) -> ContentSection:
             for topic in found.topics
         ]
         heads = ('Topic', 'Messages', 'Type', 'Joints')
-        blocks.insert(0, DataTable(heads, rows, (0, 2, 3)))
+        blocks.insert(0, DataTable(heads, rows, (0, 2, 3), 'tight'))
     return ContentSection('What is in it', blocks)
 
 

@@ -44,7 +44,9 @@ class Inertial:
         if self.mass < 0.0 or moments[0] < -tolerance:
             return f'negative mass or inertia (m = {self.mass:g} kg, moments {said} kg m^2)'
         if moments[0] + moments[1] < moments[2] - tolerance:
-            return f'principal moments {said} kg m^2 violate the triangle inequality'
+            sum_in_words = said.replace(', ', ' + ', 1).replace(', ', ' < ')
+            why = 'the principal moments violate the triangle inequality'
+            return f'impossible inertia, {sum_in_words} kg m^2: {why}'
         if self.mass == 0.0 and moments[2] > 0.0:  # noqa: RUF069 - as described
             return f'an inertia without a mass (moments {said} kg m^2)'
         return None

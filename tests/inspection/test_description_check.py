@@ -65,6 +65,10 @@ def test_an_impossible_value_is_found(text, weight, fact):
     found = ar.check(ar.load_robot(text))
     assert any(one.weight == weight and fact in one.text for one in found.remarks)
     assert found.wrong == (weight == 'bad')
+    shown = found.summary()
+    assert found.wrong == bool(shown.steps) == (shown.then == '')
+    assert not found.wrong or found.remarks[0].text.split(':')[0] in shown.steps[0]
+    assert found.remarks[0].weight == 'note' or found.remarks[0].text[1:12] in found.finding
 
 
 def run(effects, seed=0):
