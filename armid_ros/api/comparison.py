@@ -18,6 +18,7 @@ from armid_ros.report.compare_report import (
     change_sentences,
     compare_report,
     HEADS,
+    next_step,
     verdict,
 )
 from armid_ros.report.provenance import DEFAULT_ORIGIN, ResultOrigin
@@ -71,15 +72,16 @@ class ComparisonResult(Shown):
 
     def page(self, origin: ResultOrigin = DEFAULT_ORIGIN) -> str:
         """Return report.html."""
-        return compare_report(self.core, self.stated(origin))
+        return compare_report(self.core, origin)
 
     def summary(self) -> Summary:
         """Return the changes, most significant first."""
         rows = change_rows(self.core)
         first, *more = change_sentences(self.core)
-        then = 'diagnose' if self.anything else 'identify'
+        then = 'diagnose' if self.anything or self.core.unusable else 'identify'
         heads = HEADS if rows else ()
-        return Summary(first, verdict(self.core)[0], heads, rows, lines=more, then=then)
+        steps = [next_step(self.core)]
+        return Summary(first, verdict(self.core)[0], heads, rows, more, steps, then)
 
 
 def compare(

@@ -65,7 +65,8 @@ def compare_report(comparison: Comparison, origin: ResultOrigin) -> str:
             *verdict(comparison),
             change_sentences(comparison),
             _beware(comparison),
-            step=origin.step,
+            step=next_step(comparison),
+            command=origin.step,
         ),
         *([ContentSection('What changed', [DataTable(HEADS, rows, kind='both')])] if rows else []),
         changes_section(comparison),
@@ -88,6 +89,15 @@ def verdict(comparison: Comparison) -> tuple[str, str]:
     if comparison.not_compared:
         return 'unchanged in part', 'fair'
     return 'unchanged', 'good'
+
+
+def next_step(comparison: Comparison) -> str:
+    """Return the next step, which a command follows."""
+    if comparison.unusable:
+        return 'Find the effect that the unusable model lacks, before you compare.'
+    if comparison.anything:
+        return 'If you did not expect this change, find its cause in the later recordings.'
+    return 'Identify from all recordings together, for smaller intervals.'
 
 
 def change_rows(comparison: Comparison) -> list[tuple[str, ...]]:
@@ -129,6 +139,8 @@ def change_sentences(comparison: Comparison) -> tuple[str, ...]:
         return tuple(lines)
     if comparison.load is not None:
         lines += _load(comparison, comparison.load)
+    else:
+        lines += [_change(change) for change in comparison.changed[:1]]
     lines += [_count_sentence(comparison), *_residuals(comparison), *_not_compared(comparison)]
     changed = comparison.changed
     for group in comparison.changed_together:
@@ -148,6 +160,16 @@ def change_sentences(comparison: Comparison) -> tuple[str, ...]:
     return tuple(lines)
 
 
+def _change(change: ParameterChange) -> str:
+    """Return a sentence on the change of a parameter, with the 95 % interval of the change."""
+    ends = [measured(x, HALF_WIDTH * change.std) for x in (change.before, change.after)]
+    verb, label = 'rose' if change.difference > 0.0 else 'fell', full_label(change.parameter)
+    unit = pretty(change.parameter.unit)
+    return (
+        f'{label[:1].upper()}{label[1:]} {verb} from {ends[0][0]} to {" ± ".join(ends[1])} {unit}.'
+    )
+
+
 def _count_sentence(comparison: Comparison) -> str:
     """Return a sentence on the number of changed parameters."""
     changed, others = comparison.changed, len(comparison.not_compared)
@@ -156,6 +178,8 @@ def _count_sentence(comparison: Comparison) -> str:
     if changed or comparison.changed_together:
         joints = ', '.join(dict.fromkeys(c.parameter.joint for c in changed if c.parameter.joint))
         where = f', at {joints}' if joints else ''
+        if comparison.load is not None and all(c.parameter.rigid for c in changed):
+            return f'These {len(changed)} of {count} follow from it{where}{also}.'
         return f'{len(changed)} of {count} changed beyond uncertainty{where}{also}.'
     but = ''
     if comparison.unusable:
