@@ -231,7 +231,7 @@ class ExcitationResult(Shown):
 
     def summary(self) -> Summary:
         """Return the identifiable parameters, and the share of its limits that each joint uses."""
-        shares = self.core.limits_used(self.arm)
+        shares = self.core.robot_limits_used(self.arm)
         rows = [
             (joint, *(f'{100 * share[k]:.0f} %' for share in shares.values()))
             for k, joint in enumerate(self.arm.robot.joints)

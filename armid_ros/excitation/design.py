@@ -77,6 +77,11 @@ class Design:
     settings: DesignSettings
     stopped: str = ''
 
+    def robot_limits_used(self, arm: ArmModel) -> dict[str, FloatArray]:
+        """Return the used share of the limits of the robot, without the reserves of the design."""
+        whole = replace(self, limits=Limits.of(arm.robot, speed=1.0, reserve=False))
+        return whole.limits_used(arm)
+
     def limits_used(self, arm: ArmModel) -> dict[str, FloatArray]:
         """
         Return the used share of every limit; the transfers are not included.

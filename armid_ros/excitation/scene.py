@@ -138,15 +138,18 @@ class CollisionScene:
         if bare:
             found.append(f'bodies of {_listed(bare)} (no collision body; joint origins only)')
         if self.collision.touching:
-            pairs = [f'{first} and {second}' for first, second in self.collision.touching]
-            found.append(f'the clearance of {_listed(pairs)} (touch at zero, no SRDF)')
+            pairs = [f'{first} - {second}' for first, second in self.collision.touching]
+            listed = _listed(pairs, '; ')
+            found.append(
+                f'collision of {listed} (they touch in the zero pose, and there is no SRDF)'
+            )
         return found
 
 
-def _listed(names: Sequence[str]) -> str:
+def _listed(names: Sequence[str], separator: str = ', ') -> str:
     most = 4
     more = len(names) - most
-    text = ', '.join(names[:most])
+    text = separator.join(names[:most])
     return f'{text} and {more} more' if more > 0 else text
 
 
@@ -201,7 +204,7 @@ class Fitness:
             return 'Do not run it. Design it with another --start or --seed, or more --clearance.'
         items = ' '.join(self.unchecked)
         needed = ', '.join(what for words, what in _REMEDIES.items() if words in items)
-        return f'Give {needed}, or check that yourself before the arm moves.' if needed else ''
+        return f'Give {needed}, or check these items yourself before the run.' if needed else ''
 
     def __str__(self) -> str:
         """Return a sentence on the results and on the unchecked items."""

@@ -94,7 +94,7 @@ def excitation_report(
     motion = run.at(np.linspace(0.0, run.duration, 600))
     collision, obstacles = scene.collision, scene.obstacles
     motion = replace(motion, tau=arm.joint_torque(motion))
-    shares = design.limits_used(arm)
+    shares = design.robot_limits_used(arm)
     bodies = {'links from each other': collision}
     if obstacles:
         bodies['arm from its environment'] = obstacles_alone(collision, obstacles)
@@ -159,7 +159,9 @@ def _verdict(
         for joint, (share, quantity) in zip(joints, used, strict=True)
     ]
     rows.sort(key=lambda row: -row[1][0].value)
-    bars = BarChart(rows, [('after', 'largest share of a limit that the joint uses')], full=1.0)
+    bars = BarChart(
+        rows, [('after', 'largest share of a limit of the robot that the joint uses')], full=1.0
+    )
     first, *others = checked.sentences()
     sentences = [first, *others, ' '.join(identifiable(design, links))]
     if unseen:
@@ -293,12 +295,12 @@ def _motion_section(
         'Motion and limits',
         [
             Paragraph(
-                'Largest share of each limit that the excitation uses. For positions it is '
-                'measured from the middle of the range. Approach and return may use the whole '
-                'range.'
+                'Largest share of each limit of the robot that the excitation uses. For positions '
+                'it is measured from the middle of the range. Approach and return may use the '
+                'whole range.'
             ),
             DataTable(('Joint', *shares), rows, kind='tight'),
-            Paragraph(f'Horizontal lines are the limits. {ZOOM}', 'hint'),
+            Paragraph(f'Horizontal lines are the limits of the design. {ZOOM}', 'hint'),
             Panels(panels),
         ],
     )
