@@ -89,7 +89,7 @@ def _arm_page(found: Watch, arm: WatchedArm, diagnoses: Diagnoses) -> str:
     texts = [pretty(row['text']) for row in change_rows(arm)]
     diagnosis = diagnoses.get(arm.arm)
     diagnosed = _diagnosed(arm, diagnosis)
-    tone = {'changed': 'bad', 'healthy': 'fair' if diagnosed else 'good'}.get(arm.health, 'fair')
+    tone = 'good' if arm.health == 'healthy' and not diagnosed else 'fair'
     quiet = 'No parameter has changed by more than noise and the scatter between bags.'
     if diagnosis is not None and diagnosed:
         quiet = pretty(diagnosis['summary'])
@@ -123,8 +123,8 @@ def _arm_page(found: Watch, arm: WatchedArm, diagnoses: Diagnoses) -> str:
         line = f'{counted(len(rest), "parameter")} without a change'
         curves.append(Fold(line, [SmallMultiples(rest)]))
     sections.append(ContentSection('Parameters over time', [Paragraph(said, 'hint'), *curves]))
-    rows = []
-    for row in arm.wear:
+    rows, steps = [], {one.series.parameter for one in arm.named if one.kind == 'step'}
+    for row in (one for one in arm.wear if (one['name'], one['joint']) not in steps):
         std = (row['upper'] - row['lower']) / (2.0 * HALF_WIDTH)
         unit = f'{row["unit"]} a month'
         rows.append(
@@ -135,7 +135,7 @@ def _arm_page(found: Watch, arm: WatchedArm, diagnoses: Diagnoses) -> str:
         )
     hint = (
         'Slope of a straight line through all bags with its 95 % interval, fitted separately. '
-        'An interval that includes 0 shows no wear.'
+        'An interval that includes 0 shows no wear. Parameters with a sudden change have no trend.'
     )
     sections += [
         _table('Wear', ('Parameter', 'Trend'), rows, (1,), hint),
@@ -197,7 +197,7 @@ def _explained(found: Watch, diagnoses: Diagnoses) -> list[str]:
             lead = pretty(diagnosis['summary']).partition('. ')[0].rstrip('.')
             day = change_rows(arm)[0]['first_day']
             since = f', since {day}' if arm.named[0].kind == 'step' else ''
-            sentences.append(f'{arm.arm}: {lead}{since}.')
+            sentences.append(f'{arm.arm}{since}: {lead}.')
     return sentences[:3]
 
 

@@ -282,15 +282,22 @@ def sentence(change: HistoryChange) -> str:
         reach = HALF_WIDTH * change.std
         factor, lower, upper = np.exp(change.size + np.array([0.0, -reach, reach]))
         by = f'by a factor of {factor:.3g} ({lower:.3g} to {upper:.3g})'
+        stepped = f'changed {by}'
     else:
         size, half = measured(change.size, HALF_WIDTH * change.std)
         sign = '+' * (change.size > 0.0)
         by = f'by {sign}{size} ± {half} {series.unit}'.rstrip()
+        old, new = (
+            measured(change.level + size, HALF_WIDTH * change.std)[0]
+            for size in (0.0, change.size)
+        )
+        verb = 'rose' if change.size > 0.0 else 'fell'
+        stepped = f'{verb} from {old} to {new} ± {half} {series.unit}'.rstrip()
     if change.kind == 'trend':
         return f'{what} drifts {by} a month since {day_text(float(series.days[0]))}'
     last, first = (day_text(float(series.days[k])) for k in (change.index - 1, change.index))
     when = f'on {first}' if last == first else f'between {last} and {first}'
-    return f'{what} changed {by} {when}'
+    return f'{what} {stepped} {when}'
 
 
 def day_text(days: float) -> str:
