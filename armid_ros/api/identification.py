@@ -54,7 +54,7 @@ from armid_ros.identification.rows.temperature import friction_per_kelvin
 from armid_ros.recording import Recording, require_once
 from armid_ros.recording.curves import draw_joints
 from armid_ros.report.identification_report import Assessment, identification_report
-from armid_ros.report.judgement import judge, residual_trends
+from armid_ros.report.judgement import judge, residual_trends, USE
 from armid_ros.report.notation import counted, digits, plain, pretty
 from armid_ros.report.parameter_tables import estimate_text, full_label, joint_columns
 from armid_ros.report.provenance import DEFAULT_ORIGIN, ResultOrigin
@@ -266,13 +266,11 @@ class IdentificationResult(ShownModel):
             count += f'; {unseen} more cannot be identified from this motion'
         read = [*self.recordings, *self.held_out]
         damaged = [one for one in read if one.report.unwrapped or not one.report.unharmed]
-        steps = judge(core, self.validation, read, self.verification).next_steps
-        then = 'inspect'
-        if self.grade != 'unusable':  # a good model is saved with its links
-            named = (
-                name for name in ('diagnose', 'excite') if f'armid {name}' in ''.join(steps[:1])
-            )
-            then = next(named, 'check')
+        unusable = self.grade == 'unusable'
+        steps = judge(core, self.validation, read, self.verification, unusable).next_steps
+        commands = 'inspect', 'diagnose', 'excite'
+        named = (name for name in commands if f'armid {name}' in ''.join(steps[:1]))
+        then = 'simulate' if USE in steps else next(named, '')
         bodies = []
         if core.bodies_cost is not None:
             grows = f'(torque error {100.0 * max(core.bodies_cost, 0.0):.2g} % larger)'

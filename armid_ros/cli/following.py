@@ -88,9 +88,9 @@ def _subject(
         return result.core.after.robot, list(dict.fromkeys(bags)) or [Path('BAG')], more
     if isinstance(result, ExcitationResult):
         more = ['--trajectory', out / 'excitation.yaml']
-    elif isinstance(result, DiagnosisResult) and then == 'simulate':
+    elif then == 'simulate':
         more = ['--model', out / 'model.yaml']
-        if result.next_run is not None:
+        if isinstance(result, DiagnosisResult) and result.next_run is not None:
             more += ['--trajectory', out / result.plan_file]
     elif then == 'diagnose':
         held_out = chain(*(('--validate', bag) for bag in given['validate']))

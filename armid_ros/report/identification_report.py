@@ -122,7 +122,8 @@ def identification_report(
     shown = held_out or list(result.training)
     if grade is None:
         grade = graded(result, description, recordings, validation, validation_recordings)
-    judgement = judge(result, validation, [*recordings, *validation_recordings], verification)
+    every = [*recordings, *validation_recordings]
+    judgement = judge(result, validation, every, verification, grade.word == 'unusable')
     is_urdf = assessment.reference == 'description'
     unlike = _contradictions(result, description) if is_urdf else []
     read = [
@@ -161,7 +162,7 @@ def identification_report(
     ]
     subtitle = f'{robot_label(origin.robot)} · {counted(len(training), "training recording")}'
     if validation:
-        subtitle += f' · {counted(len(validation), "held-out recording")}'
+        subtitle += f' · {counted(len(validation), "recording")} not used for the fit'
     names = (*described.joints, *described.links)
     return Page(f'Identification of {described.name}', subtitle, sections, names=names).html()
 
@@ -270,7 +271,7 @@ def _physical_section(
         'Mass [kg]',
         'Eigenvalues of the pseudo-inertia',
         'Principal moments [kg m²]',
-        'Smallest share of prior',
+        'Smallest eigenvalue over its prior',
         'Constraint',
     )
     activity = [(line[:1].upper() + line[1:], '') for line in certificate.activity]

@@ -22,6 +22,8 @@ import numpy as np
 GOOD_CONDITION, WEAK_CONDITION = 100.0, 1000.0
 
 
+#: Next step with a good model.
+USE = 'Use model.yaml for simulation and control, in the range of the recorded motions.'
 #: A limitation and its remedy; one of them may be empty.
 Caution = tuple[str, str]
 
@@ -52,6 +54,7 @@ def judge(
     validation: Mapping[str, Sequence[Fit]],
     recordings: Sequence[Recording],
     verification: Verification | None = None,
+    unusable: bool = False,
 ) -> Judgement:
     """
     Judge an identification.
@@ -66,11 +69,15 @@ def judge(
         Recordings, for the damage that their reader reports.
     verification : Verification, optional
         Test for encoder noise, and simulations.
+    unusable : bool
+        Whether the grade is unusable.
 
     """
     training = Score.of(result.training)
     fits = [fit for part in validation.values() for fit in part]
     held_out = Score.of(fits) if fits else None
+    worst = float(training.joint_relative_error_percent.max())
+    misfits = unusable and worst > LIMITS.unusable  # more data do not help
     # only active constraints and notes of a physical certificate
     known = set()
     if result.physical is not None:
@@ -82,14 +89,14 @@ def judge(
             for recording in recordings
             if not recording.report.unharmed
         ),
-        *_of_errors(result, training, held_out),
+        *_of_errors(result, training, held_out, misfits),
         *_of_residuals(result, fits or result.training),
-        *([] if verification is None else _of_verification(verification)),
+        *([] if verification is None else _of_verification(verification, misfits)),
         *((note[0].upper() + note[1:] + '.', '') for note in result.notes if note not in known),
     ]
     steps = [step for _, step in findings if step]
     if held_out is not None and not steps:
-        steps = ['The model can be used within the range of the held-out data.']
+        steps = [USE]
     return Judgement(
         sentences=tuple(_sentences(result, verification)),
         beware=tuple(text for text, _ in findings if text),
@@ -113,7 +120,7 @@ def _sentences(result: Identification, verification: Verification | None) -> Ite
     )
     if verification is not None and verification.forward:
         worst = max(verification.forward, key=lambda pair: float(pair.after.position_error.max()))
-        before = '' if worst.before is None else f'; with the description, {worst.before.worst}'
+        before = '' if worst.before is None else f' (links as described: {worst.before.worst})'
         yield (
             f'Driven by the recorded torques, its position error is at most {worst.after.worst} '
             f'rms{before}.'
@@ -121,10 +128,16 @@ def _sentences(result: Identification, verification: Verification | None) -> Ite
 
 
 def _of_errors(
-    result: Identification, training: Score, held_out: Score | None
+    result: Identification, training: Score, held_out: Score | None, misfits: bool
 ) -> Iterator[Caution]:
     """Yield sentences on the errors of training and held-out data."""
-    if held_out is None:
+    if misfits:
+        yield (
+            '',
+            'Check names, signs and units of the joints with armid inspect. If they are right, '
+            'the model lacks an effect.',
+        )
+    elif held_out is None:
         yield '', 'Record another motion of armid excite, and test the model on it: --validate.'
     else:
         # the same residual is a larger share of a smaller torque
@@ -200,7 +213,7 @@ def _of_residuals(result: Identification, fits: Sequence[Fit]) -> Iterator[Cauti
         )
 
 
-def _of_verification(verification: Verification) -> Iterator[Caution]:
+def _of_verification(verification: Verification, misfits: bool) -> Iterator[Caution]:
     """Yield statements on simulations and the test for encoder noise."""
     for text in verification.left_out:
         yield text[0].upper() + text[1:] + '.', ''
@@ -211,7 +224,8 @@ def _of_verification(verification: Verification) -> Iterator[Caution]:
             f'than the description in {worse}.',
             f'Check the residual of {worse} before you simulate with the model.',
         )
-    if verification.noise is not None and not verification.noise.harmless:
+    # jerks of a missing effect look like encoder noise
+    if verification.noise is not None and not verification.noise.harmless and not misfits:
         size = float(np.max(np.abs(verification.noise.relative_bias)))
         yield (
             'Encoder noise biases parameters by up to '

@@ -155,11 +155,13 @@ def _errors(
         word = by_error(one.beyond)
         # a body of the right robot follows the recordings that it is fitted to
         wrong = word == by_error(float(fitted[one.joint])) == 'unusable'
-        ask = f': is {result.arm.robot.name} the right robot?' * wrong
+        ask = ', also in the fit: names, signs or units are wrong, or an effect is missing' * wrong
         if bag is None:
             yield _halves(result, word, f'{one.text}{ask}')
         else:
-            yield Fault(f'torque error on {bag}, held out: {one.text}{ask or use[word]}', word)
+            yield Fault(
+                f'torque error on {bag}, not used for the fit: {one.text}{ask or use[word]}', word
+            )
     # held-out data, or training data if there are none
     fits = held_out or result.training
     every = Score.of(fits).joint_relative_error_percent
@@ -203,7 +205,7 @@ def _halves(result: Identification, word: Word, error: str) -> Fault:
     """Grade by the error with which each half of the data predicts the other."""
     training = Score.of(result.training).joint_relative_error_percent
     every = result.halves.joint_relative_error_percent
-    text = f'cross-check between the halves of the data: {error}'
+    text = f'torque error of one half of the data, predicted from the other: {error}'
     undetermined = every > np.maximum(LIMITS.undetermined * training, 100.0 * LIMITS.floor)
     undetermined &= beyond_noise(every, result.training, result.used) > 0.0
     if np.any(undetermined):

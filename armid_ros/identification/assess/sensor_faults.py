@@ -153,11 +153,11 @@ def encoder_faults(recording: Recording, units: Sequence[str] | None) -> Iterato
             walk = float(np.sqrt(noise * np.sum(np.diff(time) ** 2)))
             distance = float(np.ptp(integral)) - 3.0 * walk
         if distance > hidden:
-            why = f', while its velocity goes {distance:.3g} {unit}: its encoder is dead'
+            why = f', while its velocity goes {distance:.3g} {unit}: its encoder is frozen'
             value = f'{recording.q[start, j]:.4g} {unit}'
             yield _stays(recording, j, 'position', value, (start, stop), why, 'record again')
         if measured and moved[j] > REST_RANGE and not changes[j] and deviation[j] > 0.1 * moved[j]:
-            why = f', while its position goes {moved[j]:.3g} {unit}: one of the two is dead'
+            why = f', while its position goes {moved[j]:.3g} {unit}: one of the two is frozen'
             remedy = 'record again, or leave velocities out if the positions are right'
             value = f'{recording.dq[0, j] + 0.0:.4g} {unit}/s'
             yield _stays(recording, j, 'velocity', value, (0, len(t)), why, remedy)
@@ -189,7 +189,7 @@ def torque_faults(
             largest = max(float(np.std(weight)), float(np.std(load - weight)))
             if float(np.std(load)) > 0.5 * largest > 0.0:
                 value = f'{reading[start] + 0.0:.4g} {arm.robot.torque_units[j]}'
-                why = ' while the joint moves: its channel is dead'
+                why = ' while the joint moves: its channel is frozen'
                 remedy = 'record with the joint held still'
                 yield _stays(recording, j, 'torque', value, (start, stop), why, remedy)
                 break

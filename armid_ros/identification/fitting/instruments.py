@@ -242,10 +242,9 @@ class NoiseCheck:
             )
         worst = int(np.argmax(np.abs(self.relative_bias)))
         name = self.instrumental.parameters[worst]
-        leader = name.name.split(' ')[0]
-        where = f'{leader} of {name.joint}' if name.joint else leader
-        low, high = self.position_noise.min(), self.position_noise.max()
-        verdict = 'negligible' if self.harmless else 'the intervals are shifted by the bias'
+        words = replace(name, name=name.name.split(' ')[0]).words
+        where = f'{words} of {name.joint}' if name.joint else words
+        verdict = 'negligible' if self.harmless else 'it shifts the intervals'
         return (
             (
                 f'Durbin-Wu-Hausman test: {found} (statistic {self.statistic:.1f}, '
@@ -253,7 +252,7 @@ class NoiseCheck:
                 self.consistent,
             ),
             (
-                f'position noise {low:.2g} to {high:.2g} rad (or m): {verdict} (bias at most '
+                f'bias by the position noise: {verdict} (at most '
                 f'{abs(self.relative_bias[worst]):.2g} standard deviations, in {where})',
                 self.harmless,
             ),

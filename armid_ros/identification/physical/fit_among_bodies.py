@@ -144,9 +144,11 @@ class PhysicalCertificate:
         # held-out torque error, relative to an unconstrained fit, above which the constraints do
         # not fit the arm
         if self.held_out_ratio > 1.03:
+            given = self.total_mass is not None or self.at_wall or self.at_mass
             notes.append(
                 f'constraints cost {100.0 * (self.held_out_ratio - 1.0):.1f} % of torque error on '
-                'blocks left out: a given mass or box is wrong, or the model lacks an effect'
+                f'blocks left out: {"a given mass or box is wrong, or " * bool(given)}the model '
+                'lacks an effect'
             )
         if self.active:
             notes.append(
@@ -160,7 +162,7 @@ class PhysicalCertificate:
         if self.total_mass is not None:
             notes.append(f'the masses add up to {self.total_mass:g} kg, as given')
         if self.at_bound:
-            names = ', '.join(f'{p.name} of {p.joint}' for p in self.at_bound)
+            names = ', '.join(f'{p.words} of {p.joint}' for p in self.at_bound)
             notes.append(f'held by their bounds: {names}')
         return tuple(notes)
 
@@ -412,8 +414,8 @@ def bodily_prior(arm: ArmModel) -> tuple[FloatArray, tuple[str, ...]]:
             matrix[:3, :3] = second + mass * np.outer(center, center)
             theta[part] = link_parameters(matrix)
             notes.append(
-                f"link '{link}': the described inertia is hardly possible; the prior "
-                f'has a radius of gyration of {1e3 * np.sqrt(least / mass):.2g} mm at least'
+                f"link '{link}': the described body is thin; the prior of the fit has a radius of "
+                f'gyration of {1e3 * np.sqrt(least / mass):.2g} mm at least'
             )
     return theta, tuple(notes)
 

@@ -50,17 +50,19 @@ def error_bars(robot: Robot, training: Fits, validation: Fits, halves: Score) ->
         return Score.of([f for part in fits.values() for f in part]).joint_relative_error_percent
 
     test = errors(validation) if validation else halves.joint_relative_error_percent
-    label = 'held-out' if validation else 'cross-check'
+    label = 'torque error of one half of the data, predicted from the other'
+    if validation:
+        label = 'torque error on recordings not used for the fit'
     shown: list[tuple[Role, str, FloatArray]] = [
         ('after', label, test),
-        ('faint', 'training', errors(training)),
+        ('faint', 'torque error on the recordings of the fit', errors(training)),
     ]
     rows = []
     for joint in np.argsort(-test):
         pairs = [(role, float(each[joint])) for role, _, each in shown]
         bars = [Bar(error, role, f'{digits(error)} %') for role, error in pairs]
         rows.append((robot.joints[joint], bars))
-    return BarChart(rows, [(role, f'{label} error of torque') for role, label, _ in shown])
+    return BarChart(rows, [(role, label) for role, label, _ in shown])
 
 
 def fit_section(
@@ -188,16 +190,17 @@ def forward_section(
         Names of both models.
 
     """
+    names = labels if any(not pair.same for pair in pairs) else ('the model',)
     blocks: list[Templated] = [
         Paragraph(
-            f'Root mean square errors of position of two models, {labels[0]} and {labels[1]}, the '
-            'worst joint first. The recorded torques drive both. The same 8 Hz feedback keeps '
-            'both at the recorded motion, because commanded positions are not recorded.'
+            f'Root mean square position error of {" and ".join(names)}, the worst joint first. '
+            'The recorded torques drive the simulated arm. An 8 Hz feedback keeps it at the '
+            'recorded motion, because commanded positions are not recorded.'
         )
     ]
     for number, pair in enumerate(pairs):
-        models: list[tuple[Role, str, ForwardScore]] = [('after', labels[1], pair.after)]
-        if pair.before is not None:
+        models: list[tuple[Role, str, ForwardScore]] = [('after', names[-1], pair.after)]
+        if pair.before is not None and not pair.same:
             models.insert(0, ('before', labels[0], pair.before))
         own: list[Templated] = []
         if pair.before is None:
@@ -221,10 +224,8 @@ def forward_section(
             ]
             own.append(BarChart(rows, [(role, label) for role, label, _ in models]))
         own += _worst_joint(robot, pair, models)
-        text = pair.after.worst
-        if pair.before is not None:
-            text = f'{pair.before.worst} before, {text} after'
-        blocks.append(Fold(f'{pair.after.source}: at most {text}', own, opened=number == 0))
+        line = f'{pair.after.source}: at most {pair.errors()}'
+        blocks.append(Fold(line, own, opened=number == 0))
     return ContentSection('Forward validation', blocks)
 
 

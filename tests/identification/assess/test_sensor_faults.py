@@ -139,14 +139,14 @@ def test_identification_grades_the_one_as_unusable_and_not_the_other(structure, 
         result = identify(structure, [recording], rng=np.random.default_rng(0))
         found = grade(result, structure, [recording], {})
         assert found.word == word
-        assert ('dead' in ' '.join(found.reasons)) == (word == 'unusable')
+        assert ('frozen' in ' '.join(found.reasons)) == (word == 'unusable')
 
 
 def test_inspection_says_so_with_and_without_a_robot(arm, blind, locked):
     for known in (arm, None):
         found = inspect(blind, known, rng=np.random.default_rng(0))
         assert found.remarks[0].weight == 'bad'
-        assert 'dead' in found.remarks[0].text
+        assert 'frozen' in found.remarks[0].text
         sound = inspect(locked, known, rng=np.random.default_rng(0))
         assert not any(remark.weight == 'bad' for remark in sound.remarks)
 
