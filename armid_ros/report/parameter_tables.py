@@ -134,7 +134,8 @@ def parameter_folds(
                 )
             rows.append((*lead, *cells(k)))
         columns = ('Parameter', 'Unit') if rigid else ('Joint',)
-        table = DataTable((*columns, *heads), rows, tuple(range(len(columns))), 'parameters')
+        kind = 'parameters' if len(heads) < 5 else 'parameters described'
+        table = DataTable((*columns, *heads), rows, tuple(range(len(columns))), kind)
         count = suffix(members) if suffix else str(len(members))
         shown = opened is None or opened(members)
         folds.append(Fold(f'{title}: {count}', [table], shown))
