@@ -22,6 +22,7 @@ from armid_ros.excitation import (
     whole_period,
     with_joint_limits,
 )
+from armid_ros.excitation.limits import require_narrower
 from armid_ros.identification import SignalSettings
 from armid_ros.identification.rows.signals import conditioning, segments
 from armid_ros.motion import FloatArray
@@ -136,7 +137,9 @@ def design_excitation(
     elif joint_limits is not None:
         robot = with_joint_limits(robot, joint_limits)
     if acceleration is not None:
-        robot = replace(robot, acceleration_limit=np.nan_to_num(acceleration, nan=np.inf))
+        given = np.nan_to_num(acceleration, nan=np.inf)
+        require_narrower(robot, 'acceleration', given, robot.acceleration_limit)
+        robot = replace(robot, acceleration_limit=np.minimum(given, robot.acceleration_limit))
     model = replace(model, robot=robot)
     # one search for an arm of many joints, as each step takes seconds
     searches, seconds = (1, 25.0) if robot.n_joints > 20 else (4, 120.0)

@@ -278,15 +278,16 @@ def with_joint_limits(
         ``joint_limits.yaml`` of MoveIt; a limit applies if its ``has_..._limits`` is true.
         Position and velocity limits wider than those of the description are ignored.
     velocity : sequence of str
-        'joint:=value' [rad/s or m/s]; these replace all other velocity limits.
+        'joint:=value' [rad/s or m/s]; these replace the velocity limits of the file.
 
     Raises
     ------
     TrajectoryError
         If the file has no limits of the arm's joints, a limit is not a positive number, a position
-        range is empty, or a joint is unknown.
+        range is empty, a joint is unknown, or a velocity exceeds the limit of the description.
 
     """
+    described = np.where(has_velocity_limit(robot), robot.velocity_limit, np.inf)
     if path:
         robot = _with_file(robot, Path(path))
     top = np.array(robot.velocity_limit)
@@ -298,7 +299,39 @@ def with_joint_limits(
             )
         with reading(f'joint {joint}', TrajectoryError):
             top[robot.joints.index(joint)] = _positive(number, 'velocity')
+    require_narrower(robot, 'velocity', top, described)
     return replace(robot, velocity_limit=top)
+
+
+def require_narrower(
+    robot: Robot, quantity: str, given: FloatArray, described: FloatArray
+) -> None:
+    """
+    Raise a TrajectoryError if a limit that a user gives exceeds the existing limit.
+
+    Parameters
+    ----------
+    robot : Robot
+        The arm.
+    quantity : str
+        'velocity' or 'acceleration', for the message.
+    given, described : ndarray, shape (n,)
+        Limits of the user, and existing limits [rad or m, per s or s^2]; may be infinite.
+
+    """
+    for joint, value, limit, slides in zip(
+        robot.joints, given, described, robot.prismatic, strict=True
+    ):
+        if math.isfinite(value) and value > limit * (1.0 + 1e-9):  # 1e-9: rounding
+            unit = ('m' if slides else 'rad') + ('/s' if quantity == 'velocity' else '/s^2')
+            hint = ''
+            # degrees give a usual share of the limit; 1 % for rounded numbers
+            if not slides and 0.1 * limit <= math.radians(value) <= 1.01 * limit:
+                hint = f'; are these degrees? {value:g} degrees are {math.radians(value):.4g} rad'
+            raise TrajectoryError(
+                f'joint {joint}: the given {quantity} limit of {value:g} {unit} exceeds the limit '
+                f'of {limit:g} {unit}; a given limit can only be smaller{hint}'
+            )
 
 
 def _with_file(robot: Robot, path: Path) -> Robot:

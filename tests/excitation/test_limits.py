@@ -5,6 +5,7 @@
 from dataclasses import replace
 from types import SimpleNamespace
 
+from armid_ros.api.design import design_excitation
 from armid_ros.arm import ArmModel
 from armid_ros.errors import TrajectoryError
 from armid_ros.excitation import (
@@ -146,6 +147,24 @@ def test_a_joint_without_a_velocity_limit_is_slow_and_that_is_said(given):
 def test_a_velocity_that_is_none_is_refused(text):
     with pytest.raises(TrajectoryError, match='waist'):
         with_joint_limits(robot_from_urdf(arm_urdf()), velocity=[text])
+
+
+@pytest.mark.parametrize(
+    ('value', 'hint'), [(2.1, False), (90.0, True), (150.0, False)]
+)  # 90 degrees/s are 1.57 rad/s, 150 degrees/s 2.6
+def test_a_given_velocity_cannot_exceed_that_of_the_description(value, hint):
+    with pytest.raises(TrajectoryError, match=r'waist.*exceeds the limit of 2 rad/s') as caught:
+        with_joint_limits(robot_from_urdf(arm_urdf()), velocity=[f'waist:={value}'])
+    assert ('degrees' in str(caught.value)) == hint
+
+
+def test_a_given_acceleration_cannot_exceed_that_of_the_file(tmp_path):
+    path = tmp_path / 'joint_limits.yaml'
+    entry = 'has_acceleration_limits: true, max_acceleration: 3.0'
+    path.write_text(f'joint_limits: {{waist: {{{entry}}}}}')
+    robot = robot_from_urdf(arm_urdf())
+    with pytest.raises(TrajectoryError, match=r'waist.*acceleration.*3 rad/s\^2'):
+        design_excitation(robot, joint_limits=path, acceleration=np.full(3, 4.0))
 
 
 def test_limits_in_degrees_are_asked_about():
