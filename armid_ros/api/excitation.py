@@ -133,6 +133,24 @@ class ExcitationResult(Shown):
         return self.planner.free_start() if self.given_start is None else self.given_start
 
     @cached_property
+    def start_reason(self) -> str:
+        """Return why the default start is not zero; empty for zero and for a given start."""
+        if self.given_start is not None:
+            return ''
+        robot, nearest = self.arm.robot, self.planner.zero_pose
+        outside = [
+            f'{robot.joints[j]} ({robot.lower[j]:.4g} to {robot.upper[j]:.4g} '
+            f'{robot.position_units[j]})'
+            for j in np.flatnonzero(nearest)
+        ]
+        fault, reasons = self.planner.fault(nearest), []
+        if outside:
+            ranges = ', '.join(outside)
+            reasons = [f'not inside the position limits, 2 % at each end unused: {ranges}']
+        reasons += [f'not free: {fault}'] if fault else []
+        return f'zero is no start: {"; ".join(reasons)}' if reasons else ''
+
+    @cached_property
     def run(self) -> Run:
         """Return the trajectory with approach and return; TrajectoryError if none is found."""
         excitation = self.core.excitation
@@ -197,6 +215,7 @@ class ExcitationResult(Shown):
             self.fitness,
             scene=self.scene,
             isolability=self.isolability if self.with_isolability else None,
+            start_reason=self.start_reason,
             origin=self.stated(
                 replace(origin, step=self.fitness.remedy or origin.step), self.arm.robot
             ),
@@ -257,7 +276,6 @@ class ExcitationResult(Shown):
             found = f'There is no path to the trajectory: {error}.'
             return NO_WAY, [found], 'Give another --start or --seed.'
         robot = self.arm.robot
-        fault = '' if self.given_start is not None else self.planner.fault(robot.zero_pose)
         parts = zip(robot.joints, self.start, robot.position_units, strict=True)
         pose = [f'{joint} {value:.3g} {unit}' for joint, value, unit in parts if value]
         lines = fit.sentences()
@@ -265,6 +283,6 @@ class ExcitationResult(Shown):
             f'starts at rest at {", ".join(pose) or "zero"}, is on the trajectory after '
             f'{run.approach.duration:.1f} s and back after {run.duration:.1f} s'
         )
-        lines += [f'the zero of the description is not free: {fault}'] if fault else []
+        lines += [self.start_reason] if self.start_reason else []
         early = f'stopped early ({self.core.stopped}): another run with this seed may differ'
         return fit.word, [*lines, early] if self.core.stopped else lines, fit.remedy

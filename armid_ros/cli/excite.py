@@ -130,7 +130,8 @@ class Speed(click.ParamType[str | float]):
 @click.option(
     '--start',
     metavar='Q,...',
-    help='Pose in which the trajectory starts and ends [rad or m]; zero by default.',
+    help='Pose in which the trajectory starts and ends [rad or m]; by default the free pose '
+    'nearest to zero.',
 )
 @click.option(
     '--acceleration',

@@ -141,9 +141,15 @@ class TransferPlanner:
             f'clearance of {self.clearance.margin:g} m'
         )
 
+    @property
+    def zero_pose(self) -> FloatArray:
+        """Return the pose nearest to zero inside the position limits with reserve, (n,)."""
+        inside = Limits.of(self.arm.robot)
+        return np.clip(np.zeros(len(inside.joints)), inside.lower, inside.upper)
+
     def free_start(self) -> FloatArray:
         """
-        Return the zero pose, or the nearest pose found that is free, shape (n,).
+        Return `zero_pose`, or the nearest pose found that is free, shape (n,).
 
         Raises
         ------
@@ -151,15 +157,15 @@ class TransferPlanner:
             If no pose about zero is free.
 
         """
-        zero = self.arm.robot.zero_pose
+        zero = self.zero_pose
         reason = self.fault(zero)
         if not reason:
             return zero
-        rng = np.random.default_rng(0)
+        rng, inside = np.random.default_rng(0), Limits.of(self.arm.robot)
         # 200 random poses around zero at each of these distances
         for distance in (0.1, 0.2, 0.4, 0.8, 1.6, 3.2):
             about = zero + distance * rng.uniform(-1.0, 1.0, (200, len(zero)))
-            about = np.clip(about, self.limits.lower, self.limits.upper)
+            about = np.clip(about, inside.lower, inside.upper)
             about = about[np.argsort(np.linalg.norm(about - zero, axis=1))]
             for q in about:
                 if not self.fault(q):
@@ -178,6 +184,8 @@ class TransferPlanner:
             if not self.fault(other):
                 q = other
         rounded = np.where(q == zero, zero, np.round(q, 2))  # few decimals, for the command line
+        inside = Limits.of(self.arm.robot)
+        rounded = np.clip(rounded, inside.lower, inside.upper)
         return q if self.fault(rounded) else rounded
 
     def _overload(self, q: FloatArray) -> str:

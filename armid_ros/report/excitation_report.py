@@ -62,6 +62,7 @@ def excitation_report(
     *,
     scene: CollisionScene,
     isolability: Isolability | None = None,
+    start_reason: str = '',
     origin: ResultOrigin,
 ) -> str:
     """
@@ -81,6 +82,8 @@ def excitation_report(
         Bodies of the arm, floor and obstacles.
     isolability : Isolability, optional
         Detectable sizes of the effects, and effects that are not distinguishable.
+    start_reason : str
+        Reason why the run does not start at zero.
     origin : ResultOrigin
         Robot, files, versions, settings, seed, and the command that follows.
 
@@ -128,7 +131,7 @@ def excitation_report(
         *([] if isolability is None else [isolability_section(isolability)]),
         _motion_section(limits, motion, shares),
         _clearance_section(motion.t, curves, design.settings.clearance, remarks),
-        _input_section(design, arm, origin.robot, obstacles, run),
+        _input_section(design, arm, origin.robot, obstacles, run, start_reason),
         Origin(origin.provenance),
     ]
     subtitle = (
@@ -221,11 +224,14 @@ def _input_section(
     robot: str,
     obstacles: Sequence[Obstacle],
     whole: Run,
+    start_reason: str,
 ) -> ContentSection:
     settings, run = design.settings, design.excitation
     criterion = f'{settings.criterion}: {CRITERIA[settings.criterion]}'
     focus = f'; focus on {", ".join(settings.focus)}' if settings.focus else ''
     start = f'{_numbers(whole.approach.q[0])}, with an approach of {whole.approach.duration:.1f} s'
+    if start_reason:
+        start += f'; {start_reason}'
     name = settings.speed
     share = SPEED_CLASSES[name] if isinstance(name, str) else name
     speed = f'{name}: {100.0 * share:.0f} % of the velocity and acceleration limits'

@@ -128,6 +128,12 @@ def test_where_zero_is_not_free_a_pose_beside_it_is_taken(two_link):
     assert not planner(two_link).free_start().any()
 
 
+def test_the_default_start_keeps_the_reserve_at_a_position_limit(two_link):
+    one_sided = replace(two_link, lower=np.array([0.5, -1.0]), upper=np.array([1.5, 0.0]))
+    start = planner(one_sided).free_start()
+    np.testing.assert_allclose(start, [0.52, -0.02])
+
+
 @pytest.mark.parametrize('back', [True, False])
 @pytest.mark.parametrize('rate', [50.0, 130.0])
 def test_a_run_is_one_motion_from_its_start(two_link, back, rate):
