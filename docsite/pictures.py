@@ -129,12 +129,11 @@ def exo_cycle() -> Figure:
             phase, np.degrees(wrong.error), color=ORANGE, label='torques for springs 20 % too soft'
         )
         error.set(ylabel='error [°]', ylim=(-1.15 * most, 1.15 * most))
-    for column, other in enumerate((False, True)):
-        axes = panels[2, column]
-        feet = cycle.feet(other=other)[..., 1]
+    for column, machine in enumerate((cycle.own, cycle.other)):
+        axes, feet = panels[2, column], machine.feet[..., 1]
         for foot, side in enumerate(('right', 'left')):
             axes.plot(cycle.phase, feet[:, foot], color=(BLUE, ORANGE)[foot], label=f'{side} foot')
-        two = cycle.support(other=other) == 2
+        two = machine.support == 2
         axes.fill_between(
             cycle.phase, 0.0, feet.max(), where=two, color=GREY, alpha=0.2, label='both feet'
         )

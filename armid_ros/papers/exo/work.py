@@ -13,12 +13,7 @@ from armid_ros.identification.ties.recorded import recorded_interaction_problem
 from armid_ros.identification.ties.stiffness import identify_interaction, Interaction
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.papers.exo.plant.gait import Gait, read_assumptions
-from armid_ros.papers.exo.plant.gait_cycle import (
-    check_cycle,
-    gait_cycle,
-    ground_by_shares,
-    weight,
-)
+from armid_ros.papers.exo.plant.gait_cycle import check_cycle, gait_cycle, ground_by_shares
 from armid_ros.papers.exo.plant.leg_pair import (
     pair_torques,
     PairMotion,
@@ -26,15 +21,12 @@ from armid_ros.papers.exo.plant.leg_pair import (
     walking,
 )
 from armid_ros.papers.exo.plant.walkers import walking_pair
-from armid_ros.papers.exo.report.walk import Driven, SimulatedWalk
+from armid_ros.papers.exo.report.walk import DrivenJoint, SimulatedWalk, SOFTER, SOURCE_ERROR
 from armid_ros.recording import recorded_together, Recording, write_joint_states
 from armid_ros.recording.writer import whole_bag
 import numpy as np
 from numpy.random import Generator
 
-#: Joints that the source drives by torque, one at a time.
-_DRIVEN = ('exo_right_hip', 'exo_right_knee')
-_SOFTER = 0.2
 SCHEMA = 'armid/exo/1'
 
 
@@ -61,18 +53,17 @@ def walk(pair: TiedPair, gait: Gait, stiffness: float | None, tick: Tick) -> Sim
     tick(0.6, 'walking a whole cycle')
     walkers = walking_pair(stiffness)
     cycle, rate = gait_cycle(walkers, gait), read_assumptions()['torque_rate'].value
-    soft = walkers.with_stiffness((1.0 - _SOFTER) * walkers.stiffness)
+    soft = walkers.with_stiffness((1.0 - SOFTER) * walkers.stiffness)
     shared = ground_by_shares(cycle)
     driven = [
-        Driven(
+        DrivenJoint(
             check_cycle(cycle, joint, rate),
             check_cycle(cycle, joint, rate, soft),
             check_cycle(cycle, joint, rate, ground_forces=shared),
         )
-        for joint in _DRIVEN
+        for joint in SOURCE_ERROR  # the source drives these joints, one at a time
     ]
-    truth = dict(zip(('all', *pair.segments), [pair.stiffness[0]] * 5, strict=False))
-    return SimulatedWalk(truth, cycle, driven, _SOFTER, rate)
+    return SimulatedWalk(float(pair.stiffness[0]), cycle, driven)
 
 
 def identify_ties(
@@ -130,34 +121,31 @@ def exo_document(
             'unit': 'N/m',
             'interval': part.interval()[k].tolist(),
             'bias_of_least_squares': float(part.bias[k]),
-            'truth': walked.truth.get(segment) if walked else None,
+            'truth': walked.stiffness if walked else None,
         }
         for part in found
         for k, segment in enumerate(part.segments)
     ]
     cycle = [
         {
-            'joint': d.joint,
-            'error_deg': d.right.most,
-            'error_softer_deg': d.softer.most,
-            'error_shared_deg': d.shared.most,
-            'source_deg': d.source,
+            'joint': right.joint,
+            'error_deg': right.most,
+            'error_softer_deg': softer.most,
+            'error_shared_deg': shared.most,
+            'source_deg': SOURCE_ERROR[right.joint],
         }
-        for d in (walked.driven if walked else ())
+        for right, softer, shared in (walked.driven if walked else ())
     ]
-    feet = []
-    if walked is not None:
-        pair, walk_cycle = walked.cycle.pair, walked.cycle
-        feet = [
-            {
-                'machine': robot.name,
-                'weight': weight(robot),
-                'most': float(walk_cycle.feet(other=other)[..., 1].max()),
-                'double_support': float(np.mean(walk_cycle.support(other=other) == 2)),
-                'unit': 'N',
-            }
-            for robot, other in ((pair.robot, False), (pair.other, True))
-        ]
+    feet = [
+        {
+            'machine': one.robot.name,
+            'weight': one.weight,
+            'most': float(one.feet[..., 1].max()),
+            'double_support': float(np.mean(one.support == 2)),
+            'unit': 'N',
+        }
+        for one in ((walked.cycle.own, walked.cycle.other) if walked else ())
+    ]
     return {
         'schema': SCHEMA,
         'recording': source,

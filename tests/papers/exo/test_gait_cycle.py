@@ -3,12 +3,7 @@
 """A whole cycle: momentum, periodicity, supports, and the same in MuJoCo."""
 
 from armid_ros.model.kinematics import points_motion
-from armid_ros.papers.exo.plant.gait_cycle import (
-    check_cycle,
-    driving_torque,
-    feet_by_shares,
-    weight,
-)
+from armid_ros.papers.exo.plant.gait_cycle import check_cycle, driving_torque
 from armid_ros.papers.exo.plant.walkers import contacts, floating
 import numpy as np
 import pinocchio as pin
@@ -23,27 +18,24 @@ RATE = 200.0
 
 def test_nothing_holds_the_hips(cycle) -> None:
     """Newton: weight, springs and ground leave no force that a joint would have to give."""
-    for robot, tau in (
-        (cycle.pair.robot, cycle.torques.tau),
-        (cycle.pair.other, cycle.torques.other_tau),
-    ):
-        assert np.abs(tau[:, floating(robot)[:2]]).max() < 1e-6 * weight(robot)
+    for one in (cycle.own, cycle.other):
+        assert np.abs(one.tau[:, floating(one.robot)[:2]]).max() < 1e-6 * one.weight
 
 
-@pytest.mark.parametrize('other', [False, True])
+@pytest.mark.parametrize('which', ['own', 'other'])
 def test_the_moment_on_a_trunk_is_what_the_ground_and_the_springs_do_not_give(
-    cycle, other
+    cycle, which
 ) -> None:
     """Euler, about the centre of mass, with the momentum of Pinocchio."""
-    robot = cycle.pair.other if other else cycle.pair.robot
-    motion = cycle.motions.other if other else cycle.motions.own
+    one = getattr(cycle, which)
+    robot, motion, ground, pull, moment = (
+        one.robot, one.motion, one.ground, one.springs, one.trunk_moment
+    )  # fmt: skip
     geometry = cycle.pair.geometry(*cycle.motions)
-    tied = geometry.other_position if other else geometry.other_position + geometry.way
-    pull = -cycle.torques.forces if other else cycle.torques.forces
+    tied = geometry.other_position if which == 'other' else geometry.position
     feet = points_motion(robot, *contacts(robot), motion.q)[0]
-    ground = cycle.other_ground if other else cycle.ground
-    data, moment = robot.model.createData(), cycle.trunk_moment(other=other)
-    assert np.abs(moment).max() > 0.1 * weight(robot)
+    data = robot.model.createData()
+    assert np.abs(moment).max() > 0.1 * one.weight
     for k in range(0, len(motion), 100):
         change = pin.computeCentroidalMomentumTimeVariation(
             robot.model, data, motion.q[k], motion.dq[k], motion.ddq[k]
@@ -51,13 +43,13 @@ def test_the_moment_on_a_trunk_is_what_the_ground_and_the_springs_do_not_give(
         arms = np.concatenate([feet[k], tied[k]]) - data.com[0]
         upon = np.concatenate([np.insert(ground[k], 1, 0.0, axis=1), pull[k]])
         given = np.cross(arms, upon).sum(axis=0)[1] + moment[k]
-        assert change.angular[1] == pytest.approx(given, abs=1e-6 * weight(robot))
+        assert change.angular[1] == pytest.approx(given, abs=1e-6 * one.weight)
 
 
 def test_on_average_the_ground_carries_the_weight_of_both(cycle) -> None:
-    both = cycle.ground.sum(axis=1) + cycle.other_ground.sum(axis=1)
+    both = cycle.own.ground.sum(axis=1) + cycle.other.ground.sum(axis=1)
     ahead, up = both[:-1].mean(axis=0)
-    carried = weight(cycle.pair.robot) + weight(cycle.pair.other)
+    carried = cycle.own.weight + cycle.other.weight
     assert up == pytest.approx(carried, rel=5e-3)
     assert abs(ahead) < 5e-3 * carried
 
@@ -74,35 +66,35 @@ def test_both_walk_on_and_do_the_same_every_cycle(cycle) -> None:
     assert strides == pytest.approx([1.2, 1.2], rel=0.1) and abs(np.diff(strides)[0]) < 1e-5
 
 
-@pytest.mark.parametrize('other', [False, True])
-def test_feet_take_turns_and_nobody_flies(cycle, other) -> None:
-    support = cycle.support(other=other)
+@pytest.mark.parametrize('which', ['own', 'other'])
+def test_feet_take_turns_and_nobody_flies(cycle, which) -> None:
+    one = getattr(cycle, which)
+    support = one.support
     assert support.min() >= 1
     assert 0.15 < np.mean(support == 2) < 0.35
-    feet = cycle.feet(other=other)[..., 1]
+    feet = one.feet[..., 1]
     for foot in feet.T:
         assert 0.55 < np.mean(foot > 0.0) < 0.7
 
 
 def test_friction_holds_what_stands(cycle) -> None:
-    ahead, up = cycle.ground[..., 0], cycle.ground[..., 1]
+    ahead, up = cycle.own.ground[..., 0], cycle.own.ground[..., 1]
     assert np.all(np.abs(ahead) <= 0.3 * up + 1e-9)
 
 
-@pytest.mark.parametrize('other', [False, True])
-def test_the_rule_of_shares_adds_up_to_what_the_ground_does(cycle, other) -> None:
+@pytest.mark.parametrize('which', ['own', 'other'])
+def test_the_rule_of_shares_adds_up_to_what_the_ground_does(cycle, which) -> None:
     """(20) to (22) split the same whole; strikes, where velocities bend, are left out."""
-    off = np.abs(feet_by_shares(cycle, other=other) - cycle.feet(other=other))
-    whole = feet_by_shares(cycle, other=other).sum(axis=1) - cycle.feet(other=other).sum(axis=1)
-    carried = weight(cycle.pair.other if other else cycle.pair.robot)
-    assert np.median(np.abs(whole)) < 1e-3 * carried
-    alone = cycle.support(other=other) == 1
-    assert np.median(off[alone]) < 1e-2 * carried
+    one = getattr(cycle, which)
+    difference = one.feet_by_shares() - one.feet
+    assert np.median(np.abs(difference.sum(axis=1))) < 1e-3 * one.weight
+    alone = one.support == 1
+    assert np.median(np.abs(difference)[alone]) < 1e-2 * one.weight
 
 
 def test_mujoco_walks_the_same_cycle(cycle) -> None:
     walked = walk_in_mujoco(cycle)
-    feet = np.stack([cycle.feet(), cycle.feet(other=True)], axis=1)
+    feet = np.stack([cycle.own.feet, cycle.other.feet], axis=1)
     np.testing.assert_allclose(walked.feet, feet, atol=0.2)
     hips = np.stack([cycle.motions.own.q[:, :2], cycle.motions.other.q[:, :2]], axis=1)
     np.testing.assert_allclose(walked.hips, hips, atol=1e-5)

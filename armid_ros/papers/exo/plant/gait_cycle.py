@@ -36,6 +36,7 @@ from armid_ros.papers.exo.plant.walkers import (
     floating,
     ground_force,
     leg_length,
+    SEGMENTS,
     SIDES,
     walkable,
     WalkableGait,
@@ -50,7 +51,85 @@ _STEPS = 2400
 _PLANE = np.array([0, 2])
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
+class WalkingMachine:
+    """
+    One machine of a walking pair over a cycle of N samples.
+
+    Attributes
+    ----------
+    robot : Robot
+        The machine, free to walk.
+    motion : Motion
+        Its motion, including the floating joints forward, up and lean.
+    ground : ndarray, shape (N, 4, 2)
+        Force on right heel and toe and left heel and toe, forward and up [N].
+    springs : ndarray, shape (N, S, 3)
+        Force of each spring on the machine [N].
+    tau : ndarray, shape (N, n)
+        Torques of all joints; those of the floating joints are the remaining external forces.
+
+    """
+
+    robot: Robot
+    motion: Motion
+    ground: FloatArray
+    springs: FloatArray
+    tau: FloatArray
+
+    @property
+    def weight(self) -> float:
+        """Return the weight [N]."""
+        mass = self.robot.rigid_parameters[::10].sum()
+        return float(mass * np.linalg.norm(self.robot.gravity))
+
+    @property
+    def feet(self) -> FloatArray:
+        """Return the force on the right and on the left foot, shape (N, 2, 2) [N]."""
+        return np.asarray(self.ground.reshape(-1, 2, 2, 2).sum(axis=2))
+
+    @property
+    def trunk_moment(self) -> FloatArray:
+        """Return the external moment that keeps the lean of the trunk, shape (N,) [N m]."""
+        return np.asarray(self.tau[:, floating(self.robot)[2]])
+
+    @property
+    def support(self) -> npt.NDArray[np.int_]:
+        """Return the number of feet that bear weight, shape (N,)."""
+        # smallest load of a supporting foot: 1 % of the weight
+        return np.asarray(np.sum(self.feet[:, :, 1] > 0.01 * self.weight, axis=1))
+
+    def feet_by_shares(self) -> FloatArray:
+        """Return the forces on right and left foot by (20) to (22), shape (N, 2, 2) [N]."""
+        robot, motion = self.robot, self.motion
+        # centroids and m (c'' - g) of all bodies
+        bodies = list(robot.model.inertias)[1:]
+        levers = np.array([body.lever for body in bodies])
+        place, jacobian = points_motion(robot, list(robot.joints), levers, motion.q)
+        speed = np.einsum('ncxj,nj->ncx', jacobian, motion.dq)
+        acceleration = np.gradient(speed, motion.t, axis=0)
+        mass = np.array([body.mass for body in bodies])
+        taken = mass[:, np.newaxis] * (acceleration - robot.gravity)
+        place, taken = place[..., _PLANE], taken[..., _PLANE]
+        trunk = floating(robot)[2]
+        legs = [columns(robot, side) for side in SIDES]
+        # shares of the trunk, (20) to (22): the leg with the nearer thigh carries more
+        far = np.linalg.norm(place[:, [leg[0] for leg in legs]] - place[:, [trunk]], axis=-1)
+        shares = far[:, ::-1] / far.sum(axis=1, keepdims=True)
+        feet = np.empty((len(motion), 2, 2))
+        for foot, (side, own) in enumerate(zip(SIDES, legs, strict=True)):
+            tied = [name.startswith(side) for name in SEGMENTS]
+            feet[:, foot] = taken[:, own].sum(axis=1) + shares[:, [foot]] * taken[:, trunk]
+            feet[:, foot] -= self.springs[:, tied][..., _PLANE].sum(axis=1)
+        bearing = self.feet[:, :, 1] > 0.0
+        for foot in range(2):
+            alone = bearing[:, foot] & ~bearing[:, 1 - foot]
+            feet[alone, foot] = feet[alone].sum(axis=1)
+            feet[alone, 1 - foot] = 0.0
+        return feet
+
+
+@dataclass(frozen=True, eq=False)
 class GaitCycle:
     """
     One cycle of a walking pair, between two planned right heel strikes of the wearer.
@@ -58,41 +137,23 @@ class GaitCycle:
     Attributes
     ----------
     pair : TiedPair
-        The machines.
+        Both machines and their springs.
     phase : ndarray, shape (N,)
         Phase of the right leg, 0 to 1.
-    motions : PairMotion
-        Motions of both machines, including the floating joints forward, up and lean.
-    ground, other_ground : ndarray, shape (N, 4, 2)
-        Force on right heel and toe and left heel and toe, forward and up [N].
-    torques : PairTorques
-        Torques of all joints; those of the floating joints are the remaining external forces.
+    own, other : WalkingMachine
+        The machine (exoskeleton) and its wearer.
 
     """
 
     pair: TiedPair
     phase: FloatArray
-    motions: PairMotion
-    ground: FloatArray
-    other_ground: FloatArray
-    torques: PairTorques
+    own: WalkingMachine
+    other: WalkingMachine
 
-    def feet(self, *, other: bool = False) -> FloatArray:
-        """Return the force on the right and on the left foot, shape (N, 2, 2) [N]."""
-        ground = self.other_ground if other else self.ground
-        return np.asarray(ground.reshape(-1, 2, 2, 2).sum(axis=2))
-
-    def trunk_moment(self, *, other: bool = False) -> FloatArray:
-        """Return the external moment that keeps the lean of the trunk, shape (N,) [N m]."""
-        robot = self.pair.other if other else self.pair.robot
-        tau = self.torques.other_tau if other else self.torques.tau
-        return np.asarray(tau[:, floating(robot)[2]])
-
-    def support(self, *, other: bool = False) -> npt.NDArray[np.int_]:
-        """Return the number of feet that bear weight, shape (N,)."""
-        robot = self.pair.other if other else self.pair.robot
-        # smallest load of a supporting foot
-        return np.asarray(np.sum(self.feet(other=other)[:, :, 1] > 0.01 * weight(robot), axis=1))
+    @property
+    def motions(self) -> PairMotion:
+        """Return the motions of both machines."""
+        return PairMotion(self.own.motion, self.other.motion)
 
 
 @dataclass(frozen=True)
@@ -104,11 +165,6 @@ class _Course:
     tied: FloatArray  # (2 K, S, 2)
     pull: FloatArray  # (2 K, 2): weight and inertial force of the limbs [N]
     mass: float
-
-
-def weight(robot: Robot) -> float:
-    """Return the weight of a machine [N]."""
-    return float(robot.rigid_parameters[::10].sum() * np.linalg.norm(robot.gravity))
 
 
 def gait_cycle(pair: TiedPair, gait: Gait) -> GaitCycle:
@@ -155,25 +211,26 @@ def gait_cycle(pair: TiedPair, gait: Gait) -> GaitCycle:
         _placed(pair.robot, moves[0], rows, states[:, :2], states[:, 4:6], rates[:, 4:6], cycle),
         _placed(pair.other, moves[1], rows, states[:, 2:4], states[:, 6:], rates[:, 6:], cycle),
     )
-    forces = [
-        ground_forces(robot, motion)
+    ground = [
+        _ground_forces(robot, motion)
         for robot, motion in zip((pair.robot, pair.other), motions, strict=True)
     ]
-    return GaitCycle(
-        pair,
-        read_only(np.linspace(0.0, 1.0, _STEPS + 1)),
-        motions,
-        read_only(forces[0]),
-        read_only(forces[1]),
-        walking_torques(pair, motions, forces[0], forces[1]),
+    found = walking_torques(pair, motions, ground[0], ground[1])
+    own, other = (
+        WalkingMachine(*parts)
+        for parts in (
+            (pair.robot, motions.own, ground[0], found.forces, found.tau),
+            (pair.other, motions.other, ground[1], -found.forces, found.other_tau),
+        )
     )
+    return GaitCycle(pair, read_only(np.linspace(0.0, 1.0, _STEPS + 1)), own, other)
 
 
-def ground_forces(robot: Robot, motion: Motion) -> FloatArray:
+def _ground_forces(robot: Robot, motion: Motion) -> FloatArray:
     """Return the ground forces on heels and toes along a motion, shape (N, 4, 2) [N]."""
     place, jacobian = points_motion(robot, *contacts(robot), motion.q)
     speed = np.einsum('ncxj,nj->ncx', jacobian, motion.dq)
-    return ground_force(place[..., 2], speed[..., 2], speed[..., 0])
+    return read_only(ground_force(place[..., 2], speed[..., 2], speed[..., 0]))
 
 
 def walking_torques(
@@ -226,12 +283,12 @@ def _course(pair: TiedPair, motion: Motion, other: bool) -> _Course:
         robot, [joint for joint, _ in ties], np.array([point for _, point in ties]), motion.q
     )
     data = robot.model.createData()
-    hurry = np.empty((len(motion), 2))  # acceleration of the centre of mass
+    acceleration = np.empty((len(motion), 2))  # of the centre of mass
     for k, row in enumerate(zip(motion.q, motion.dq, motion.ddq, strict=True)):
         pin.centerOfMass(robot.model, data, *map(np.array, row))
-        hurry[k] = data.acom[0][_PLANE]
+        acceleration[k] = data.acom[0][_PLANE]
     mass = float(robot.rigid_parameters[::10].sum())
-    pull = mass * (robot.gravity[_PLANE] - hurry)
+    pull = mass * (robot.gravity[_PLANE] - acceleration)
     return _Course(contact[..., _PLANE], speed[..., _PLANE], tied[..., _PLANE], pull, mass)
 
 
@@ -326,56 +383,13 @@ def driving_torque(
     ground_forces: FloatArray | None = None,
 ) -> DrivingTorque:
     """Return zero force on the hips and the interpolated torque of a joint, (3,) [N, N m]."""
-    tau = cycle.torques.tau
+    tau = cycle.own.tau
     if believed is not None or ground_forces is not None:
-        on_feet = cycle.ground if ground_forces is None else ground_forces
+        ground = cycle.own.ground if ground_forces is None else ground_forces
         pair = believed or cycle.pair
-        tau = walking_torques(pair, cycle.motions, on_feet, cycle.other_ground).tau
-    curve = splined(cycle.motions.own.t, tau[:, [cycle.pair.robot.index(joint)]], rate)
+        tau = walking_torques(pair, cycle.motions, ground, cycle.other.ground).tau
+    curve = splined(cycle.own.motion.t, tau[:, [cycle.pair.robot.index(joint)]], rate)
     return lambda t: np.concatenate([[0.0, 0.0], curve(t)])
-
-
-def feet_by_shares(cycle: GaitCycle, *, other: bool = False) -> FloatArray:
-    """
-    Return the forces on right and left foot by (20) to (22), shape (N, 2, 2) [N].
-
-    Parameters
-    ----------
-    cycle : GaitCycle
-        The motion, and the feet on the ground.
-    other : bool
-        Whether the feet are those of the wearer.
-
-    """
-    robot, motion = (
-        (cycle.pair.other, cycle.motions.other) if other else (cycle.pair.robot, cycle.motions.own)
-    )
-    # centroids and m (c'' - g) of all bodies, both
-    bodies = list(robot.model.inertias)[1:]
-    levers = np.array([body.lever for body in bodies])
-    place, jacobian = points_motion(robot, list(robot.joints), levers, motion.q)
-    speed = np.einsum('ncxj,nj->ncx', jacobian, motion.dq)
-    hurry = np.gradient(speed, motion.t, axis=0)
-    mass = np.array([body.mass for body in bodies])
-    taken = mass[:, np.newaxis] * (hurry - robot.gravity)
-    place, taken = place[..., _PLANE], taken[..., _PLANE]
-    trunk = floating(robot)[2]
-    legs = [columns(robot, side) for side in SIDES]
-    # shares of the trunk, (20) to (22): the leg with the nearer thigh carries more
-    far = np.linalg.norm(place[:, [leg[0] for leg in legs]] - place[:, [trunk]], axis=-1)
-    shares = far[:, ::-1] / far.sum(axis=1, keepdims=True)
-    springs = cycle.torques.forces[..., _PLANE] * (1.0 if not other else -1.0)
-    feet = np.empty((len(motion), 2, 2))
-    for foot, own in enumerate(legs):
-        pulled = [k for k, tie in enumerate(cycle.pair.ties) if tie.name.startswith(SIDES[foot])]
-        feet[:, foot] = taken[:, own].sum(axis=1) + shares[:, [foot]] * taken[:, trunk]
-        feet[:, foot] -= springs[:, pulled].sum(axis=1)
-    bearing = cycle.feet(other=other)[:, :, 1] > 0.0
-    for foot in range(2):
-        alone = bearing[:, foot] & ~bearing[:, 1 - foot]
-        feet[alone, foot] = feet[alone].sum(axis=1)
-        feet[alone, 1 - foot] = 0.0
-    return feet
 
 
 def ground_by_shares(cycle: GaitCycle) -> FloatArray:
@@ -385,8 +399,8 @@ def ground_by_shares(cycle: GaitCycle) -> FloatArray:
     The equations do not give the centre of pressure, so that of the simulated ground is used.
 
     """
-    feet = feet_by_shares(cycle)
-    up = cycle.ground[..., 1].reshape(-1, 2, 2)
+    feet = cycle.own.feet_by_shares()
+    up = cycle.own.ground[..., 1].reshape(-1, 2, 2)
     whole = up.sum(axis=2, keepdims=True)
     part = np.where(whole > 0.0, up / np.where(whole > 0.0, whole, 1.0), 0.5)
     return np.asarray((part[..., np.newaxis] * feet[:, :, np.newaxis]).reshape(-1, 4, 2))

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 from armid_ros.estimate import measured
 from armid_ros.identification.fitting.identifiability import HALF_WIDTH
@@ -51,7 +51,7 @@ def exo_report(
     found : sequence of Interaction
         Estimates with one stiffness for all ties, then with one for each.
     walked : SimulatedWalk or None
-        Truth of simulated data; None for recorded data.
+        Walk of the simulated pair; None for recorded data.
     provenance : Provenance
         Files, versions, settings, seed.
 
@@ -59,11 +59,11 @@ def exo_report(
     motions, abscissa, name = shown
     sections: list[Section] = [
         verdict(found, walked),
-        _stiffness_section(found, walked.truth if walked else {}),
+        _stiffness_section(found, walked),
     ]
     if walked is not None:
         sections += [
-            Walk(walked.cycle, walked.driven),
+            Walk(walked),
             by_torque_section(walked),
             feet_section(walked.cycle),
         ]
@@ -90,7 +90,7 @@ def verdict(found: Sequence[Interaction], walked: SimulatedWalk | None) -> Verdi
         if HALF_WIDTH * std > _NARROW * abs(value)
     ]
     if walked is not None:
-        each = ', '.join(f'{d.joint} {d.right.most:.2g}°' for d in walked.driven)
+        each = ', '.join(f'{one.right.joint} {one.right.most:.2g}°' for one in walked.driven)
         sentences.append(f'Largest position error of a driven joint over a walking cycle: {each}.')
     beware = (
         [f'{", ".join(weak)}: the extension is too small for an accuracy of 10 %.'] if weak else []
@@ -106,7 +106,9 @@ def verdict(found: Sequence[Interaction], walked: SimulatedWalk | None) -> Verdi
 _ROLES: tuple[Role, ...] = ('residual', 'predicted', 'before', 'measured')
 
 
-def _stiffness_section(found: Sequence[Interaction], truth: Mapping[str, float]) -> ContentSection:
+def _stiffness_section(
+    found: Sequence[Interaction], walked: SimulatedWalk | None
+) -> ContentSection:
     """Return a section with the stiffness of the ties and its intervals."""
     heads = ['Spring', 'Stiffness [N/m]', '± 95 %', 'Bias of plain least squares']
     rows = [
@@ -114,7 +116,7 @@ def _stiffness_section(found: Sequence[Interaction], truth: Mapping[str, float])
             segment.replace('_', ' '),
             *measured(part.stiffness[k], HALF_WIDTH * part.std[k]),
             f'{100.0 * part.bias[k] / part.stiffness[k]:+z.2f} %',
-            *([f'{truth[segment]:g}' if segment in truth else ''] if truth else []),
+            *([f'{walked.stiffness:g}'] if walked else []),
         ]
         for part in found
         for k, segment in enumerate(part.segments)
@@ -128,7 +130,7 @@ def _stiffness_section(found: Sequence[Interaction], truth: Mapping[str, float])
         'the angles biases plain least squares, and more data do not reduce this bias. The noise '
         'is estimated from the recording, and the bias is corrected.'
     )
-    table = DataTable([*heads, 'Simulated with'] if truth else heads, rows)
+    table = DataTable([*heads, 'Simulated with'] if walked else heads, rows)
     return ContentSection('Stiffness', [table, FactList(noise), Paragraph(text, 'hint')])
 
 

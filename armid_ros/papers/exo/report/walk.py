@@ -4,13 +4,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NamedTuple
 
 from armid_ros.model.kinematics import points_motion
 from armid_ros.motion import FloatArray, Motion
-from armid_ros.papers.exo.plant.gait_cycle import feet_by_shares, GaitCycle, weight
+from armid_ros.papers.exo.plant.gait import read_assumptions
+from armid_ros.papers.exo.plant.gait_cycle import GaitCycle
 from armid_ros.papers.exo.plant.torque_driven import GaitCheck
 from armid_ros.papers.exo.plant.walkers import columns, contacts, floating, leg_length, SIDES
 from armid_ros.report.blocks import ContentSection, DataTable, Panels, Paragraph
@@ -25,17 +26,22 @@ _SCALE, _GROUND = 260.0, 385.0
 _ABSCISSA = 'gait cycle of the right leg'
 
 
-@dataclass(frozen=True)
-class Driven:
+#: Relative error of the stiffness of springs that are too soft.
+SOFTER = 0.2
+#: Largest error of the position of a torque-driven joint in the source [deg].
+SOURCE_ERROR = {'exo_right_hip': 1.5, 'exo_right_knee': 2.5}
+
+
+class DrivenJoint(NamedTuple):
     """
-    Results for a joint driven by its torque.
+    A joint of the machine over a cycle, driven by its torque.
 
     Attributes
     ----------
     right, softer : GaitCheck
-        Results with the right torque, and with the torque for springs that are too soft.
+        With the right torque, and with the torque for springs that are too soft.
     shared : GaitCheck
-        Result with the torque for forces on the feet by (20) to (22).
+        With the torque for forces on the feet by (20) to (22).
 
     """
 
@@ -43,42 +49,25 @@ class Driven:
     softer: GaitCheck
     shared: GaitCheck
 
-    @property
-    def joint(self) -> str:
-        """Its name."""
-        return self.right.joint
 
-    @property
-    def source(self) -> float:
-        """Largest error of the joint position in the source [deg]."""
-        return {'hip': 1.5, 'knee': 2.5}[self.joint.split('_')[-1]]
-
-
-@dataclass(frozen=True)
-class SimulatedWalk:
+class SimulatedWalk(NamedTuple):
     """
-    True values of a simulated pair.
+    Cycle of a simulated pair, and the joints that are driven by torque over this cycle.
 
     Attributes
     ----------
-    truth : mapping of str to float
-        True stiffnesses [N/m].
+    stiffness : float
+        True stiffness of all springs [N/m].
     cycle : GaitCycle
         A whole cycle of walking.
-    driven : sequence of Driven
-        Joints driven by torque over this cycle.
-    softer : float
-        Relative error of the stiffness of springs that are too soft.
-    rate : float
-        Torque samples per second.
+    driven : sequence of DrivenJoint
+        Joints driven by torque.
 
     """
 
-    truth: Mapping[str, float]
+    stiffness: float
     cycle: GaitCycle
-    driven: Sequence[Driven]
-    softer: float
-    rate: float
+    driven: Sequence[DrivenJoint]
 
 
 @dataclass(frozen=True)
@@ -88,10 +77,8 @@ class Walk(Section):
 
     Attributes
     ----------
-    cycle : GaitCycle
-        The motion of both bodies.
-    driven : sequence of Driven
-        Joints driven by torque, to choose from.
+    walked : SimulatedWalk
+        The cycle, and the joints driven by torque to choose from.
 
     """
 
@@ -101,46 +88,42 @@ class Walk(Section):
     #: Width and height of the drawing, and height of the ground [px].
     size: ClassVar[tuple[int, int, float]] = (640, 420, _GROUND)
 
-    cycle: GaitCycle
-    driven: Sequence[Driven]
+    walked: SimulatedWalk
 
     @property
     def choices(self) -> list[str]:
         """Return the choices of the animation."""
-        figure = {'hip': ' (figure 3)', 'knee': ' (figure 4)'}
+        names = [one.right.joint.removeprefix('exo_') for one in self.walked.driven]
         return [
             'as prescribed',
             *(
-                f'{d.joint.removeprefix("exo_").replace("_", " ")} by its torque'
-                f'{figure.get(d.joint.split("_")[-1], "")}'
-                for d in self.driven
+                f'{name.replace("_", " ")} by its torque (figure {3 + name.endswith("knee")})'
+                for name in names
             ),
         ]
 
     @property
-    def held(self) -> tuple[str, str]:
+    def held(self) -> list[str]:
         """Return the largest external moments on the trunks, machine and wearer [N m]."""
-        own, other = (
-            f'{np.abs(self.cycle.trunk_moment(other=other)).max():.0f}' for other in (False, True)
-        )
-        return own, other
+        cycle = self.walked.cycle
+        return [f'{np.abs(one.trunk_moment).max():.0f}' for one in (cycle.own, cycle.other)]
 
     @property
     def data(self) -> Markup:
         """Return the data of the animation script: a list of frames, each with lines."""
-        cycle = self.cycle
+        _, cycle, driven = self.walked
         rows = np.linspace(0, len(cycle.phase) - 1, 73).astype(int)[:-1]
         wearer = cycle.motions.other.select(rows)
         ahead = wearer.q[:, floating(cycle.pair.other)[0]]
         machines = [cycle.motions.own.select(rows)]
-        machines += [d.right.motion.select(rows // 2) for d in self.driven]
+        machines += [one.right.motion.select(rows // 2) for one in driven]
         geometry = cycle.pair.geometry(machines[0], wearer)
         start = geometry.other_position[..., [0, 2]]
         end = start + 4.0 * geometry.way[..., [0, 2]]  # magnified four times for visibility
         arrows = []  # points and forces of ground contact: feet of the wearer, then of the machine
         for robot, motion, ground in (
-            (cycle.pair.other, wearer, cycle.other_ground),
-            (cycle.pair.robot, machines[0], cycle.ground),
+            (cycle.pair.other, wearer, cycle.other.ground),
+            (cycle.pair.robot, machines[0], cycle.own.ground),
         ):
             force = ground[rows].reshape(len(rows), 2, 2, 2)
             place = points_motion(robot, *contacts(robot), motion.q)[0]
@@ -159,7 +142,7 @@ class Walk(Section):
                 'springs': _whole(_placed(np.stack([start, end], axis=2), ahead)),
                 'feet': _whole(np.concatenate(arrows, axis=1)),
                 'error': [
-                    np.round(np.degrees(d.right.error[rows // 2]), 4).tolist() for d in self.driven
+                    np.round(np.degrees(one.right.error[rows // 2]), 4).tolist() for one in driven
                 ],
             }
         )
@@ -176,10 +159,9 @@ def feet_section(cycle: GaitCycle) -> ContentSection:
     off = 'source off by [N rms]'
     heads = ('Machine', 'Weight [N]', 'Most on a foot [N]', 'On both feet', off)
     panels, rows = [], []
-    for robot, other in ((cycle.pair.robot, False), (cycle.pair.other, True)):
-        feet = cycle.feet(other=other)[..., 1]
-        rule = feet_by_shares(cycle, other=other)[..., 1]
-        two = cycle.support(other=other) == 2
+    for machine in (cycle.own, cycle.other):
+        feet, rule = machine.feet[..., 1], machine.feet_by_shares()[..., 1]
+        two, name = machine.support == 2, machine.robot.name
         series = [
             Series('right foot', feet[:, 0], 'residual'),
             Series('left foot', feet[:, 1], 'predicted'),
@@ -190,11 +172,11 @@ def feet_section(cycle: GaitCycle) -> ContentSection:
         chart = Chart(
             cycle.phase, series, _ABSCISSA, 'force up [N]', height=240, link='feet', marks=marks
         )
-        panels.append((robot.name, '', [chart]))
+        panels.append((name, '', [chart]))
         rows.append(
             (
-                robot.name,
-                f'{weight(robot):.0f}',
+                name,
+                f'{machine.weight:.0f}',
                 f'{feet.max():.0f}',
                 f'{100.0 * np.mean(two):.0f} %',
                 f'{np.sqrt(np.mean((rule - feet)[two] ** 2)):.0f}',
@@ -205,39 +187,33 @@ def feet_section(cycle: GaitCycle) -> ContentSection:
 
 def by_torque_section(walked: SimulatedWalk) -> ContentSection:
     """Return a section with torque-driven joints over the cycle, and the source's results."""
+    rate = read_assumptions()['torque_rate'].value
     text = (
-        f'One joint follows its torque alone ({walked.rate:g} samples per second, cubic splines) '
+        f'One joint follows its torque alone ({rate:g} samples per second, cubic splines) '
         'through swing and stance; hips are free, all other joints move as prescribed. Largest '
         'errors over the cycle:'
     )
-    soft = f'Springs {100.0 * walked.softer:g} % too soft [°]'
+    soft = f'Springs {100.0 * SOFTER:g} % too soft [°]'
     heads = ('Joint', 'Source [°]', 'Here [°]', soft, 'Feet of the source [°]')
-    rows = [
-        (
-            d.joint,
-            f'{d.source:g}',
-            f'{d.right.most:.2g}',
-            f'{d.softer.most:.2f}',
-            f'{d.shared.most:.2f}',
-        )
-        for d in walked.driven
-    ]
-    phase, panels = walked.cycle.phase[::2], []
-    for d in walked.driven:
+    phase, rows, panels = walked.cycle.phase[::2], [], []
+    for right, softer, shared in walked.driven:
+        joint = right.joint
+        errors = f'{right.most:.2g}', f'{softer.most:.2f}', f'{shared.most:.2f}'
+        rows.append((joint, f'{SOURCE_ERROR[joint]:g}', *errors))
         both: tuple[tuple[str, GaitCheck, Role], ...] = (
-            ('by its torque', d.right, 'residual'),
-            ('springs too soft', d.softer, 'predicted'),
+            ('by its torque', right, 'residual'),
+            ('springs too soft', softer, 'predicted'),
         )
         angles = [
-            Series('prescribed', np.degrees(d.right.prescribed), 'measured'),
+            Series('prescribed', np.degrees(right.prescribed), 'measured'),
             *(Series(name, np.degrees(check.followed), role) for name, check, role in both),
         ]
-        errors = [Series(name, np.degrees(check.error), role) for name, check, role in both]
+        curves = [Series(name, np.degrees(check.error), role) for name, check, role in both]
         error = Chart(
-            phase, errors, _ABSCISSA, 'error [°]', height=150, link=d.joint, symmetric=True,
+            phase, curves, _ABSCISSA, 'error [°]', height=150, link=joint, symmetric=True,
             legend=False,
         )  # fmt: skip
-        panels.append((d.joint, '', [Chart(phase, angles, '', 'angle [°]', link=d.joint), error]))
+        panels.append((joint, '', [Chart(phase, angles, '', 'angle [°]', link=joint), error]))
     return ContentSection(
         'Whole cycle by torque', [Paragraph(text), DataTable(heads, rows), Panels(panels)]
     )
