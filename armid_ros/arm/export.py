@@ -18,9 +18,6 @@ from armid_ros.motion import FloatArray, Motion
 from armid_ros.robots import held_joints
 import numpy as np
 
-#: Number of random states in which torques are compared.
-STATES = 50
-
 
 @dataclass(frozen=True)
 class Exported:
@@ -144,7 +141,7 @@ def torque_check(exported: Exported, arm: ArmModel) -> dict[str, Any]:
     except ImportError:
         return {'not_checked': 'MuJoCo is not installed'}
     robot = arm.body.tree
-    motion = random_motion(robot, np.random.default_rng(0), STATES)
+    motion = random_motion(robot, np.random.default_rng(0), 50)
     placed = {
         key: np.array([exported.values.get(key, {}).get(joint, 0.0) for joint in robot.joints])
         for key in ('damping', 'friction', 'armature')
@@ -171,7 +168,7 @@ def torque_check(exported: Exported, arm: ArmModel) -> dict[str, Any]:
     difference = float(np.abs(found - wanted).max())
     return {
         'program': f'MuJoCo {mujoco.__version__}',
-        'states': STATES,
+        'states': len(motion),
         'difference': difference,
         'share': difference / float(np.abs(wanted).max()),
         **shapes,

@@ -185,8 +185,8 @@ def load_model(path: str | Path, robot: Robot | ArmModel | str | Path | None = N
         document = checked_model(text)
         if robot is None:
             source = str(document['robot'])
-            beside = path.parent / source
-            robot = load_robot(str(beside) if is_file(beside) else source)
+            local = path.parent / source
+            robot = load_robot(str(local) if is_file(local) else source)
         return _arm(document, robot)
 
 
@@ -240,9 +240,9 @@ def with_named(arm: ArmModel, effect: Effect, values: FloatArray) -> ArmModel:
     there = place_in(arm, effect)
     if there is None:
         words = effect.named_as(values, arm)
-        if all(said.linear and place_in(arm, said) for said, _ in words):
-            for said, theirs in words:
-                arm = with_named(arm, said, theirs)
+        if all(one.linear and place_in(arm, one) for one, _ in words):
+            for one, own_values in words:
+                arm = with_named(arm, one, own_values)
             return arm
         return arm.with_effect(effect, values)
     position, rows = there
@@ -270,15 +270,15 @@ def in_words(arm: ArmModel) -> ArmModel:
     magnitude.
 
     """
-    said = replace(arm, effects=(), values=())
+    translated = replace(arm, effects=(), values=())
     for effect, values in zip(arm.effects, arm.values, strict=True):
         words = effect.named_as(values, arm)
         if len(words) == 1 and words[0][0] == effect:
-            said = said.with_effect(effect, values)
+            translated = translated.with_effect(effect, values)
             continue
-        for word, theirs in words:
-            said = with_named(said, word, theirs)
-    return said
+        for one, own_values in words:
+            translated = with_named(translated, one, own_values)
+    return translated
 
 
 def checked_model(text: str) -> dict[str, Any]:

@@ -20,7 +20,7 @@ import pinocchio as pin
 _MESHES = ('.stl', '.obj', '.msh')
 #: Dry friction as stiff as the default time step of 2 ms allows. With the softer default of
 #: MuJoCo, a slow joint of an arm has a tenth of its friction.
-_DRY = {'solreffriction': '0.004 1', 'solimpfriction': '0.9999 0.9999 0.001 0.5 2'}
+_FRICTION_SOLVER = {'solreffriction': '0.004 1', 'solimpfriction': '0.9999 0.9999 0.001 0.5 2'}
 #: Contact attributes: visuals have no contacts; collision shapes have contacts with the
 #: environment and not with each other, because neighbouring links overlap.
 _CLASSES: dict[Literal['visual', 'collision'], dict[str, str]] = {
@@ -89,7 +89,7 @@ def export_mjcf(
             if table.get(joint):
                 body[-1].set(key, repr(float(table[joint])))
         if 'frictionloss' in body[-1].attrib:
-            body[-1].attrib.update(_DRY)
+            body[-1].attrib.update(_FRICTION_SOLVER)
     left_out = [
         *_shapes(robot, bodies, assets),
         'contacts of links with each other',
@@ -179,12 +179,11 @@ def _place(placement: pin.SE3) -> dict[str, str]:
 def _joint(robot: Robot, index: int) -> dict[str, str]:
     """Return the attributes of a joint without its friction."""
     slides = bool(robot.prismatic[index])
-    subspace = robot.model.joints[index + 1].createData().S
-    subspace = np.asarray(getattr(subspace, 'matrix', lambda: subspace)()).reshape(6)
+    geometry = robot.geometry[index]
     attributes = {
         'name': robot.joints[index],
         'type': 'slide' if slides else 'hinge',
-        'axis': _numbers(subspace[:3] if slides else subspace[3:]),
+        'axis': _numbers(geometry.slide if slides else geometry.turn),
     }
     lower, upper, limit = robot.lower[index], robot.upper[index], robot.torque_limit[index]
     if np.isfinite(lower) and np.isfinite(upper):

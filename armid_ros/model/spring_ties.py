@@ -24,7 +24,7 @@ from armid_ros.robots.ties import Tie
 import numpy as np
 
 #: Step of the central differences of spring columns [rad or m].
-_STEP = 1e-5
+_DIFFERENCE_STEP = 1e-5
 
 
 @dataclass(frozen=True)
@@ -69,13 +69,13 @@ class TieGeometry(NamedTuple):
     jacobian: FloatArray
     other_jacobian: FloatArray
 
-    @property
-    def columns(self) -> FloatArray:
-        """Torque of the machine's actuators per stiffness, J^T D, shape (N, n, S) [m^2]."""
-        return np.asarray(np.einsum('nsxj,nsx->njs', self.jacobian, self.way))
-
     def pulled(self, slack: float | FloatArray) -> FloatArray:
-        """Return the columns of springs that pull only if longer than a slack [m], (N, n, S)."""
+        """
+        Return the torque of the machine's actuators per stiffness, J^T D, shape (N, n, S) [m^2].
+
+        Springs pull only if they are longer than a slack [m].
+
+        """
         way = extension(self.way, slack)
         return np.asarray(np.einsum('nsxj,nsx->njs', self.jacobian, way))
 
@@ -147,16 +147,16 @@ def tie_columns_derivatives(
 
     """
     by_q = np.empty((len(q), robot.n_joints, len(ties), robot.n_joints))
-    for j, step in enumerate(_STEP * np.eye(robot.n_joints)):
+    for j, step in enumerate(_DIFFERENCE_STEP * np.eye(robot.n_joints)):
         after = tie_geometry(robot, q + step, other, other_q, ties).pulled(slack)
         before = tie_geometry(robot, q - step, other, other_q, ties).pulled(slack)
-        by_q[..., j] = (after - before) / (2.0 * _STEP)
+        by_q[..., j] = (after - before) / (2.0 * _DIFFERENCE_STEP)
     if np.any(slack):
         by_other = np.empty((*by_q.shape[:3], other.n_joints))
-        for j, step in enumerate(_STEP * np.eye(other.n_joints)):
+        for j, step in enumerate(_DIFFERENCE_STEP * np.eye(other.n_joints)):
             after = tie_geometry(robot, q, other, other_q + step, ties).pulled(slack)
             before = tie_geometry(robot, q, other, other_q - step, ties).pulled(slack)
-            by_other[..., j] = (after - before) / (2.0 * _STEP)
+            by_other[..., j] = (after - before) / (2.0 * _DIFFERENCE_STEP)
         return by_q, by_other
     here = tie_geometry(robot, q, other, other_q, ties)
     return by_q, -np.einsum('nsxi,nsxj->nisj', here.jacobian, here.other_jacobian)

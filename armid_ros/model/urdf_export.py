@@ -29,7 +29,7 @@ import pinocchio as pin
 import scipy.linalg
 
 #: Smallest share of a body's pseudo-inertia, in any direction, that its own link keeps.
-LEAST_SHARE = 0.05
+_MIN_SHARE = 0.05
 
 
 def export_urdf(
@@ -157,30 +157,24 @@ def _share(body: FloatArray, others: FloatArray) -> float:
     if not Consistency.of('', others).eigenvalues[0] > -1e-12:
         return 0.0
     largest = float(scipy.linalg.eigh(pseudo_inertia(others), pseudo_inertia(body))[0][-1])
-    return 1.0 if largest <= 1.0 - LEAST_SHARE else 0.5 / largest
+    return 1.0 if largest <= 1.0 - _MIN_SHARE else 0.5 / largest
 
 
 def _scaled(robot: Robot, shares: FloatArray) -> str:
     """Return the URDF with scaled mass and inertia of links that are fixed to driven ones."""
     document, root = _parsed(robot.urdf)
-    parents: dict[str, tuple[str, str]] = {}
-    for joint in _children(root, 'joint'):
-        for parent, child in zip(
-            _children(joint, 'parent'), _children(joint, 'child'), strict=False
-        ):
-            names = parent.getAttribute('link'), joint.getAttribute('name')
-            parents[child.getAttribute('link')] = names
+    carriers = {joint.child: joint for joint in robot.description.joints}
     for link in _children(root, 'link'):
         name, inertial = link.getAttribute('name'), next(_children(link, 'inertial'), None)
         if inertial is None or name in robot.links:
             continue
         # up to the nearest driven joint
-        at, moved_by = name, ''
-        while at in parents and moved_by not in robot.joints:
-            at, moved_by = parents[at]
-        if moved_by not in robot.joints:
+        carrier = carriers.get(name)
+        while carrier is not None and carrier.name not in robot.joints:
+            carrier = carriers.get(carrier.parent)
+        if carrier is None:
             continue
-        share = float(shares[robot.joints.index(moved_by)])
+        share = float(shares[robot.joints.index(carrier.name)])
         for element in (_child(inertial, 'mass'), _child(inertial, 'inertia')):
             for key, value in element.attributes.items() if share < 1.0 else ():
                 element.setAttribute(key, repr(share * float(value)))

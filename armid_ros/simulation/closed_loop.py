@@ -160,8 +160,8 @@ class CompiledLoop:
         """
         library, last = kernel(), len(rows)
         assert library is not None and targets.tau is not None
-        asked = (targets.q, targets.dq, targets.ddq, targets.tau)
-        arrays = (*moved, tau, *(values[rows.start : rows.stop] for values in asked))
+        desired = (targets.q, targets.dq, targets.ddq, targets.tau)
+        arrays = (*moved, tau, *(values[rows.start : rows.stop] for values in desired))
         addresses = [array.ctypes.data for array in arrays]
 
         def advance(state: State, row: int, arrays: object = arrays) -> int:  # references

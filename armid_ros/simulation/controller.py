@@ -109,15 +109,19 @@ class Controller:
     acts_once: ClassVar[bool] = False
     feedback: LinearFeedback | None = None
 
+    def __init__(self, feedback: LinearFeedback | None = None) -> None:
+        """Make a controller of a feedback law; a subclass may have a law of another form."""
+        self.feedback = feedback
+
     def started(self) -> Controller:
         """Return a controller in its initial state; the same object if it has no state."""
         return self
 
-    def targets(self, desired: Motion, asked: FloatArray | None = None) -> Motion:
+    def targets(self, desired: Motion, previous: FloatArray | None = None) -> Motion:
         """
         Return the desired motion of the motors, with the feedforward torque.
 
-        The reference has one row per step. `asked` is the previously commanded position, shape
+        The reference has one row per step. `previous` is the previously commanded position, shape
         (n,), if any, for the first row.
 
         """
@@ -299,7 +303,7 @@ class MotorControl(Controller):
         """Return the same loops with zero integrals."""
         return replace(self)
 
-    def targets(self, desired: Motion, asked: FloatArray | None = None) -> Motion:
+    def targets(self, desired: Motion, previous: FloatArray | None = None) -> Motion:
         """
         Return the desired motion of the motors for a motion of the links.
 
@@ -313,8 +317,8 @@ class MotorControl(Controller):
             q = self.guide.springs.at_motors(q, self.guide.springs.twist(load))
             tau += load + self.guide.action.effort(desired, desired, load)
         before = np.concatenate([q[:1] - self.dt * desired.dq[:1], q[:-1]])
-        if asked is not None:
-            before[1:2] = asked
+        if previous is not None:
+            before[1:2] = previous
         dq = (q - before) / self.dt
         return Motion(desired.joints, desired.t, q, dq, np.zeros_like(q), tau)
 

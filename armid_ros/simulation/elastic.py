@@ -154,12 +154,8 @@ def make_simulated_arm(
 
 #: Samples per second of the multisines.
 _RATE = 500.0
-#: Pause between two experiments, and duration of a step [s].
-_STAND, _STEP = 1.0, 0.5
-#: Largest distance of a joint from its middle position [rad or m].
-_REACH = np.pi / 3.0
-#: Number of tried poses before a TrajectoryError.
-_TRIES = 1000
+#: Pause between two experiments [s].
+_PAUSE = 1.0
 
 #: Function that returns whether a path, shape (N, n), is allowed.
 Clear = Callable[[FloatArray], bool]
@@ -231,7 +227,7 @@ def multisine_course(
     """
     limit = _finite(robot, robot.torque_limit, 'torque')
     velocity = _finite(robot, robot.velocity_limit, 'velocity')
-    here, parts, stand = robot.middle_pose, [], round(_STAND * _RATE)
+    here, parts, stand = robot.middle_pose, [], round(_PAUSE * _RATE)
     still = np.zeros((stand, robot.n_joints))
     samples = stand
     while True:
@@ -288,12 +284,12 @@ def step_course(
     limit = _finite(robot, robot.velocity_limit, 'velocity')
     n = robot.n_joints
     directions = [*np.eye(n), np.ones(n), (-1.0) ** np.arange(n)]
-    t, q, number = [0.0, _STAND], [robot.middle_pose] * 2, 0
+    t, q, number, length = [0.0, _PAUSE], [robot.middle_pose] * 2, 0, 0.5  # of a step [s]
     while True:
-        step = velocity * limit * directions[number % len(directions)] * _STEP
+        step = velocity * limit * directions[number % len(directions)] * length
         there = _next_pose(robot, q[-1], rng, clear, step)
         way = float(np.max(np.abs(there - q[-1]) / (velocity * limit)))
-        times = t[-1] + np.cumsum([way, _STAND, _STEP, _STAND])
+        times = t[-1] + np.cumsum([way, _PAUSE, length, _PAUSE])
         if times[-1] > duration:
             break
         t += times.tolist()
@@ -309,15 +305,16 @@ def _next_pose(
 ) -> FloatArray:
     """Draw a pose that can be reached in a straight line, with a margin beyond the pose."""
     middle = robot.middle_pose
-    lower = np.maximum(robot.lower, middle - _REACH)
-    upper = np.minimum(robot.upper, middle + _REACH)
+    reach, tries = np.pi / 3.0, 1000  # largest distance from the middle [rad or m]; drawn poses
+    lower = np.maximum(robot.lower, middle - reach)
+    upper = np.minimum(robot.upper, middle + reach)
     room = 0.1 * (upper - lower)
-    for _ in range(_TRIES):
+    for _ in range(tries):
         there = rng.uniform(lower + room, upper - room)
         if clear(np.vstack([np.linspace(here, there, 50), there + beyond])):
             return np.asarray(there)
     raise TrajectoryError(
-        f'{robot.name}: none of {_TRIES} poses can be reached from the middle of the ranges in a '
+        f'{robot.name}: none of {tries} poses can be reached from the middle of the ranges in a '
         'straight line without bodies coming too near each other'
     )
 

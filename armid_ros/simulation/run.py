@@ -18,7 +18,7 @@ from armid_ros.simulation.simulated_arm import SimulatedArm
 import numpy as np
 
 #: Velocity from which a simulated joint is unstable [rad/s or m/s].
-_LOST = 1e6
+_MAX_SPEED = 1e6
 
 
 @dataclass(frozen=True, eq=False)
@@ -146,17 +146,17 @@ def record(
     )
     duration = curve.duration if duration is None else duration
     last = stride * int(np.floor(duration / (stride * plant.dt) + 1e-9))
-    motors, links, tau = _followed(arm, last + 1, progress)
+    motors, links, tau = _simulated_motion(arm, last + 1, progress)
     q, dq, ddq = motors
     given = tau if plant.action.drive is None else plant.action.drive(tau)
-    asked, rows = tau, slice(None, None, stride)
+    commanded, rows = tau, slice(None, None, stride)
     if plant.springs is None:
-        ddq, given, asked = (
+        ddq, given, commanded = (
             np.concatenate([x[:1], (x[1:] + x[:-1]) / 2]) for x in (ddq, given, tau)
         )
     truth = Motion(plant.robot.joints, plant.times(0, last + 1), q, dq, ddq, given)
-    q, dq, asked = readings(plant.sensing, truth, asked)
-    late = asked[np.maximum(np.arange(0, last + 1, stride) - sensors.torque_delay, 0)]
+    q, dq, commanded = readings(plant.sensing, truth, commanded)
+    late = commanded[np.maximum(np.arange(0, last + 1, stride) - sensors.torque_delay, 0)]
     measured = sensors.measure(q[rows], dq[rows], late, stride * plant.dt, arm.rng)
     truth = truth.select(rows)
     desired = curve.sample(truth.t)
@@ -167,7 +167,7 @@ def record(
     return replace(run, sides=_both_sides(arm, run, moved))
 
 
-def _followed(
+def _simulated_motion(
     arm: SimulatedArm, steps: int, progress: Callable[[float], None] | None
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Simulate steps; return the motion of motors and links, and the torques."""
@@ -175,13 +175,13 @@ def _followed(
     with np.errstate(over='ignore', invalid='ignore'):  # overflow is checked below
         for trace in arm.traces(steps):
             q, dq, ddq = trace.motors
-            lost = ~(np.abs(dq[:-1]) < _LOST)
+            lost = ~(np.abs(dq[:-1]) < _MAX_SPEED)
             if np.any(lost):
                 step, joint = np.argwhere(lost)[0]
                 raise ModelError(
                     f'{plant.robot.name}: the simulated arm does not follow; '
-                    f'{plant.robot.joints[joint]} is faster than {_LOST:g} rad/s (or m/s) after '
-                    f'{plant.dt * (done + step):.3g} s'
+                    f'{plant.robot.joints[joint]} is faster than {_MAX_SPEED:g} rad/s (or m/s) '
+                    f'after {plant.dt * (done + step):.3g} s'
                 )
             motors = np.stack([q[:-1], dq[:-1], ddq[1:]])
             pieces.append((motors, trace.links[:, :-1], trace.tau[np.newaxis, :-1]))
@@ -197,16 +197,16 @@ def _both_sides(arm: SimulatedArm, run: SimulatedRun, moved: Motion) -> ElasticR
     period = run.t[1] - run.t[0] if len(run.t) > 1 else arm.plant.dt
     sensors, still = arm.sensors, np.zeros_like(moved.q)
     q, dq, _ = sensors.measure(moved.q, moved.dq, still, period, arm.rng)
-    felt = arm.accelerometers.readings(moved)
+    measured = arm.accelerometers.readings(moved)
     if np.any(sensors.acceleration_noise):
-        felt = felt + sensors.acceleration_noise * arm.rng.standard_normal(felt.shape)
+        measured = measured + sensors.acceleration_noise * arm.rng.standard_normal(measured.shape)
     targets = arm.controller.targets(run.reference)
     before = targets.q[:1] - period * run.reference.dq[:1]
     return ElasticRun(
         Motion(run.joints, run.t, run.q, run.dq, still, run.tau),
         Motion(run.joints, run.t, q, dq, moved.ddq),
         np.diff(targets.q, axis=0, prepend=before) / period,
-        felt=felt,
+        felt=measured,
     )
 
 

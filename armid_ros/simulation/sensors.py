@@ -124,7 +124,7 @@ class Sensors:
 
 
 def readings(
-    action: Action, truth: Motion, asked: FloatArray
+    action: Action, truth: Motion, commanded: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """
     Return the readings of sensors without noise.
@@ -135,7 +135,7 @@ def readings(
         Action of the effects.
     truth : Motion
         True motion and torque, at every step of the plant.
-    asked : ndarray, shape (N, n)
+    commanded : ndarray, shape (N, n)
         Commanded torque, which the drives report [N m].
 
     Returns
@@ -144,10 +144,10 @@ def readings(
         Position, velocity and torque as read.
 
     """
-    q, dq, tau = truth.q, truth.dq, asked
+    q, dq, tau = truth.q, truth.dq, commanded
     if action.reading is not None:
         assert truth.tau is not None
-        tau = action.reading(truth.with_torque(asked), truth.tau)
+        tau = action.reading(truth.with_torque(commanded), truth.tau)
     if action.displacement is not None:
         beyond = action.displacement(truth)
         q, dq = q - beyond.q, dq - beyond.dq
@@ -220,13 +220,13 @@ class RecentPast:
         end = self._rows.shape[1] - ahead
         rows, sensing = self._rows[:, max(end - self._length, 0) : end], self._plant.sensing
         count = rows.shape[1]
-        q, dq, ddq, given, asked = rows
+        q, dq, ddq, given, commanded = rows
         late = max(-1 - self._delay, -count)
         if count == 1 or (sensing.reading is None and sensing.displacement is None):
-            return q[-1], dq[-1], asked[late]
+            return q[-1], dq[-1], commanded[late]
         t = self._plant.times(self._steps - ahead - count + 1, count)
         truth = Motion(self._plant.robot.joints, t, q, dq, ddq, given)
-        q, dq, tau = readings(sensing, truth, asked)
+        q, dq, tau = readings(sensing, truth, commanded)
         return q[-1], dq[-1], tau[late]
 
 

@@ -19,7 +19,7 @@ import numpy as np
 import numpy.typing as npt
 
 #: Largest velocity of a trajectory at its beginning and end [rad/s or m/s].
-_AT_REST = 1e-3
+_REST_SPEED = 1e-3
 #: Steps that are simulated at once if they are compiled. Samples are cheaper than with single
 #: steps, and a block takes less time than a period at 1 kHz.
 _BLOCK = 50
@@ -259,16 +259,16 @@ class SimulatedArm:
         self._end_block()
         curve, now = reference.for_robot(self.plant.robot), self._desired(1)
         if curve.dq is not None:
-            self._require_none('ends with', curve.dq[-1], _AT_REST, '/s', 'stop it')
+            self._require_small('ends with', curve.dq[-1], _REST_SPEED, '/s', 'stop it')
         if curve.t[0] > 0.0:
             curve = curve.after(now.q[0], now.dq[0], now.ddq[0])
         else:
             # largest distance of an immediate first point from the desired position [rad or m]
             advice = 'give its first point a later time, to get there'
-            self._require_none('starts away by', curve.q[0] - now.q[0], 0.01, '', advice)
+            self._require_small('starts away by', curve.q[0] - now.q[0], 0.01, '', advice)
             if curve.dq is not None:
                 jump = curve.dq[0] - now.dq[0]
-                self._require_none('starts with a jump of', jump, _AT_REST, '/s', advice)
+                self._require_small('starts with a jump of', jump, _REST_SPEED, '/s', advice)
         curve.require_limits(self.plant.robot, self.plant.dt)
         self._reference, self._begun = curve, self._state.steps
         self._look_ahead(self._targets.q[self._row])
@@ -342,11 +342,12 @@ class SimulatedArm:
         at, speed, none = state.q[np.newaxis], state.dq[np.newaxis], np.zeros((1, len(state.q)))
         at, speed, _ = self.sensors.measure(at, speed, none, dt, self.rng, self._previous_link)
         self._previous_link = at[0]
-        felt = self.accelerometers.read(state.q, state.dq, state.ddq)
+        acceleration = self.accelerometers.read(state.q, state.dq, state.ddq)
         if np.any(self.sensors.acceleration_noise):
-            felt = felt + self.sensors.acceleration_noise * self.rng.standard_normal(felt.shape)
-        asked = self._targets.q[self._row], self._targets.dq[self._row]
-        link = LinkSample(at[0], speed[0], state.ddq, felt, *asked)
+            noise = self.rng.standard_normal(acceleration.shape)
+            acceleration = acceleration + self.sensors.acceleration_noise * noise
+        commanded = self._targets.q[self._row], self._targets.dq[self._row]
+        link = LinkSample(at[0], speed[0], state.ddq, acceleration, *commanded)
         return Sample(state.steps, state.t, q[0], dq[0], tau[0], link)
 
     def _begin(self, reference: Reference, steps: int) -> None:
@@ -370,10 +371,10 @@ class SimulatedArm:
         """Return the torque of the controller for the present targets."""
         self._torque = command(self.plant, self._acting, self._state, self._targets, 0)
 
-    def _look_ahead(self, asked: FloatArray | None = None, steps: int = 1000) -> None:
+    def _look_ahead(self, commanded: FloatArray | None = None, steps: int = 1000) -> None:
         """Evaluate the reference for the next steps, from the last commanded motor position."""
         self._first = self._state.steps
-        self._targets = self.controller.targets(self._desired(steps + 1), asked)
+        self._targets = self.controller.targets(self._desired(steps + 1), commanded)
 
     def _desired(self, count: int) -> Motion:
         """Return the desired motion at successive steps from the present step on."""
@@ -381,7 +382,7 @@ class SimulatedArm:
         motion = self._reference.sample(times(first - self._begun, count))
         return replace(motion, t=times(first, count))
 
-    def _require_none(
+    def _require_small(
         self, what: str, values: FloatArray, tolerance: float, per: str, advice: str
     ) -> None:
         """Raise a TrajectoryError if the value of any joint exceeds a tolerance."""

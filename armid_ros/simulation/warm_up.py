@@ -9,9 +9,6 @@ from armid_ros.errors import ModelError
 from armid_ros.motion import Motion, Temperatures
 import numpy as np
 
-#: Time between the temperatures of a simulated sensor [s].
-_PERIOD = 1.0
-
 
 def temperature_course(text: str, n_joints: int, duration: float) -> Temperatures:
     """
@@ -33,7 +30,8 @@ def temperature_course(text: str, n_joints: int, duration: float) -> Temperature
         If the text is malformed, or is for another number of joints.
 
     """
-    t = np.arange(0.0, duration + _PERIOD, _PERIOD)
+    period = 1.0  # of a simulated sensor [s]
+    t = np.arange(0.0, duration + period, period)
     columns = []
     try:
         for part in text.split(','):
