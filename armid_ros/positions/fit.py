@@ -28,26 +28,11 @@ import numpy as np
 import numpy.typing as npt
 from scipy.optimize import least_squares, nnls
 
-#: Candidate start values of the delay [s], and limits of the fitted delay [s]. A delay is
-#: negative if the clocks of commands and positions differ.
-_DELAYS, _DELAY_RANGE = np.arange(0.0, 0.1, 0.002), (-0.05, 0.3)
 #: Prior standard deviation of a parameter, relative to the size with which it alone explains the
-#: torque. Share of it from which a standard error is reported as infinite.
-_PRIOR, _SEEN = 3.0, 0.3
-#: Step of a finite difference, relative to the same size.
-_DIFFERENCE = 1e-3
-#: Sizes of the delay [s], of the centre of a tool and of its radius of gyration [m].
-_OF_DELAY, _OF_CENTER, _OF_RADIUS = 0.03, 0.1, 0.02
-#: Duration of the blocks within which residuals are correlated [s].
-_BLOCK = 0.5
-#: Smallest initial torque of a joint, relative to that of the strongest joint.
-_LIGHTEST = 0.03
-#: Largest number of samples of a recording for the start values.
-_THINNED = 2000
+#: torque.
+_PRIOR_STD = 3.0
 #: Residual over noise of a joint, above which a law of the joint is missing or a gain is wrong.
-COLOURED = 1.3
-#: Number of fits, each with a new estimate of the noise of the joints.
-_ROUNDS = 3
+MAX_RESIDUAL_TO_NOISE = 1.3
 
 #: A recording and its commands.
 Run = tuple[Recording, CommandedMotion]
@@ -145,7 +130,8 @@ def start_values(
     """
     robot, n = model.robot, model.robot.n_joints
     motions = [motion_of(recording) for recording, _ in runs]
-    motions = [one.select(slice(None, None, len(one) // _THINNED + 1)) for one in motions]
+    # 2000 samples of a recording are enough for start values
+    motions = [one.select(slice(None, None, len(one) // 2000 + 1)) for one in motions]
     body = ArmModel(robot)
     load = np.concatenate([body.load(motion) for motion in motions])
     if model.compensated:
@@ -156,7 +142,7 @@ def start_values(
     if gains is None and not any(np.any(commands.dq) for _, commands in runs):
         free[3] = False  # velocity gain and viscous friction are collinear
     least, level = np.inf, np.sum(load**2, axis=0) + 1e-12
-    for delay in _DELAYS:
+    for delay in np.arange(0.0, 0.1, 0.002):  # [s]
         means = []
         for motion, (_, commands) in zip(motions, runs, strict=True):
             half = 0.5 * (motion.t[1] - motion.t[0])
@@ -181,15 +167,16 @@ def start_values(
     # a joint that sticks moves only by the noise of its encoder, which is no scale
     speed, rate = (np.maximum(x, 0.01 * x.max()) for x in (speed, rate))
     if gains is None:  # the described load of a light last link gives no scale
-        more = np.maximum(_LIGHTEST * effort.max() / effort, 1.0)
+        more = np.maximum(0.03 * effort.max() / effort, 1.0)
         values, effort = more * values, more * effort
     mass = float(robot.rigid_parameters[::10].sum())
     sizes = np.array([effort / error, effort / speed, effort / rate, effort / speed, effort])
-    size = np.concatenate([[_OF_DELAY], sizes.ravel(), [mass / _PRIOR]])
-    size = np.concatenate([size, 3 * [_OF_CENTER], [_OF_RADIUS]])
+    radius = 0.02  # of gyration of a tool [m]
+    # delay [s], joints, mass of the tool [kg], its centre and radius [m]
+    size = np.concatenate([[0.03], sizes.ravel(), [mass / _PRIOR_STD], 3 * [0.1], [radius]])
     # move start values off the limits, as the solver hardly leaves a limit
     values[free] = np.maximum(values, 0.02 * sizes)[free]
-    return np.concatenate([[best], values.ravel(), [0.01 * mass, 0.0, 0.0, 0.0, _OF_RADIUS]]), size
+    return np.concatenate([[best], values.ravel(), [0.01 * mass, 0.0, 0.0, 0.0, radius]]), size
 
 
 @dataclass(eq=False)
@@ -201,7 +188,7 @@ class _Problem:
     start: FloatArray
     size: FloatArray
 
-    def apart(self, x: FloatArray) -> FloatArray:
+    def residual(self, x: FloatArray) -> FloatArray:
         """Return simulated minus measured positions, shape (M, n)."""
         simulated = self.model.simulated(x, self.windows)
         measured = [window.q for window in self.windows]
@@ -209,35 +196,36 @@ class _Problem:
 
     def slopes(self, x: FloatArray, places: npt.NDArray[np.intp]) -> FloatArray:
         """Differentiate positions by some parameters, relative to their sizes, (M, n, places)."""
-        now, steps = self.apart(x), _DIFFERENCE * np.diag(self.size)[places]
-        columns = [(self.apart(x + step) - now) / _DIFFERENCE for step in steps]
+        share = 1e-3  # of the size of a parameter
+        now, steps = self.residual(x), share * np.diag(self.size)[places]
+        columns = [(self.residual(x + step) - now) / share for step in steps]
         return np.stack(columns, axis=-1)
 
     def solved(self, free: npt.NDArray[np.bool_]) -> FloatArray:
         """Fit the free parameters, with repeated estimates of the noise of the joints."""
         x, places = self.start.copy(), np.flatnonzero(free)
         lower, upper = np.zeros(len(x)), np.full(len(x), np.inf)
-        lower[0], upper[0] = _DELAY_RANGE
+        lower[0], upper[0] = -0.05, 0.3  # the delay [s]; negative if the clocks differ
         lower[-4:-1], upper[-4:] = -1.0, 1.0  # of the tool [m]
-        size, prior = self.size[places], np.eye(len(places)) / _PRIOR
+        size, prior = self.size[places], np.eye(len(places)) / _PRIOR_STD
 
         def whole(z: FloatArray) -> FloatArray:
             found = self.start.copy()
             found[places] = size * z
             return found
 
-        def residual(z: FloatArray) -> FloatArray:
-            return np.append(self.apart(whole(z)) / sigma, (z - begin) / _PRIOR)
+        def weighted(z: FloatArray) -> FloatArray:
+            return np.append(self.residual(whole(z)) / sigma, (z - begin) / _PRIOR_STD)
 
         def jacobian(z: FloatArray) -> FloatArray:
             slopes = self.slopes(whole(z), places) / sigma[:, np.newaxis]
             return np.concatenate([slopes.reshape(-1, len(places)), prior])
 
         begin, bounds = self.start[places] / size, (lower[places] / size, upper[places] / size)
-        sigma = np.sqrt(np.mean(self.apart(x) ** 2, axis=0)) + 1e-9
-        for _ in range(_ROUNDS):
+        sigma = np.sqrt(np.mean(self.residual(x) ** 2, axis=0)) + 1e-9
+        for _ in range(3):  # each with a new estimate of the noise of the joints
             found = least_squares(
-                residual,
+                weighted,
                 x[places] / size,
                 jacobian,
                 bounds,
@@ -247,7 +235,7 @@ class _Problem:
                 max_nfev=25,
             )
             x, before = whole(found.x), sigma
-            sigma = np.sqrt(np.mean(self.apart(x) ** 2, axis=0)) + 1e-9
+            sigma = np.sqrt(np.mean(self.residual(x) ** 2, axis=0)) + 1e-9
             if np.all(np.abs(before / sigma - 1.0) < 0.1):
                 break
         return x
@@ -257,11 +245,11 @@ def _errors(
     information: FloatArray, scores: FloatArray, some: npt.NDArray[np.intp]
 ) -> tuple[FloatArray, FloatArray]:
     """Return covariance and standard errors of some parameters, relative to their sizes."""
-    inside = information[np.ix_(some, some)] + np.eye(len(some)) / _PRIOR**2
+    inside = information[np.ix_(some, some)] + np.eye(len(some)) / _PRIOR_STD**2
     covariance = np.linalg.inv(inside)
     blocks = len(scores)
-    lost = blocks / max(blocks - len(some), 0.2 * blocks)
-    middle = lost * scores[:, some].T @ scores[:, some]
+    correction = blocks / max(blocks - len(some), 0.2 * blocks)  # degrees of freedom
+    middle = correction * scores[:, some].T @ scores[:, some]
     robust = np.diag(covariance @ middle @ covariance)
     return np.asarray(covariance), np.sqrt(np.maximum(np.diag(covariance), robust))
 
@@ -269,23 +257,25 @@ def _errors(
 def _judged(problem: _Problem, x: FloatArray, free: npt.NDArray[np.bool_]) -> PositionFit:
     """Return the fit at the solution, with standard errors."""
     model, n, count = problem.model, problem.model.robot.n_joints, len(x)
-    rest = problem.apart(x)
-    sigma = np.sqrt(np.mean(rest**2, axis=0)) + 1e-9
+    residuals = problem.residual(x)
+    sigma = np.sqrt(np.mean(residuals**2, axis=0)) + 1e-9
     weighted = problem.slopes(x, np.arange(count)) / sigma[:, np.newaxis]
-    pulls = np.einsum('mjp,mj->mp', weighted, rest / sigma)
+    gradients = np.einsum('mjp,mj->mp', weighted, residuals / sigma)
     t = np.concatenate([k * 1e6 + window.t for k, window in enumerate(problem.windows)])
-    _, block = np.unique(np.floor(t / _BLOCK), return_inverse=True)
+    # residuals are correlated within blocks of 0.5 s
+    _, block = np.unique(np.floor(t / 0.5), return_inverse=True)
     scores = np.zeros((block.max() + 1, count))
-    np.add.at(scores, block, pulls)
+    np.add.at(scores, block, gradients)
     information = np.einsum('mjp,mjr->pr', weighted, weighted)
 
     errors = partial(_errors, information, scores)
     fitted = np.flatnonzero(free)
     covariance, own = errors(fitted)
     std, reasons = np.zeros(count), [''] * count
+    limit = 0.3 * _PRIOR_STD  # larger standard errors are reported as infinite
     std[fitted] = own * problem.size[fitted]
     for k, place in enumerate(fitted):
-        if own[k] < _SEEN * _PRIOR or place == count - 1:  # the prior of the radius is real
+        if own[k] < limit or place == count - 1:  # the prior of the radius is real
             continue
         std[place] = np.inf
         correlation = np.abs(covariance[k]) / np.sqrt(np.diag(covariance))
@@ -295,24 +285,26 @@ def _judged(problem: _Problem, x: FloatArray, free: npt.NDArray[np.bool_]) -> Po
         mixed = f'not separable from the {other.words} of {other.joint or "the arm"}'
         if 'velocity_gain' in (other.name, model.parameters[place].name):
             mixed += '; give --gains, or record commanded velocities'
-        reasons[place] = mixed if alone < _SEEN * _PRIOR else 'the motion does not depend on it'
-    residual = np.sqrt(np.mean(rest**2, axis=0))
-    noise = np.sqrt(np.mean(np.diff(rest, 3, axis=0) ** 2, axis=0) / 20.0)
+        reasons[place] = mixed if alone < limit else 'the motion does not depend on it'
+    residual = np.sqrt(np.mean(residuals**2, axis=0))
+    noise = np.sqrt(np.mean(np.diff(residuals, 3, axis=0) ** 2, axis=0) / 20.0)
     ratio, ratio_std = np.ones(n), np.zeros(n)
     if not free[1]:
         values, deviation = x.copy(), np.zeros(count)
         with_kp = free | (np.arange(count) <= n)
-        if np.any(residual > COLOURED * noise):  # far from the optimum
+        if np.any(residual > MAX_RESIDUAL_TO_NOISE * noise):  # far from the optimum
             again = replace(problem, start=x).solved(with_kp)
             refitted = _judged(problem, again, with_kp)
             values, deviation = refitted.values, refitted.std
         else:  # one Gauss-Newton step with kp free as well
             some = np.flatnonzero(with_kp)
             covariance, own = errors(some)
-            values[some] -= covariance @ pulls.sum(axis=0)[some] * problem.size[some]
+            values[some] -= covariance @ gradients.sum(axis=0)[some] * problem.size[some]
             deviation[some] = own * problem.size[some]
         ratio, ratio_std = (each[1 : n + 1] / x[1 : n + 1] for each in (values, deviation))
-    behind = [w.commands.mean(np.append(w.t, w.t[-1] + 1e-3))[0] - w.q for w in problem.windows]
+    errors_of_tracking = [
+        w.commands.mean(np.append(w.t, w.t[-1] + 1e-3))[0] - w.q for w in problem.windows
+    ]
     return PositionFit(
         model.arm(x),
         model.parameters,
@@ -321,7 +313,7 @@ def _judged(problem: _Problem, x: FloatArray, free: npt.NDArray[np.bool_]) -> Po
         tuple(reasons),
         ratio,
         ratio_std,
-        np.sqrt(np.mean(np.concatenate(behind) ** 2, axis=0)),
+        np.sqrt(np.mean(np.concatenate(errors_of_tracking) ** 2, axis=0)),
         residual,
         noise,
         sum(float(w.t[-1] - w.t[0]) for w in problem.windows),

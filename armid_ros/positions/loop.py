@@ -31,22 +31,8 @@ import numpy as np
 import pinocchio as pin
 from scipy.interpolate import CubicSpline
 
-#: Step of the plant [s].
-STEP = 1e-3
-#: Parts of a step in which friction sticks or slips from some time on. A reversal at the end of
-#: its step delays the joint by up to a step, and such a delay resembles viscous friction.
-_PARTS = 4
-#: Duration of a window, and of the simulation before it, in which errors of the initial state
-#: decay [s].
-WINDOW, LEAD = 5.0, 0.5
-#: Half width of the time window whose positions determine an initial state by a parabola [s].
-_AROUND = 0.03
-#: Largest rate of compared samples [Hz]; a higher rate has no more information.
-_RATE = 250.0
-#: Largest position error of a simulation that is used [rad or m]; it bounds unstable loops.
-_FAR = 3.0
 #: Time for which the last command is held [s].
-_HELD = 0.5
+_COMMAND_HOLD = 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,30 +102,26 @@ class Window:
 def windows_of(recording: Recording, commands: CommandedMotion) -> Iterator[Window]:
     """Yield windows without gaps in a recording, as long as there are commands."""
     t = recording.t
-    known = (t >= commands.t[0]) & (t <= commands.t[-1] + _HELD)
+    length, lead = 5.0, 0.5  # of a window, and before it for errors of the initial state [s]
+    around = 0.03  # half width of the positions that determine an initial state by a parabola [s]
+    known = (t >= commands.t[0]) & (t <= commands.t[-1] + _COMMAND_HOLD)
     breaks = np.diff(t) > GAP_PERIODS * recording.period
     breaks |= known[1:] != known[:-1]
-    every = max(round(1.0 / (_RATE * max(recording.period, 1e-6))), 1)
+    # samples at a rate above 250 Hz have no more information
+    every = max(round(1.0 / (250.0 * max(recording.period, 1e-6))), 1)
     for stretch in np.split(np.arange(len(t)), np.flatnonzero(breaks) + 1):
-        first = t[stretch[0]] + _AROUND
-        count = round((t[stretch[-1]] - first - LEAD) / WINDOW + 0.3)
+        first = t[stretch[0]] + around
+        count = round((t[stretch[-1]] - first - lead) / length + 0.3)
         if not known[stretch[0]] or count < 1:
             continue
-        edges = np.linspace(first + LEAD, t[stretch[-1]], count + 1)
+        edges = np.linspace(first + lead, t[stretch[-1]], count + 1)
         for begin, end in pairwise(edges):
-            start = begin - LEAD
-            near = stretch[np.abs(t[stretch] - start) <= max(_AROUND, 2.5 * recording.period)]
+            start = begin - lead
+            near = stretch[np.abs(t[stretch] - start) <= max(around, 2.5 * recording.period)]
             parabola = np.polynomial.polynomial.polyfit(t[near] - start, recording.q[near], 2)
             inside = stretch[(t[stretch] > begin) & (t[stretch] <= end)][::every]
             state = parabola * np.array([[1.0], [1.0], [2.0]])
             yield Window(commands, start, state, t[inside], recording.q[inside])
-
-
-@dataclass(frozen=True, eq=False)
-class _PositionControl(Controller):
-    """Controller that is defined by its feedback law."""
-
-    feedback: LinearFeedback
 
 
 @dataclass(frozen=True, eq=False)
@@ -207,7 +189,7 @@ class LoopModel:
         """
         n = self.robot.n_joints
         arrived = recording.t - x[0]
-        known = (arrived >= commands.t[0]) & (arrived <= commands.t[-1] + _HELD)
+        known = (arrived >= commands.t[0]) & (arrived <= commands.t[-1] + _COMMAND_HOLD)
         t, q = recording.t[known], recording.q[known]
         dq = CubicSpline(t, q)(t, 1)
         half = 0.5 * recording.period
@@ -229,30 +211,32 @@ class LoopModel:
             Positions at the times of the samples of each window [rad or m].
 
         """
-        effects, n = self.arm(x), self.robot.n_joints
+        effects, n, dt = self.arm(x), self.robot.n_joints, 1e-3  # step of the plant [s]
         kp, kd = x[1 : n + 1], x[n + 1 : 2 * n + 1]
         rotor, viscous, *others = effects.values
         endless = replace(self.robot, torque_limit=np.full(n, np.inf))
         damped = replace(effects, robot=endless, values=(rotor, viscous + kd, *others))
-        plant, fine = (Plant(damped, dt, hard_stops=False) for dt in (STEP, STEP / _PARTS))
-        # positions half a step ahead: kp (u - q - dq STEP / 2)
+        # a step in which friction sticks or slips from some time on has four parts: a reversal at
+        # the end of a step delays the joint, which resembles viscous friction
+        plant, fine = (Plant(damped, step, hard_stops=False) for step in (dt, dt / 4))
+        # positions half a step ahead: kp (u - q - dq dt / 2)
         feedback = LinearFeedback(
             self.robot,
             np.zeros((n, n)),
             weighs=self.compensated,
             stiffness=kp,
-            damping=0.5 * STEP * kp,
+            damping=0.5 * dt * kp,
         )
-        control = _PositionControl(feedback)
+        control = Controller(feedback)
         compiled = CompiledLoop.of(plant, control)
-        found = []
+        found, far = [], 3.0  # largest position error, of an unstable loop [rad or m]
         for window in windows:
             # steps begin when commands arrive, as friction may hold against a mean of two commands
             sent = window.commands.t[np.searchsorted(window.commands.t, window.start - x[0]) - 1]
-            late = (sent + x[0] - window.start) % STEP
+            late = (sent + x[0] - window.start) % dt
             start, (q, dq, ddq) = window.start + late, window.state
-            steps = int(np.ceil((window.t[-1] - start) / STEP)) + 1
-            edges = start - x[0] + STEP * np.arange(steps + 2)
+            steps = int(np.ceil((window.t[-1] - start) / dt)) + 1
+            edges = start - x[0] + dt * np.arange(steps + 2)
             u, du = window.commands.mean(edges)
             still = np.zeros_like(u)
             targets = Motion(self.robot.joints, edges[:-1], u, still, still, kd * du)
@@ -262,14 +246,14 @@ class LoopModel:
             try:
                 trace = run(plant, control, state, torque, targets, rows, compiled, fine)
             except (ModelError, FloatingPointError):  # the simulation is unstable
-                found.append(np.full_like(window.q, _FAR))
+                found.append(np.full_like(window.q, far))
                 continue
             q, dq, _ = trace.links
-            place = (window.t - start) / STEP
+            place = (window.t - start) / dt
             k = np.minimum(place.astype(int), steps - 1)
             s = (place - k)[:, np.newaxis]
             here = q[k] + (q[k + 1] - q[k]) * s**2 * (3.0 - 2.0 * s)  # Hermite's spline
-            here += STEP * s * (1.0 - s) * (dq[k] * (1.0 - s) - dq[k + 1] * s)
-            apart = np.nan_to_num(here - window.q, nan=_FAR, posinf=_FAR, neginf=-_FAR)
-            found.append(window.q + np.clip(apart, -_FAR, _FAR))
+            here += dt * s * (1.0 - s) * (dq[k] * (1.0 - s) - dq[k + 1] * s)
+            residual = np.nan_to_num(here - window.q, nan=far, posinf=far, neginf=-far)
+            found.append(window.q + np.clip(residual, -far, far))
         return found

@@ -9,18 +9,12 @@ from typing import Any
 
 from armid_ros.api.table import Summary
 from armid_ros.estimate import measured
-from armid_ros.positions.fit import COLOURED, PositionFit, Run
+from armid_ros.positions.fit import MAX_RESIDUAL_TO_NOISE, PositionFit, Run
 from armid_ros.recording import Recording
 from armid_ros.robots import Robot
 import numpy as np
 
 SCHEMA = 'armid/positions/1'
-#: Residual over tracking error of a joint, above which the fit is reported as poor.
-_POOR = 0.3
-#: Given gains contradict the data above this number of standard errors and this share.
-_DIFFERS, _SHARE = 3.0, 0.02
-#: Share of samples beyond a limit that is reported, and share of a torque limit that reaches it.
-_OFTEN, _REACHED = 0.001, 0.99
 #: Quantities of the joints in the table, and their headings.
 _COLUMNS = {
     'position_gain': 'kp',
@@ -36,7 +30,7 @@ def limit_hints(runs: Sequence[Run], torques: Sequence[Recording], robot: Robot)
     commands = np.concatenate([commands.q for _, commands in runs])
     torque = np.concatenate([one.tau for one in torques if one.tau is not None])
     beyond = np.mean((commands < robot.lower) | (commands > robot.upper), axis=0)
-    reached = np.mean(np.abs(torque) > _REACHED * robot.torque_limit, axis=0)
+    reached = np.mean(np.abs(torque) > 0.99 * robot.torque_limit, axis=0)
     return [
         f'{joint}: {100.0 * share:.3g} % of the {text}'
         for shares, text in (
@@ -44,13 +38,13 @@ def limit_hints(runs: Sequence[Run], torques: Sequence[Recording], robot: Robot)
             (reached, 'torque reaches the limit of its drive, which is not modelled; move slower'),
         )
         for joint, share in zip(robot.joints, shares, strict=True)
-        if share > _OFTEN
+        if share > 0.001
     ]
 
 
 def fit_document(found: PositionFit, hints: Sequence[str] = ()) -> dict[str, Any]:
     """Return the content of positions.json; `hints` are of `limit_hints`."""
-    poor = bool(np.any(found.residual > _POOR * found.tracking))
+    poor = bool(np.any(found.residual > 0.3 * found.tracking))
     std = [float(one) if np.isfinite(one) else None for one in found.std]
     values = zip(found.parameters, found.values.tolist(), std, found.reasons, strict=True)
     columns = 'tracking', 'residual', 'noise', 'gain_ratio', 'gain_ratio_std'
@@ -61,7 +55,7 @@ def fit_document(found: PositionFit, hints: Sequence[str] = ()) -> dict[str, Any
         for joint, rest, noise in zip(
             found.arm.robot.joints, found.residual, found.noise, strict=True
         )
-        if rest > COLOURED * noise
+        if rest > MAX_RESIDUAL_TO_NOISE * noise
     ]
     partial = any(found.reasons) or coloured or hints
     return {
@@ -119,7 +113,8 @@ def fit_summary(found: PositionFit, document: dict[str, Any], step: str) -> Summ
     lines = [f'{found.duration:.0f} s compared; links are taken as described']
     ratio, error = found.gain_ratio, found.gain_ratio_std
     if error.any():
-        differs = np.abs(ratio - 1.0) > np.maximum(_DIFFERS * error, _SHARE)
+        # by more than three standard errors and 2 %
+        differs = np.abs(ratio - 1.0) > np.maximum(3.0 * error, 0.02)
         text = f'agree with the data within {100.0 * 1.96 * error.max():.2g} %'
         if differs.any():
             places = np.flatnonzero(differs)

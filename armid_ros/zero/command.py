@@ -15,7 +15,7 @@ from armid_ros.cli.terminal import progress
 import click
 
 #: Options of `armid excite` on the limits and surroundings of an arm.
-_AROUND = ('joint_limits', 'velocity', 'clearance', 'floor', 'environment')
+_SCENE_OPTIONS = ('joint_limits', 'velocity', 'clearance', 'floor', 'environment')
 
 
 @click.group(epilog='Example: armid zero plan --robot ur5.urdf --out plan')
@@ -56,7 +56,7 @@ def plan(
     from armid_ros.excitation import CollisionScene, with_joint_limits
     from armid_ros.zero.plan import plan_zero
 
-    joint_limits, velocity, *place = (given.pop(name) for name in _AROUND)
+    joint_limits, velocity, *place = (given.pop(name) for name in _SCENE_OPTIONS)
     robot = options.open_robot(robot_source, gravity, joints)
     robot = with_joint_limits(robot, joint_limits, velocity)
     require_free(out)
@@ -76,7 +76,7 @@ def plan(
         options.deliver(result, staged, origin, as_json, summary)
 
 
-plan.params += [one for one in excite.params if one.name in _AROUND]
+plan.params += [one for one in excite.params if one.name in _SCENE_OPTIONS]
 
 
 @zero.command(epilog='Example: armid zero fit run.mcap --robot ur5.urdf --out zeros')

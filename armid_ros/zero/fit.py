@@ -27,24 +27,23 @@ from scipy.stats import t as student
 
 SCHEMA = 'armid/zero/1'
 #: Quantities that the user may fix, each with the effects that are then not fitted.
-KNOWN = {'gain': 'torque_gain', 'tilt': 'base_tilt', 'tool': 'payload'}
+_EFFECTS_OF_KNOWN = {'gain': 'torque_gain', 'tilt': 'base_tilt', 'tool': 'payload'}
 #: Quantity of each effect; if it is not determined, the effect is not in the model.
-_OF = {'torque_gain': 'gain', 'torque_offset': 'zero', 'base_tilt': 'tilt', 'payload': 'mass'}
+_QUANTITY = {'torque_gain': 'gain', 'torque_offset': 'zero', 'base_tilt': 'tilt'}
+_QUANTITY |= {'payload': 'mass'}
 #: Largest half-width of a 95 % interval of a determined quantity: zeros and friction as shares
 #: of the largest reading of the joint, gravity [m/s^2], tilt [deg], mass as a share of the mass
 #: of the arm, and centre [m].
-_USEFUL = {'zero': 0.2, 'friction': 0.2, 'gain': 0.1, 'gravity': 0.4, 'tilt': 2.0, 'mass': 0.04}
-_USEFUL['center'] = 0.1
+_MAX_HALF_WIDTH = {'zero': 0.2, 'friction': 0.2, 'gain': 0.1, 'gravity': 0.4, 'tilt': 2.0}
+_MAX_HALF_WIDTH |= {'mass': 0.04, 'center': 0.1}
 #: Prior standard deviation of each parameter, ten times a useful accuracy: torques as shares of
 #: the largest reading of the joint, payload as a share of the mass of the arm, others in SI
 #: units.
-_PRIORS = {'torque_offset': 1.0, 'coulomb_torque': 1.0, 'gain_error': 0.5, 'payload_m': 0.3}
-_PRIORS |= {'tilt_x': 0.3, 'tilt_y': 0.3, 'gravity_difference': 2.0}
-_PRIORS |= dict.fromkeys(('payload_mx', 'payload_my', 'payload_mz'), 0.1)
-#: Residual over the noise of a rest from which dry friction of unknown size is reported.
-STICKS = 5.0
+_PRIOR_STD = {'torque_offset': 1.0, 'coulomb_torque': 1.0, 'gain_error': 0.5, 'payload_m': 0.3}
+_PRIOR_STD |= {'tilt_x': 0.3, 'tilt_y': 0.3, 'gravity_difference': 2.0}
+_PRIOR_STD |= dict.fromkeys(('payload_mx', 'payload_my', 'payload_mz'), 0.1)
 #: Remedy for most quantities that are not determined.
-MORE = 'record a run of armid zero plan'
+_REMEDY = 'record a run of armid zero plan'
 
 
 @dataclass(frozen=True)
@@ -105,7 +104,7 @@ class ZeroFit:
             if effect.name == 'payload' and values[0] > 0.0:
                 point = pin.Inertia(values[0], values[1:4] / values[0], np.zeros((3, 3)))
                 values = point.toDynamicParameters()
-            if name := _OF.get(effect.name):
+            if name := _QUANTITY.get(effect.name):
                 owners = effect.joints if name in ('gain', 'zero') else ('',)
                 known = [not self.of(name, joint).reason for joint in owners]
                 arm = arm.with_effect(effect, values * known)
@@ -119,7 +118,7 @@ def arm_at_rest(robot: Robot, known: Collection[str] = ()) -> ArmModel:
         names.append('gravity_magnitude')
     arm = ArmModel(robot, quasi_static=True)
     for name in names:
-        if name not in {KNOWN[one] for one in known}:
+        if name not in {_EFFECTS_OF_KNOWN[one] for one in known}:
             arm = arm.with_effect(make_effect(name, robot))
     return arm
 
@@ -166,7 +165,7 @@ def fit_rests(
     robots : sequence of Robot
         The described arm in each recording, with its known payload.
     known : collection of str
-        Quantities of `KNOWN` that are fixed to their described values.
+        Quantities that are fixed to their described values: 'gain', 'tilt' or 'tool'.
     link_error : float
         Standard deviation of masses and first moments of links, as a share of their size; 0: the
         description is exact.
@@ -183,13 +182,13 @@ def fit_rests(
     for name in arms[0].parameters[links.size :]:
         share = name.effect in ('torque_offset', 'coulomb_friction', 'payload')
         owner = '' if name.effect == 'payload' else name.joint
-        prior.append(_PRIORS.get(name.name, 0.0) * (units[owner] if share else 1.0))
+        prior.append(_PRIOR_STD.get(name.name, 0.0) * (units[owner] if share else 1.0))
     solved = _solved(arms, rests, np.array(prior), scales)
     arm = arms[-1].with_theta(arms[-1].theta + solved.x)
     q = np.concatenate([one.q for one in rests])
     # poses at least 0.1 rad or m from all previous poses
     poses = sum(bool(np.all(np.abs(q[:k] - q[k]).max(axis=1) > 0.1)) for k in range(len(q)))
-    few = f'{poses} poses are too few; {MORE}' if solved.freedom < 3.0 else ''
+    few = f'{poses} poses are too few; {_REMEDY}' if solved.freedom < 3.0 else ''
     before, after = (y - _predicted(arms, rests, x)[0] for x in (0.0 * solved.x, solved.x))
     return ZeroFit(
         arm,
@@ -199,7 +198,7 @@ def fit_rests(
         scales,
         len(y),
         poses,
-        int(np.sum(_sided(rests) & ~solved.used)),
+        int(np.sum(_approached(rests) & ~solved.used)),
     )
 
 
@@ -212,7 +211,7 @@ def _predicted(
     return torque, np.concatenate([arm.columns(motion) for arm, motion in pairs])
 
 
-def _sided(rests: Sequence[Motion]) -> npt.NDArray[np.bool_]:
+def _approached(rests: Sequence[Motion]) -> npt.NDArray[np.bool_]:
     """Mark readings after an approach; in others, dry friction is known only to its bounds."""
     return np.concatenate([one.dq for one in rests]).astype(bool)
 
@@ -240,8 +239,8 @@ def _solved(
     arms: Sequence[ArmModel], rests: Sequence[Motion], prior: FloatArray, scales: FloatArray
 ) -> _Solution:
     """Solve by Gauss-Newton iterations; estimate variances and leave out outliers on the way."""
-    y, sided = np.concatenate([np.asarray(one.tau) for one in rests]), _sided(rests)
-    x, free, used, sigma = np.zeros(len(prior)), np.flatnonzero(prior), sided, 0.02 * scales
+    y, approached = np.concatenate([np.asarray(one.tau) for one in rests]), _approached(rests)
+    x, free, used, sigma = np.zeros(len(prior)), np.flatnonzero(prior), approached, 0.02 * scales
     for _ in range(60):
         torque, columns = _predicted(arms, rests, x)
         w = columns[:, :, free] * (used / sigma)[:, :, np.newaxis]
@@ -256,7 +255,7 @@ def _solved(
         sigma = np.sqrt((used * residual**2).sum(axis=0) / np.maximum(freedom, 0.1)) + least
         if freedom.min() > 8.0:  # readings are enough to leave out outliers
             # 6.7 median residuals are 4.5 standard deviations, as where dry friction is reversed
-            used = sided & (residual <= 6.7 * np.median(residual, axis=0) + least)
+            used = approached & (residual <= 6.7 * np.median(residual, axis=0) + least)
         small = np.all(step**2 < 1e-6 * np.diag(covariance))
         if small and np.all(np.abs(before / sigma - 1.0) < 1e-3):
             break
@@ -283,7 +282,7 @@ def _quantities(
         variance = max(slope @ one @ slope for one in (solved.covariance, solved.scattered))
         half = factor * float(np.sqrt(variance))
         scale = units[joint] if name in ('zero', 'friction', 'mass') else 1.0
-        limit = scale * _USEFUL[name.split('_')[0]]
+        limit = scale * _MAX_HALF_WIDTH[name.split('_')[0]]
         reason = few if half > 0.0 else ''
         if half > limit:
             reason = few or _reason(arm, solved, slope, limit / factor)
@@ -310,7 +309,7 @@ def _reason(arm: ArmModel, solved: _Solution, slope: FloatArray, limit: float) -
     elif 'gain_error' in names:
         remedy = 'gravity hardly turns the joint: give --known gain, or record it with a tool'
     elif own.name == 'coulomb_torque':
-        remedy = MORE
+        remedy = _REMEDY
     mixed = f'not separable from {other.words} of {other.joint or "the base"}'
     return f'{mixed if alone else "no rest depends on it"}; {remedy}'
 
@@ -371,7 +370,7 @@ def fit_summary(found: ZeroFit, document: dict[str, Any], step: str, noise: Floa
         for joint, residual, least in zip(
             found.arm.robot.joints, found.residual, noise, strict=True
         )
-        if residual > STICKS * least
+        if residual > 5.0 * least  # dry friction of unknown size
     ]
     if sticking:
         lines.append(
@@ -388,7 +387,7 @@ def fit_summary(found: ZeroFit, document: dict[str, Any], step: str, noise: Floa
     if document['verdict'] == 'not explained':
         step = 'check --robot, --gravity, --effort-scale and contacts of the arm'
     elif document['verdict'] == 'not determined':
-        step = MORE
+        step = _REMEDY
     heads = ('joint', *names, 'residual [N m or N]')
     return Summary(title, document['verdict'], heads, rows, lines, [step])
 

@@ -32,7 +32,7 @@ from armid_ros.zero.fit import arm_at_rest
 import numpy as np
 
 #: Distance of the motion beyond a pose and back [rad or m].
-BEYOND = 0.1
+_OVERSHOOT = 0.1
 
 
 def plan_zero(
@@ -88,7 +88,7 @@ def _poses(
     lower, upper = limits.position_range()
     turn = np.where(robot.prismatic, np.inf, np.pi)  # gravity torque is periodic with a full turn
     lower, upper = np.maximum(lower, -turn), np.minimum(upper, turn)
-    room = np.minimum(BEYOND, 0.1 * (upper - lower))
+    room = np.minimum(_OVERSHOOT, 0.1 * (upper - lower))
     drawn = rng.uniform(lower + room, upper - room, (400, robot.n_joints))
     free = np.array([q for q in drawn if not planner.fault(q)])
     if len(free) < count:
@@ -109,10 +109,10 @@ def _poses(
         gain = np.linalg.slogdet(total + each)[1]
         gain[chosen] = -np.inf
         chosen.append(int(np.argmax(gain)))
-    left, order = list(free[chosen]), [planner.free_start()]
-    while left:
-        far = [(np.abs(q - order[-1]) / limits.velocity).max() for q in left]
-        order.append(left.pop(int(np.argmin(far))))
+    remaining, order = list(free[chosen]), [planner.free_start()]
+    while remaining:  # the nearest pose next
+        times = [(np.abs(q - order[-1]) / limits.velocity).max() for q in remaining]
+        order.append(remaining.pop(int(np.argmin(times))))
     return np.array(order[1:])
 
 
@@ -135,7 +135,7 @@ def _tour(
             continue
         now, rest = pose, np.tile(pose, (count, 1))
         parts += [way.at(np.arange(0.0, way.duration, 1.0 / rate)).q, rest]
-        over = pose + np.where(way.q[-1] < way.q[-2], -BEYOND, BEYOND)
+        over = pose + np.where(way.q[-1] < way.q[-2], -_OVERSHOOT, _OVERSHOOT)
         over = np.clip(over, limits.lower, limits.upper)
         if not planner.fault(over):
             parts += [pose + bump * (over - pose), rest]

@@ -13,13 +13,13 @@ from scipy.ndimage import maximum_filter1d, median_filter, minimum_filter1d, uni
 
 #: Time in which a joint at rest stays within `REST_RANGE` [s]; half of this time is cut off at
 #: both ends of a rest. Time in which the torque then settles, and shortest rest after it [s].
-WINDOW, SETTLING, SHORTEST = 1.0, 0.5, 0.5
+_WINDOW, _SETTLING_TIME, _MIN_REST = 1.0, 0.5, 0.5
 
 
 def reading_noise(recording: Recording) -> FloatArray:
     """Return the noise of the mean torque of the shortest rest, if it is white, shape (n,)."""
     assert recording.tau is not None
-    count = max(SHORTEST / max(recording.period, 1e-6), 1.0)
+    count = max(_MIN_REST / max(recording.period, 1e-6), 1.0)
     # the median leaves out steps of friction; 0.954 of a standard deviation for differences
     steps = np.median(np.abs(np.diff(recording.tau, axis=0)), axis=0)
     return np.asarray(steps / 0.954 / np.sqrt(count))
@@ -40,31 +40,32 @@ def find_rests(recording: Recording) -> Motion:
             f'{recording.source}: no effort was recorded; name the topic or the columns of the '
             'torque with --topic or --effort'
         )
-    size = max(round(WINDOW / max(recording.period, 1e-6)), 3)
+    size = max(round(_WINDOW / max(recording.period, 1e-6)), 3)
     # outliers and encoder noise do not end a rest
     q = median_filter(recording.q, (5, 1), mode='nearest')
     q = uniform_filter1d(q, max(size // 5, 1), axis=0, mode='nearest')
     spread = maximum_filter1d(q, size, axis=0) - minimum_filter1d(q, size, axis=0)
     still = (spread < REST_RANGE).all(axis=1)
-    still[1:] &= np.diff(t) < SHORTEST
+    still[1:] &= np.diff(t) < _MIN_REST
     edges = np.flatnonzero(np.diff(np.concatenate([[False], still, [False]]).astype(int)))
     begins, ends = edges[::2], edges[1::2] - 1
-    lasting = t[ends] - t[begins] >= SETTLING + SHORTEST
+    lasting = t[ends] - t[begins] >= _SETTLING_TIME + _MIN_REST
     if not lasting.any():
-        longest = float((t[ends] - t[begins]).max(initial=-WINDOW)) + WINDOW
+        longest = float((t[ends] - t[begins]).max(initial=-_WINDOW)) + _WINDOW
+        needed = _SETTLING_TIME + _MIN_REST + _WINDOW
         raise IdentificationError(
             f'{recording.source}: the arm is at rest for {longest:.2g} s at most, and '
-            f'{SETTLING + SHORTEST + WINDOW:g} s are needed; record a run of armid zero plan'
+            f'{needed:g} s are needed; record a run of armid zero plan'
         )
     rests, before = [], 0
     for begin, end in zip(begins[lasting], ends[lasting] + 1, strict=True):
-        first = int(np.searchsorted(t, t[begin] + SETTLING))
-        pose, came = q[first:end].mean(axis=0), np.zeros(q.shape[1])
+        first = int(np.searchsorted(t, t[begin] + _SETTLING_TIME))
+        pose, approach = q[first:end].mean(axis=0), np.zeros(q.shape[1])
         for j, way in enumerate((pose - q[before:begin]).T):
             # distance after which dry friction opposes the motion [rad or m]
             apart = np.flatnonzero(np.abs(way) > 0.03)
-            came[j] = np.sign(way[apart[-1]]) if len(apart) else 0.0
-        rests.append((t[begin], pose, came, tau[first:end].mean(axis=0)))
+            approach[j] = np.sign(way[apart[-1]]) if len(apart) else 0.0
+        rests.append((t[begin], pose, approach, tau[first:end].mean(axis=0)))
         before = first
     time, poses, directions, torque = (np.array(one) for one in zip(*rests, strict=True))
     return Motion(recording.joints, time, poses, directions, np.zeros_like(poses), torque)
