@@ -12,7 +12,7 @@ from armid_ros.errors import RobotError
 from armid_ros.motion import FloatArray, read_only
 from armid_ros.robots.description import Description, Joint
 from armid_ros.robots.mechanism import Mechanism
-from armid_ros.robots.robot import of_joints, Robot
+from armid_ros.robots.robot import joint_fields, Robot
 from armid_ros.robots.selection import leaders, standing_position
 import numpy as np
 import pinocchio as pin
@@ -73,7 +73,7 @@ def couple(tree: Robot, driven: Sequence[Joint], known: Mapping[str, float]) -> 
     names = [joint.name for joint in driven]
     if tuple(names) == tree.joints:
         return tree
-    own = of_joints(driven)
+    own = joint_fields(driven)
     start = np.clip(np.zeros(len(names)), own['lower'], own['upper'])
     mechanism = _mechanism(tree, names, start, known)
     lower, upper = _narrowed_limits(mechanism, tree, own['lower'], own['upper'])

@@ -17,7 +17,7 @@ from armid_ros.files.regular import TEXT_LIMIT
 import numpy as np
 
 MOVABLE = ('revolute', 'continuous', 'prismatic')
-KNOWN = (*MOVABLE, 'fixed', 'floating', 'planar')
+JOINT_TYPES = (*MOVABLE, 'fixed', 'floating', 'planar')
 
 Vector = tuple[float, float, float]
 #: Components of an inertia, in the order of a URDF.
@@ -40,15 +40,15 @@ class Inertial:
         moments = np.linalg.eigvalsh(tensor)
         # descriptions have six digits; moments below 1e-12 kg m^2 are negligible
         tolerance = max(1e-6 * float(np.abs(moments).max()), 1e-12)
-        said = ', '.join(f'{moment:.3g}' for moment in moments)
+        shown = ', '.join(f'{moment:.3g}' for moment in moments)
         if self.mass < 0.0 or moments[0] < -tolerance:
-            return f'negative mass or inertia (m = {self.mass:g} kg, moments {said} kg m^2)'
+            return f'negative mass or inertia (m = {self.mass:g} kg, moments {shown} kg m^2)'
         if moments[0] + moments[1] < moments[2] - tolerance:
-            sum_in_words = said.replace(', ', ' + ', 1).replace(', ', ' < ')
+            sum_in_words = shown.replace(', ', ' + ', 1).replace(', ', ' < ')
             why = 'the principal moments violate the triangle inequality'
             return f'impossible inertia, {sum_in_words} kg m^2: {why}'
         if self.mass == 0.0 and moments[2] > 0.0:  # noqa: RUF069 - as described
-            return f'an inertia without a mass (moments {said} kg m^2)'
+            return f'an inertia without a mass (moments {shown} kg m^2)'
         return None
 
 
@@ -315,8 +315,8 @@ def _inertial(link: ElementTree.Element, name: str) -> Inertial | None:
 def _joint(element: ElementTree.Element, name: str, notes: list[str]) -> Joint:
     where = f"joint '{name}'"
     kind = element.get('type', '')
-    if kind not in KNOWN:
-        raise RobotError(f"{where} has the type '{kind}'; types are {', '.join(KNOWN)}")
+    if kind not in JOINT_TYPES:
+        raise RobotError(f"{where} has the type '{kind}'; types are {', '.join(JOINT_TYPES)}")
     if kind in ('floating', 'planar'):
         raise RobotError(
             f'{where} is {kind}, but the base of an arm is fixed: make it '
@@ -403,15 +403,15 @@ def _origin(element: ElementTree.Element, where: str) -> tuple[Vector, Vector]:
 def _vector(element: ElementTree.Element, name: str, where: str) -> Vector:
     """Return three finite numbers of limited size, or zeros if the attribute is missing."""
     text = element.get(name, '0 0 0')
-    said = f"{where}: {name}='{text}' of <{element.tag}> is"
+    subject = f"{where}: {name}='{text}' of <{element.tag}> is"
     try:
         x, y, z = (float(number) for number in text.split())
     except ValueError:
         x = y = z = math.nan
     if not (math.isfinite(x) and math.isfinite(y) and math.isfinite(z)):
-        raise RobotError(f'{said} not three finite numbers')
+        raise RobotError(f'{subject} not three finite numbers')
     if max(abs(x), abs(y), abs(z)) > LARGEST:
-        raise RobotError(f'{said} beyond {LARGEST:g}')
+        raise RobotError(f'{subject} beyond {LARGEST:g}')
     return x, y, z
 
 
@@ -425,13 +425,14 @@ def _number(
 ) -> float:
     """Return a number of limited size; only limits may be infinite."""
     text = element.get(name, '' if default is None else repr(default))
-    said = f"{where}: {name}='{text}' of <{element.tag}> is"
+    subject = f"{where}: {name}='{text}' of <{element.tag}> is"
     try:
         number = float(text)
     except ValueError:
         number = math.nan
     if math.isnan(number):
-        raise RobotError(f'{said} no number')
+        raise RobotError(f'{subject} no number')
     if not endless and abs(number) > LARGEST:
-        raise RobotError(f'{said} {"not finite" if math.isinf(number) else f"beyond {LARGEST:g}"}')
+        fault = 'not finite' if math.isinf(number) else f'beyond {LARGEST:g}'
+        raise RobotError(f'{subject} {fault}')
     return number

@@ -23,7 +23,7 @@ import pinocchio as pin
 
 _Meshes = dict[tuple[Path, tuple[float, ...]], tuple[coal.CollisionGeometry, ...]]
 #: Attributes of each kind of shape, with a default if there is one.
-_SIZES = {
+_SHAPE_ATTRIBUTES = {
     'box': ('size',),
     'sphere': ('radius',),
     'cylinder': ('radius', 'length'),
@@ -208,8 +208,8 @@ def _bodies(shape: LinkShape, meshes: _Meshes) -> list[tuple[coal.CollisionGeome
 def _geometry(element: ElementTree.Element) -> tuple[str, tuple[float, ...], str]:
     """Return the kind, the dimensions and the mesh name of a shape."""
     for shape in element.findall('geometry/*'):
-        if shape.tag in _SIZES:
-            texts = [shape.get(name, '') for name in _SIZES[shape.tag]]
+        if shape.tag in _SHAPE_ATTRIBUTES:
+            texts = [shape.get(name, '') for name in _SHAPE_ATTRIBUTES[shape.tag]]
             if shape.tag == 'mesh':
                 return 'mesh', _numbers(texts[0] or '1 1 1'), shape.get('filename', '')
             size = _numbers(texts[0]) if shape.tag == 'box' else tuple(map(float, texts))

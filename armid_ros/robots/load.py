@@ -11,8 +11,9 @@ import math
 import os
 from pathlib import Path
 import shlex
+from typing import Any
 from xml.etree import ElementTree
-from xml.sax.saxutils import escape
+from xml.sax.saxutils import escape, quoteattr
 
 from armid_ros.errors import meant, RobotError
 from armid_ros.files import load_yaml, read_text, reading
@@ -24,11 +25,9 @@ from armid_ros.robots.description import (
     Joint,
     parse_description,
     parse_xml,
-    Vector,
 )
-from armid_ros.robots.mechanism_file import with_mechanism
 from armid_ros.robots.mjcf import is_mjcf, urdf_of_mjcf
-from armid_ros.robots.robot import of_joints, parse_gravity, Robot
+from armid_ros.robots.robot import joint_fields, parse_gravity, Robot
 from armid_ros.robots.selection import driven_joints, several_arms, standing_position
 from armid_ros.robots.xacro_expansion import expand_xacro
 import numpy as np
@@ -133,7 +132,7 @@ def load_robot(
     """
     if isinstance(source, str) and source.lstrip().startswith('<'):
         return robot_from_urdf(source, gravity=gravity, joints=joints)
-    source, arguments, packages = _written_out(source)
+    source, arguments, packages = _split_arguments(source)
     shipped = isinstance(source, str) and source in shipped_robots()
     path = shipped_path(str(source)) if shipped else Path(source).expanduser()
     if not os.path.lexists(path):
@@ -198,7 +197,7 @@ def robot_from_urdf(
     model.lowerPositionLimit = np.array([joint.lower for joint in moving])
     model.upperPositionLimit = np.array([joint.upper for joint in moving])
     robot = Robot(
-        **of_joints(moving),
+        **joint_fields(moving),
         name=description.name,
         model=model,
         links=tuple(joint.child for joint in moving),
@@ -230,7 +229,7 @@ def robot_from_urdf(
         return couple(replace(robot, notes=(*robot.notes, *light)), driven, {})
 
 
-def _written_out(source: str | Path) -> tuple[str | Path, dict[str, str], dict[str, str]]:
+def _split_arguments(source: str | Path) -> tuple[str | Path, dict[str, str], dict[str, str]]:
     """Split into path, arguments and packages: 'arm.xacro tool:=true package:grippers:=/a/b'."""
     if not isinstance(source, str) or ':=' not in source:
         return source, {}, {}
@@ -300,44 +299,37 @@ def _kinematic_urdf(description: Description, positions: Mapping[str, float]) ->
         if inertial is None:
             continue
         element = ElementTree.SubElement(link, 'inertial')
-        ElementTree.SubElement(element, 'origin', xyz=_join(inertial.xyz), rpy=_join(inertial.rpy))
+        ElementTree.SubElement(element, 'origin', xyz=_text(inertial.xyz), rpy=_text(inertial.rpy))
         ElementTree.SubElement(element, 'mass', value=repr(inertial.mass))
         values = dict(zip(INERTIA, map(repr, inertial.inertia), strict=True))
         ElementTree.SubElement(element, 'inertia', values)
     for joint in description.joints:
         driven = joint.movable and joint.name not in positions
         kind = 'prismatic' if joint.kind == 'prismatic' else 'revolute'
-        xyz, rpy = _placement(joint, positions.get(joint.name, 0.0))
+        xyz, rpy, position = joint.xyz, joint.rpy, positions.get(joint.name, 0.0)
+        if position != 0.0:  # noqa: RUF069 - as given
+            rotation, axis = pin.rpy.rpyToMatrix(*joint.rpy), np.array(joint.axis)
+            if kind == 'prismatic':
+                xyz = (np.array(joint.xyz) + rotation @ axis * position).tolist()
+            else:
+                rpy = pin.rpy.matrixToRpy(rotation @ pin.exp3(axis * position)).tolist()
         element = ElementTree.SubElement(
             root, 'joint', name=joint.name, type=kind if driven else 'fixed'
         )
-        ElementTree.SubElement(element, 'origin', xyz=_join(xyz), rpy=_join(rpy))
+        ElementTree.SubElement(element, 'origin', xyz=_text(xyz), rpy=_text(rpy))
         ElementTree.SubElement(element, 'parent', link=joint.parent)
         ElementTree.SubElement(element, 'child', link=joint.child)
-        ElementTree.SubElement(element, 'axis', xyz=_join(joint.axis))
+        ElementTree.SubElement(element, 'axis', xyz=_text(joint.axis))
         ElementTree.SubElement(element, 'limit', lower='-1', upper='1', effort='1', velocity='1')
     return ElementTree.tostring(root, encoding='unicode')
 
 
-def _placement(joint: Joint, position: float) -> tuple[Vector, Vector]:
-    """Placement of the child link in the parent link with the joint at a position."""
-    if position == 0.0:  # noqa: RUF069 - as given
-        return joint.xyz, joint.rpy
-    rotation = pin.rpy.rpyToMatrix(*joint.rpy)
-    axis = np.array(joint.axis)
-    if joint.kind == 'prismatic':
-        x, y, z = np.array(joint.xyz) + rotation @ axis * position
-        return (float(x), float(y), float(z)), joint.rpy
-    roll, pitch, yaw = pin.rpy.matrixToRpy(rotation @ pin.exp3(axis * position))
-    return joint.xyz, (float(roll), float(pitch), float(yaw))
-
-
-def _join(numbers: Sequence[float]) -> str:
+def _text(numbers: Sequence[float]) -> str:
     return ' '.join(map(repr, numbers))
 
 
 #: Suffix of the mounting file in the folder of NAME.urdf or NAME.urdf.xacro.
-SUFFIX = '.mounting.yaml'
+_MOUNTING_SUFFIX = '.mounting.yaml'
 
 
 def read_mounting(robot: Robot) -> tuple[float | None, Path] | None:
@@ -360,7 +352,7 @@ def read_mounting(robot: Robot) -> tuple[float | None, Path] | None:
     if robot.path is None:
         return None
     stem = robot.path.name.removesuffix('.xacro').removesuffix('.urdf')
-    path = robot.path.with_name(stem + SUFFIX)
+    path = robot.path.with_name(stem + _MOUNTING_SUFFIX)
     if not path.is_file():
         return None
     with reading(path, RobotError):
@@ -371,3 +363,71 @@ def read_mounting(robot: Robot) -> tuple[float | None, Path] | None:
     if isinstance(floor, bool) or not isinstance(floor, int | float) or not math.isfinite(floor):
         raise RobotError(f'{path}: has to say floor: HEIGHT [m], or floor: none')
     return float(floor), path
+
+
+#: Suffix of the file of coupled joints that a URDF lacks, in the folder of NAME.urdf,
+#: NAME.urdf.xacro or NAME.xml.
+_MECHANISM_SUFFIX = '.mechanism.yaml'
+
+
+def with_mechanism(text: str, path: Path) -> str:
+    """
+    Return a URDF with the coupled joints of NAME.mechanism.yaml in its folder, if it exists.
+
+    The additional elements of the result are ignored by other readers of a URDF.
+
+    Raises
+    ------
+    RobotError
+        If the file cannot be read, or has other contents.
+
+    """
+    name = path.name
+    for end in ('.xacro', '.urdf', '.xml'):
+        name = name.removesuffix(end)
+    path = path.with_name(name + _MECHANISM_SUFFIX)
+    if not path.is_file():
+        return text
+    with reading(path, RobotError):
+        document = load_yaml(read_text(path, RobotError))
+        if not isinstance(document, dict) or document.keys() - {'mimic', 'motors', 'loops'}:
+            raise RobotError('has to be a mapping with mimic, motors and loops')
+        try:
+            lines = _elements(document, text)
+        except (AttributeError, KeyError, TypeError) as error:
+            raise RobotError(f'an entry of mimic, motors or loops is malformed: {error}') from None
+    head, end, tail = text.rpartition('</robot>')
+    return ''.join([head, *(f'  {line}\n' for line in lines), end, tail])
+
+
+def _elements(document: Mapping[str, Any], urdf: str) -> list[str]:
+    """Return the elements of a URDF for the contents of a file of coupled joints."""
+
+    def tag(kind: str, /, *inside: str, **attributes: Any) -> str:
+        pairs = ''.join(f' {key}={quoteattr(str(value))}' for key, value in attributes.items())
+        return f'<{kind}{pairs}>{"".join(inside)}</{kind}>'
+
+    root, lines = parse_xml(urdf), []
+    carried = {child.get('link') for child in root.iterfind('joint/child')}
+    base = next(
+        link.get('name') for link in root.iterfind('link') if link.get('name') not in carried
+    )
+    for name, limits in (document.get('motors') or {}).items():
+        ends = {'lower': -np.inf, 'upper': np.inf, 'effort': np.inf, 'velocity': np.inf}
+        inside = tag('parent', link=base), tag('child', link=f'{name}_motor')
+        limit = tag('limit', **(ends | (limits or {})))
+        lines.append(tag('link', name=f'{name}_motor'))
+        lines.append(tag('joint', *inside, limit, name=name, type='revolute'))
+    for name, factors in (document.get('mimic') or {}).items():
+        offset = factors.pop('offset', 0.0)
+        for leader, factor in factors.items():
+            values = {'joint': leader, 'multiplier': factor, 'offset': offset}
+            lines.append(tag('mimic', follower=name, **values))
+            offset = 0.0
+    for loop in document.get('loops') or ():
+        points = [
+            tag('point', link=link, xyz=' '.join(map(str, xyz)))
+            for link, xyz in loop['points'].items()
+        ]
+        lines.append(tag('loop', *points, passive=' '.join(loop['passive'])))
+    return lines

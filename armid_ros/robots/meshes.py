@@ -26,8 +26,9 @@ import coal
 import numpy as np
 import numpy.typing as npt
 
-GROWTH = 1.1  # largest accepted ratio of the volume of a hull to the volume that it replaces
-NO_VOLUME = (RuntimeError, ValueError)  # errors that qhull raises for degenerate points
+#: Largest ratio of the volume of a hull to the volume that it replaces.
+_MAX_VOLUME_RATIO = 1.1
+_QHULL_ERRORS = (RuntimeError, ValueError)  # errors that qhull raises for degenerate points
 
 
 def find_mesh(name: str, urdf: Path | None) -> Path | None:
@@ -43,8 +44,8 @@ def find_mesh(name: str, urdf: Path | None) -> Path | None:
         package, _, inside = name.removeprefix('package://').lstrip('/').partition('/')
         candidates = (folder / inside for folder in package_folders(package, urdf))
     else:
-        beside = Path() if urdf is None else urdf.resolve().parent
-        candidates = [beside / name.removeprefix('file://')]
+        folder = Path() if urdf is None else urdf.resolve().parent
+        candidates = [folder / name.removeprefix('file://')]
     return next((path for path in candidates if is_file(path)), None)
 
 
@@ -77,9 +78,9 @@ def convex_bodies(path: Path, scale: FloatArray) -> tuple[coal.CollisionGeometry
     vertices = np.array(mesh.vertices())
     try:
         whole = _hull(vertices)
-    except NO_VOLUME:
+    except _QHULL_ERRORS:
         return (mesh,)
-    if whole.computeVolume() < GROWTH * abs(mesh.computeVolume()):
+    if whole.computeVolume() < _MAX_VOLUME_RATIO * abs(mesh.computeVolume()):
         return (whole,)
     faces = [mesh.tri_indices(number) for number in range(mesh.num_tris)]
     corners = np.array([(face[0], face[1], face[2]) for face in faces])
@@ -89,7 +90,7 @@ def convex_bodies(path: Path, scale: FloatArray) -> tuple[coal.CollisionGeometry
     _, axes = np.linalg.eigh(np.cov(np.array(whole.points()).T))
     best = min((_slabs(vertices, ends, axis) for axis in axes.T), key=_volume)
     bodies = _join(best)
-    return bodies if _volume(bodies) * GROWTH < whole.computeVolume() else (whole,)
+    return bodies if _volume(bodies) * _MAX_VOLUME_RATIO < whole.computeVolume() else (whole,)
 
 
 def _slabs(
@@ -111,7 +112,7 @@ def _slabs(
         try:
             hulls.append(_hull(points))
             thin = np.empty((0, 3))
-        except NO_VOLUME:
+        except _QHULL_ERRORS:
             thin = points
     if len(thin) > 0:
         hulls.append(_hull(np.vstack([hulls.pop().points(), thin])))
@@ -129,7 +130,7 @@ def _join(slabs: Sequence[coal.ConvexBase]) -> tuple[coal.ConvexBase, ...]:
             for body, volumes in zip(common, pairwise(apart), strict=True)
         ]
         tightest = int(np.argmin(growth))
-        if growth[tightest] > GROWTH:
+        if growth[tightest] > _MAX_VOLUME_RATIO:
             break
         bodies[tightest : tightest + 2] = [common[tightest]]
         apart[tightest : tightest + 2] = [sum(apart[tightest : tightest + 2])]

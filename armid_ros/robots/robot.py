@@ -170,7 +170,7 @@ class Robot:
         if self.mechanism is None:
             return self
         own = [self.description.by_name[name] for name in self.moving]
-        return replace(self, **of_joints(own), mechanism=None)
+        return replace(self, **joint_fields(own), mechanism=None)
 
     def positions(self, q: FloatArray) -> FloatArray:
         """Return the positions of the moving joints, (..., m), from the driven ones, (..., n)."""
@@ -321,7 +321,18 @@ class Robot:
             )
         model, place = self.model.copy(), self.path or self.name
         for body, values in enumerate(pi.reshape(-1, PER_LINK)):
-            model.inertias[body + 1] = _inertia(f"{place}: link '{self.links[body]}'", values)
+            mass, moment, (ixx, ixy, iyy, ixz, iyz, izz) = values[0], values[1:4], values[4:]
+            if abs(mass) >= NO_MASS:  # pinocchio's conversion divides by the mass
+                model.inertias[body + 1] = pin.Inertia.FromDynamicParameters(values)
+                continue
+            if np.abs(moment).max() >= NO_MASS:
+                raise RobotError(
+                    f"{place}: link '{self.links[body]}': a first moment {moment} kg m needs a "
+                    'mass; give the link an <inertial> with a rough one'
+                )
+            inertia = pin.Inertia.Zero()  # the constructor accepts positive masses only
+            inertia.inertia = np.array([[ixx, ixy, ixz], [ixy, iyy, iyz], [ixz, iyz, izz]])
+            model.inertias[body + 1] = inertia
         return replace(self, model=model)
 
 
@@ -374,7 +385,7 @@ class JointGeometry:
         )
 
 
-def of_joints(joints: Sequence[Joint]) -> dict[str, Any]:
+def joint_fields(joints: Sequence[Joint]) -> dict[str, Any]:
     """Return the fields of a `Robot` for some joints of a description."""
     return {
         'joints': tuple(joint.name for joint in joints),
@@ -430,19 +441,3 @@ def parse_gravity(value: str | Sequence[float] | FloatArray) -> FloatArray:
             f'[m/s^2], such as 0,0,-9.81'
         )
     return read_only(vector)
-
-
-def _inertia(place: str, values: FloatArray) -> pin.Inertia:
-    """Return the spatial inertia of ten parameters; pinocchio's conversion divides by the mass."""
-    mass, moment, about_origin = values[0], values[1:4], values[4:]
-    if abs(mass) >= NO_MASS:
-        return pin.Inertia.FromDynamicParameters(values)
-    if np.abs(moment).max() >= NO_MASS:
-        raise RobotError(
-            f'{place}: a first moment {moment} kg m needs a mass; give the link an <inertial> '
-            'with a rough one'
-        )
-    ixx, ixy, iyy, ixz, iyz, izz = about_origin
-    inertia = pin.Inertia.Zero()  # the constructor accepts positive masses only
-    inertia.inertia = np.array([[ixx, ixy, ixz], [ixy, iyy, iyz], [ixz, iyz, izz]])
-    return inertia

@@ -29,13 +29,13 @@ from typing import Any
 #: Largest processor time of an expansion [s]; the largest descriptions take 1 to 2 s.
 TIME_LIMIT = 20.0
 #: Largest elapsed time of an expansion [s]; this ends an expansion that waits for a file.
-PATIENCE = 300.0
+ELAPSED_LIMIT = 300.0
 #: Largest memory of an expansion [bytes].
 MEMORY_LIMIT = 2 << 30
 #: Placeholder for the folder of a package that is not found.
-NOWHERE = '/package-not-found/'
+_MISSING_PACKAGE = '/package-not-found/'
 #: Names of includes and macros for drives and simulators, which define no link or joint.
-DRIVES = ('ros2_control', 'ros_control', 'gazebo', 'transmission')
+_DRIVER_WORDS = ('ros2_control', 'ros_control', 'gazebo', 'transmission')
 
 
 def expand_xacro(path: Path, arguments: Mapping[str, str], packages: Mapping[str, str]) -> str:
@@ -74,11 +74,11 @@ def expand_xacro(path: Path, arguments: Mapping[str, str], packages: Mapping[str
             capture_output=True,
             encoding='utf-8',
             errors='replace',
-            timeout=PATIENCE,
+            timeout=ELAPSED_LIMIT,
             check=False,
         )
     except subprocess.TimeoutExpired as error:
-        raise RobotError(f'{path}: xacro: not expanded within {PATIENCE:g} s') from error
+        raise RobotError(f'{path}: xacro: not expanded within {ELAPSED_LIMIT:g} s') from error
     except OSError as error:
         raise RobotError(f'{path}: xacro: cannot be started: {error.strerror}') from error
     if -done.returncode in (signal.SIGPROF, signal.SIGXCPU, signal.SIGKILL):
@@ -114,9 +114,9 @@ def package_folders(
     ------
     Path
         The given folder, if any. Otherwise, in this order: folders whose package.xml has the name,
-        which enclose the file or lie beside an enclosing folder; such folders in ROS_PACKAGE_PATH;
-        the folder in AMENT_PREFIX_PATH; folders of that name without a package.xml, which enclose
-        the file or lie beside an enclosing folder.
+        which enclose the file or are next to an enclosing folder; such folders in
+        ROS_PACKAGE_PATH; the folder in AMENT_PREFIX_PATH; folders of that name without a
+        package.xml, which enclose the file or are next to an enclosing folder.
 
     """
     if given and name in given:
@@ -177,8 +177,8 @@ def expanded(request: dict[str, Any]) -> dict[str, str]:
         unknown = _unknown(xacro, request) if request['arguments'] else ''
         if unknown:
             return {'error': unknown}
-        answer['text'] = text.replace(f'file://{NOWHERE}', 'package://')
-        answer['text'] = answer['text'].replace(NOWHERE, 'package://')
+        answer['text'] = text.replace(f'file://{_MISSING_PACKAGE}', 'package://')
+        answer['text'] = answer['text'].replace(_MISSING_PACKAGE, 'package://')
     except ImportError:
         answer['error'] = 'a xacro file needs the Python package xacro'
     except MemoryError:
@@ -203,11 +203,11 @@ def _find_packages(xacro: Any, request: dict[str, Any], missing: dict[str, str])
         found = next((place for place in places if place.is_dir()), None)
         if found is None:
             missing.setdefault(name, _place(xacro))
-        return NOWHERE + name if found is None else str(found)
+        return _MISSING_PACKAGE + name if found is None else str(found)
 
     def include(*values: Any) -> Iterator[str]:
         for file in include_files(*values):
-            if not (NOWHERE in file and any(word in file for word in DRIVES)):
+            if not (_MISSING_PACKAGE in file and any(word in file for word in _DRIVER_WORDS)):
                 yield file
 
     def call(node: Any, *values: Any) -> bool:
@@ -217,7 +217,7 @@ def _find_packages(xacro: Any, request: dict[str, Any], missing: dict[str, str])
             name = node.tagName
             if not (missing and f'unknown macro name: {name}' == str(error)):
                 raise
-            if not any(word in name for word in DRIVES):
+            if not any(word in name for word in _DRIVER_WORDS):
                 raise
             xacro.replace_node(node, by=None)
             return True

@@ -411,7 +411,7 @@ class TestXacroIsAProgram:
             f'<xacro:include filename="{tmp_path}/fifo"/></robot>'
         )
         os.mkfifo(tmp_path / 'fifo')
-        monkeypatch.setattr(xacro_expansion, 'PATIENCE', 1.5)
+        monkeypatch.setattr(xacro_expansion, 'ELAPSED_LIMIT', 1.5)
         with pytest.raises(RobotError, match=r'endless\.xacro.*1\.5 s'):
             load_robot(path)
 
