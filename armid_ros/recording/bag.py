@@ -96,8 +96,8 @@ class Bag(Source):
     @property
     def damage(self) -> str:
         """Return the damage found in the files so far; empty if none was found."""
-        said = (*(source.damage for source in self._sources), str(self._damage))
-        return '; '.join(dict.fromkeys(filter(None, said)))
+        problems = (*(source.damage for source in self._sources), str(self._damage))
+        return '; '.join(dict.fromkeys(filter(None, problems)))
 
     def close(self) -> None:
         """Close the files."""
@@ -146,10 +146,10 @@ class Bag(Source):
         if len(found) == 1:
             return found[0]
         problem = 'several topics' if found else 'no topic'
-        asked = f' called {wanted}' if wanted else ''
+        called = f' called {wanted}' if wanted else ''
         damage = f' ({self.damage})' if self.damage else ''
         raise RecordingError(
-            f'{self.path}: {problem} of {type_name}{asked}; the topics are '
+            f'{self.path}: {problem} of {type_name}{called}; the topics are '
             f'{listed(topics)}{damage}'
         )
 
@@ -203,8 +203,8 @@ class Bag(Source):
                     with open_regular(file, RecordingError) as packed, plain.open('wb') as stream:
                         stream.writelines(unpacked(packed, self._settings, 'the unpacked file'))
                 except OSError as error:
-                    said = f'{file}: cannot be decompressed: {error.strerror}'
-                    raise RecordingError(said) from error
+                    problem = f'{file}: cannot be decompressed: {error.strerror}'
+                    raise RecordingError(problem) from error
             else:
                 plain = file
             source: Source = storage(plain, self._settings)

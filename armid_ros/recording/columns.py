@@ -20,7 +20,7 @@ Rules = Sequence[tuple[str, str]]
 #: Seconds in a unit of time.
 TIME_UNITS = {'s': 1.0, 'ms': 1e-3, 'us': 1e-6, 'ns': 1e-9}
 #: Settings for tables only, and settings of units and signs, for tables and bags.
-_WHERE = (
+_TABLE_SETTINGS = (
     'time',
     'time_unit',
     'rate_hz',
@@ -30,7 +30,7 @@ _WHERE = (
     'temperature',
     'episode',
 )
-_WHAT = ('degrees', 'position_scale', 'effort_scale', 'zero', 'gear')
+_UNIT_SETTINGS = ('degrees', 'position_scale', 'effort_scale', 'zero', 'gear')
 #: Command-line options whose name differs from that of the setting.
 _OPTIONS = {'rate_hz': '--rate', 'effort_scale': '--effort-scale or --current-gain'}
 
@@ -175,13 +175,13 @@ def refuse_columns(path: str | Path, settings: ColumnSettings, *, copied: bool =
 
     """
     reasons = dict.fromkeys(
-        _WHERE,
+        _TABLE_SETTINGS,
         'is for tables, and this is a bag; leave it out, or make a bag of the tables with armid '
         'convert',
     )
     if copied:
         reason = 'has no effect on a copied bag; give it to the command that reads the bag'
-        reasons |= dict.fromkeys(_WHAT, reason)
+        reasons |= dict.fromkeys(_UNIT_SETTINGS, reason)
     for name, reason in reasons.items():
         if getattr(settings, name) != getattr(ColumnSettings, name):  # unchanged default
             option = _OPTIONS.get(name, f'--{name.replace("_", "-")}')
@@ -204,7 +204,7 @@ def in_si(
         Whether each joint is prismatic, which has no degrees.
 
     """
-    if not any(getattr(settings, name) for name in _WHAT):
+    if not any(getattr(settings, name) for name in _UNIT_SETTINGS):
         return recording
     joints = recording.joints
     turn = per_joint(settings.position_scale or (1.0,), joints, 'the scale of positions')

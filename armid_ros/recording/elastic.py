@@ -7,6 +7,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 import re
+import struct
 
 from armid_ros.errors import RecordingError
 from armid_ros.motion import ElasticRun, FloatArray
@@ -48,23 +49,24 @@ def write_runs(path: str | Path, runs: Sequence[ElasticRun], robot: Robot) -> No
             motor, link = run.motor, run.link
             stamps = start + np.rint((motor.t - motor.t[0]) * 1e9).astype(np.int64)
             dt = float(np.median(np.diff(motor.t)))
-            asked = motor.q[0] + dt * np.cumsum(run.reference, axis=0)
+            reference = motor.q[0] + dt * np.cumsum(run.reference, axis=0)
             write_joint_states(writer, MOTOR, joints, stamps, motor.q, motor.dq, motor.tau)
             write_joint_states(writer, LINK, joints, stamps, link.q, link.dq)
-            write_joint_states(writer, REFERENCE, joints, stamps, asked, run.reference)
+            write_joint_states(writer, REFERENCE, joints, stamps, reference, run.reference)
             assert run.felt is not None
             for name, values in zip(robot.links, run.felt, strict=True):
-                topic, frame = imu_topic(name), name.encode()
-                layout = _layout(len(frame) + 1, '<')
-                rows = np.zeros(len(stamps), layout)
-                rows['encapsulation'] = (0, 1, 0, 0)
+                topic, frame = imu_topic(name), name.encode() + b'\0'
+                head = b'\0\1\0\0' + struct.pack('<iII', 0, 0, len(frame)) + frame
+                message = head.ljust(_length(len(frame)) - 37 * 8, b'\0') + bytes(37 * 8)
+                raw = np.dtype((np.void, len(message)))
+                messages = np.repeat(np.frombuffer(message, raw), len(stamps))
+                rows = messages.view(_fields(len(message), '<'))
                 rows['sec'], rows['nanosec'] = np.divmod(stamps, 10**9)
-                rows['length'], rows['frame'] = len(frame) + 1, frame
                 # a covariance of -1: orientation and angular velocity are not measured
                 rows['numbers'][:, [4, 16]] = -1.0
                 rows['numbers'][:, _ACCELERATION] = values
                 writer.add_topic(topic, IMU)
-                writer.write_many(topic, rows.view(np.dtype((np.void, layout.itemsize))), stamps)
+                writer.write_many(topic, messages, stamps)
             start = int(stamps[-1]) + pause
 
 
@@ -95,37 +97,28 @@ def read_accelerations(
     order = BYTE_ORDERS.get(messages[0][:2])
     if order is None or len(messages[0]) < 16:
         raise RecordingError(f'{path}: {topic} is not CDR')
-    layout = _layout(int(np.frombuffer(messages[0], order + 'u4', 1, 12)[0]), order)
-    odd = [k for k, m in enumerate(messages) if len(m) != layout.itemsize]
+    length = _length(*struct.unpack_from(order + 'I', messages[0], 12))
+    odd = [k for k, m in enumerate(messages) if len(m) != length]
     if odd:
         raise RecordingError(
             f'{path}: {topic}: message {odd[0]} has {len(messages[odd[0]])} bytes, but one with '
-            f'the frame of the first has {layout.itemsize}; keep one sensor per topic'
+            f'the frame of the first has {length}; keep one sensor per topic'
         )
-    rows = np.frombuffer(b''.join(messages), layout)
+    rows = np.frombuffer(b''.join(messages), _fields(length, order))
     stamps = rows['sec'].astype(np.int64) * 10**9 + rows['nanosec']
     return stamps, np.array(rows['numbers'][:, _ACCELERATION], dtype=float)
 
 
-def _layout(frame_length: int, order: str) -> np.dtype[np.void]:
-    """Return the layout of an Imu message in CDR. The frame length counts the final zero."""
-    end = 12 + frame_length
-    padded = -(-end // 8) * 8
-    return np.dtype(
-        {
-            'names': ['encapsulation', 'sec', 'nanosec', 'length', 'frame', 'numbers'],
-            'formats': [
-                '4u1',
-                order + 'i4',
-                order + 'u4',
-                order + 'u4',
-                f'S{frame_length}',
-                (order + 'f8', (37,)),
-            ],
-            'offsets': [0, 4, 8, 12, 16, 4 + padded],
-            'itemsize': 4 + padded + 8 * 37,
-        }
-    )
+def _length(frame_length: int) -> int:
+    """Return the length of an Imu message in CDR; the frame length counts the final zero."""
+    return 4 + -(-(12 + frame_length) // 8) * 8 + 37 * 8
+
+
+def _fields(length: int, order: str) -> np.dtype[np.void]:
+    """Return the stamp of an Imu message, and the numbers at its end."""
+    formats = [order + 'i4', order + 'u4', (order + 'f8', (37,))]
+    names, offsets = ['sec', 'nanosec', 'numbers'], [4, 8, length - 37 * 8]
+    return np.dtype({'names': names, 'formats': formats, 'offsets': offsets, 'itemsize': length})
 
 
 def imu_topic(link: str) -> str:

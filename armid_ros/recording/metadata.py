@@ -4,9 +4,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from enum import Enum
 from pathlib import Path
 from typing import Any
 
@@ -21,11 +20,12 @@ from rosbags.interfaces import (
     QosReliability,
     QosTime,
 )
+from rosbags.rosbag2 import metadata
 import yaml
 
 FILE_NAME = 'metadata.yaml'
-#: Duration without a limit [s, ns].
-_INFINITE = QosTime(9223372036, 854775807)
+#: Duration without a limit.
+_NO_LIMIT = QosTime(9223372036, 854775807)
 #: Reliable publisher that keeps no messages for late subscribers. History and depth are unknown,
 #: because the middleware does not report them to a recorder.
 VOLATILE = Qos(
@@ -33,10 +33,10 @@ VOLATILE = Qos(
     0,
     QosReliability.RELIABLE,
     QosDurability.VOLATILE,
-    _INFINITE,
-    _INFINITE,
+    _NO_LIMIT,
+    _NO_LIMIT,
     QosLiveliness.AUTOMATIC,
-    _INFINITE,
+    _NO_LIMIT,
     avoid_ros_namespace_conventions=False,
 )
 #: Reliable publisher that sends its last messages to late subscribers.
@@ -97,7 +97,7 @@ def bag_information(
                     'name': topic.name,
                     'type': topic.type_name,
                     'serialization_format': topic.encoding,
-                    'offered_qos_profiles': dump_qos(topic.qos),
+                    'offered_qos_profiles': metadata.dump_qos_v9(list(topic.qos)),
                     'type_description_hash': topic.message_type.type_hash,
                 },
                 'message_count': topic.count,
@@ -171,44 +171,14 @@ def read_metadata(bag: Path) -> BagMetadata:
     return BagMetadata(files, '' if mode == 'none' else mode, counts)
 
 
-def dump_qos(profiles: Iterable[Qos]) -> list[dict[str, Any]]:
-    """Convert profiles to the notation of metadata.yaml, version 9."""
-
-    def written(value: object) -> object:
-        if isinstance(value, Enum):
-            return value.name.lower()
-        return value._asdict() if isinstance(value, QosTime) else value
-
-    return [
-        {name: written(value) for name, value in profile._asdict().items()} for profile in profiles
-    ]
-
-
 def parse_qos(text: str | None) -> tuple[Qos, ...]:
-    """Read profiles from YAML in either notation; empty if the text is not valid."""
+    """Read profiles from YAML in the notation of any version; empty if the text is not valid."""
+    default: dict[str, Any] = dict(metadata.dump_qos_v9([VOLATILE])[0])
+    default |= dict.fromkeys(('reliability', 'durability', 'liveliness'), 'unknown')
     try:
-        listed = load_yaml(text or '')
-        profiles = listed if isinstance(listed, list) else ()
-        return tuple(
-            Qos(*(_read(profile.get(name), of) for name, of in VOLATILE._asdict().items()))
-            for profile in profiles
-            if isinstance(profile, Mapping)
-        )
-    except (yaml.YAMLError, ArithmeticError, ValueError, TypeError):
+        listed: Any = load_yaml(text or '')
+        profiles: Any = [default | one for one in (listed if isinstance(listed, list) else ())]
+        return tuple(metadata.parse_qos(profiles))
+    except (yaml.YAMLError, ArithmeticError, AttributeError, LookupError, TypeError, ValueError):
         # Messages can be read without the QoS of their publisher.
         return ()
-
-
-def _read(value: Any, default: object) -> Any:
-    """Read a field. Policies are names, or up to version 8 integers of rmw/types.h."""
-    if isinstance(default, Enum):
-        named = {one.name.lower(): one for one in type(default)}
-        unknown = named['unknown']
-        if isinstance(value, int):
-            return next((one for one in type(default) if one.value == value), unknown)
-        return named.get(value, unknown) if isinstance(value, str) else unknown
-    if isinstance(default, QosTime):
-        if not isinstance(value, Mapping):
-            return default
-        return QosTime(int(value.get('sec', 0)), int(value.get('nsec', 0)))
-    return int(value or 0) if type(default) is int else bool(value)

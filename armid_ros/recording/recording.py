@@ -445,6 +445,6 @@ def given_twice(fitted: Sequence[Recording], held_out: Sequence[Recording] = ())
 
 def require_once(fitted: Sequence[Recording], held_out: Sequence[Recording] = ()) -> None:
     """Raise a RecordingError if recordings are given twice."""
-    said = given_twice(fitted, held_out)
-    if said:
-        raise RecordingError(f'{said}; give each recording once')
+    repeated = given_twice(fitted, held_out)
+    if repeated:
+        raise RecordingError(f'{repeated}; give each recording once')

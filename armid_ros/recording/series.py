@@ -90,8 +90,9 @@ def ordered(series: JointSamples, clock: Clock, counts: Counter[str]) -> JointSa
     steps = np.abs(np.diff(series.stamps[~stray]))
     if len(steps) >= 4 and (steps > RESTART_NS).any():
         stamps = series.stamps[~stray]
-        around = median_filter(stamps, 5, mode='mirror')  # fewer than half of them may be wrong
-        stray[~stray] = np.abs(stamps - around) > RESTART_NS + 2 * np.median(steps)
+        # fewer than half of five neighbours may be wrong
+        median = median_filter(stamps, 5, mode='mirror')
+        stray[~stray] = np.abs(stamps - median) > RESTART_NS + 2 * np.median(steps)
     if stray.any():
         counts['unstamped'] += int(stray.sum())
         series = series.select(~stray)
@@ -255,18 +256,18 @@ def _finite(
     quantities: list[FloatArray | None] = []
     for name, values in zip(QUANTITIES, series.values, strict=True):
         if values is None:
-            lacking = list(joints)
+            missing = list(joints)
         else:
             # a joint without measurements has NaN in its first sample too
             suspect = np.flatnonzero(np.isnan(values[:1]).any(axis=0))
-            lacking = [joints[j] for j in suspect if np.isnan(values[:, j]).all()]
-        if lacking:
-            everyone = len(lacking) == len(joints)
-            absent.append(name if everyone else f'{name} of {", ".join(lacking)}')
-        quantities.append(None if lacking else values)
+            missing = [joints[j] for j in suspect if np.isnan(values[:, j]).all()]
+        if missing:
+            everyone = len(missing) == len(joints)
+            absent.append(name if everyone else f'{name} of {", ".join(missing)}')
+        quantities.append(None if missing else values)
     if quantities[0] is None:
         raise RecordingError(f'{where} has no {absent[0]}')
-    bad, culprits = np.zeros(len(series), np.bool_), []
+    bad, not_finite = np.zeros(len(series), np.bool_), []
     most = 1e15  # uninitialised memory can hold any number
     for name, values in zip(QUANTITIES, quantities, strict=True):
         # extremes of an array are NaN if one of its values is NaN
@@ -275,15 +276,15 @@ def _finite(
         wrong = ~(np.abs(values) < most)
         bad |= wrong.any(axis=1)
         numbers = zip(joints, wrong.sum(axis=0).tolist(), strict=True)
-        culprits += [f'{name} of {joint} in {number}' for joint, number in numbers if number]
+        not_finite += [f'{name} of {joint} in {number}' for joint, number in numbers if number]
     dropped = int(bad.sum())
     if dropped > MAX_NOT_FINITE * len(series):
         raise RecordingError(
-            f'{where}: {dropped} of {len(series)} samples are not finite ({"; ".join(culprits)})'
+            f'{where}: {dropped} of {len(series)} samples are not finite ({"; ".join(not_finite)})'
         )
     counts['nan'] += dropped
     samples = JointSamples(joints, series.stamps, tuple(quantities))
-    return (samples.select(~bad) if dropped else samples), tuple(absent), tuple(culprits)
+    return (samples.select(~bad) if dropped else samples), tuple(absent), tuple(not_finite)
 
 
 def unwrapped(q: FloatArray) -> tuple[FloatArray, list[int]]:
@@ -337,8 +338,8 @@ def assemble(
     where: str,
     joints: tuple[str, ...],
     pieces: list[JointSamples],
-    met: Mapping[str, Any],
-    **about: Any,
+    counted: Mapping[str, Any],
+    **attributes: Any,
 ) -> Recording:
     """
     Make a recording from samples that may be late, repeated, split or not finite.
@@ -351,9 +352,9 @@ def assemble(
         In the order of the recording.
     pieces : list of JointSamples
         Samples in the order of storage. The list is emptied to free its memory.
-    met : mapping of str to value
+    counted : mapping of str to value
         Attributes of the report so far, with the number of messages among them.
-    **about
+    **attributes
         Other attributes of the recording.
 
     Raises
@@ -362,7 +363,7 @@ def assemble(
         If no clock is usable, or fewer than two samples remain.
 
     """
-    gathered, counts = gather(pieces), Counter(unstamped=met.get('unstamped', 0))
+    gathered, counts = gather(pieces), Counter(unstamped=counted.get('unstamped', 0))
     pieces.clear()
     problems = (clock_problem(one.stamps, one.values[0], one.receive) for one in gathered)
     note = next((f'header stamps {problem}' for problem in problems if problem), '')
@@ -376,12 +377,12 @@ def assemble(
                 f'{where} has no usable time: {note}, and receive times {problem}'
             )
     series = merged([ordered(states, clock, counts) for states in gathered], joints, counts)
-    samples, absent, culprits = _finite(where, joints, series, counts)
+    samples, absent, not_finite = _finite(where, joints, series, counts)
     stamps = samples.stamps
     if len(stamps) < 2:
         lost = [f'{n} {name.replace("_", " ")}' for name, n in counts.items() if n]
         raise RecordingError(
-            f'{where}: {len(stamps)} samples are left of {met["messages"]} messages '
+            f'{where}: {len(stamps)} samples are left of {counted["messages"]} messages '
             f'({", ".join(lost) or "the recording is too short"})'
         )
     q, dq, tau = samples.values
@@ -391,7 +392,7 @@ def assemble(
     for array in (t, q, dq, tau):
         if array is not None:
             array.setflags(write=False)  # a read-only array is not copied by Recording
-    found = {'not_finite': culprits, 'absent': absent, 'clock_note': note, **met, **counts}
+    found = {'not_finite': not_finite, 'absent': absent, 'clock_note': note, **counted, **counts}
     steps = np.diff(t)
     at = np.flatnonzero(steps > GAP_PERIODS * np.median(steps))
     report = ReadReport(
@@ -409,5 +410,5 @@ def assemble(
         start_ns=int(stamps[0]),
         clock=clock,
         report=report,
-        **about,
+        **attributes,
     )

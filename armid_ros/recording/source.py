@@ -179,9 +179,9 @@ class Damage:
 
     def __str__(self) -> str:
         """Return the problems as a text; empty without problems."""
-        said = list(self._problems)[:8]
-        more = len(self._problems) - len(said)
-        return '; '.join([*said, *([f'and {more} more'] if more else [])])
+        shown = list(self._problems)[:8]
+        more = len(self._problems) - len(shown)
+        return '; '.join([*shown, *([f'and {more} more'] if more else [])])
 
     def add(self, problem: str) -> None:
         """Add a problem."""

@@ -33,7 +33,7 @@ import numpy as np
 
 _JOURNALS = ('-wal', '-journal')
 # SQL condition for valid rows: an integer time and binary data.
-_WHOLE = "typeof(timestamp) = 'integer' AND timestamp >= 0 AND typeof(data) = 'blob'"
+_VALID_ROW = "typeof(timestamp) = 'integer' AND timestamp >= 0 AND typeof(data) = 'blob'"
 _ERRORS = (sqlite3.Error, UnicodeDecodeError, OverflowError, MemoryError)
 
 
@@ -72,7 +72,7 @@ class SqliteSource(Source):
         try:
             rows = self._database.execute(
                 f'SELECT name, type, serialization_format, {", ".join(optional)}, '
-                f'(SELECT count(*) FROM messages WHERE topic_id = topics.id AND {_WHOLE}) '
+                f'(SELECT count(*) FROM messages WHERE topic_id = topics.id AND {_VALID_ROW}) '
                 'FROM topics ORDER BY id'
             ).fetchall()
             definitions: dict[str, tuple[str, str]] = {}
@@ -98,7 +98,7 @@ class SqliteSource(Source):
     def blocks(self, topic: str) -> Iterator[MessageBlock]:
         query = (
             'SELECT timestamp, data FROM messages WHERE topic_id IN '
-            f'(SELECT id FROM topics WHERE CAST(name AS TEXT) = ?) AND {_WHOLE} ORDER BY id'
+            f'(SELECT id FROM topics WHERE CAST(name AS TEXT) = ?) AND {_VALID_ROW} ORDER BY id'
         )
         for rows in self._fetch(query, (topic,)):
             times = np.array([time for time, _ in rows], np.int64)
@@ -107,7 +107,7 @@ class SqliteSource(Source):
     def messages(self) -> Iterator[RawMessage]:
         query = (
             'SELECT CAST(name AS TEXT), timestamp, data FROM messages JOIN topics '
-            f'ON topic_id = topics.id WHERE {_WHOLE} ORDER BY timestamp, messages.id'
+            f'ON topic_id = topics.id WHERE {_VALID_ROW} ORDER BY timestamp, messages.id'
         )
         for rows in self._fetch(query, ()):
             for name, time, data in rows:
@@ -152,7 +152,7 @@ class SqliteSource(Source):
             self._damage.add(f'the database is damaged: {" ".join(_text(verdict).split())}')
             return
         (odd,) = self._database.execute(
-            f'SELECT count(*) FROM messages WHERE NOT ({_WHOLE}) OR timestamp IS NULL'
+            f'SELECT count(*) FROM messages WHERE NOT ({_VALID_ROW}) OR timestamp IS NULL'
         ).fetchone()
         if odd:
             self._damage.add(f'{odd} rows of messages have no time or no bytes; they are left out')

@@ -24,11 +24,9 @@ from armid_ros.recording.writer import BagWriter
 import numpy as np
 
 TEMPERATURE = 'sensor_msgs/msg/Temperature'
-_STATES = 'control_msgs/msg/DynamicJointState'
+_DYNAMIC_JOINT_STATE = 'control_msgs/msg/DynamicJointState'
 #: Topic of temperatures in the bags that are written.
 TOPIC = '/joint_temperatures'
-#: Range of temperatures of a working joint [degC].
-_COLDEST, _HOTTEST = -40.0, 150.0
 #: Units of wrong temperatures, with factor and offset of their conversion to degC.
 _OTHER_UNITS = {
     'kelvin': (1.0, -273.15),
@@ -36,7 +34,7 @@ _OTHER_UNITS = {
     'degrees Fahrenheit': (1.0 / 1.8, -32.0 / 1.8),
 }
 #: Shortest time between two temperatures of a joint that are kept [s].
-_APART = 0.1
+_MIN_INTERVAL = 0.1
 
 
 def temperatures(
@@ -60,7 +58,7 @@ def temperatures(
         If no temperature of a joint is finite, or one is impossible; the message names its place.
 
     """
-    kept = []
+    kept, lowest, highest = [], -40.0, 150.0  # range of a working joint [degC]
     for name, t, value in zip(where, times, values, strict=True):
         there = np.isfinite(value)
         if len(value) and not there.any():
@@ -68,21 +66,21 @@ def temperatures(
                 f'{name}: no temperature is finite; leave temperatures out with --temperature none'
             )
         t, value = t[there], value[there]
-        strange = np.flatnonzero((value < _COLDEST) | (value > _HOTTEST))
+        strange = np.flatnonzero((value < lowest) | (value > highest))
         if len(strange):
             wrong = float(value[strange[0]])
             units = [
                 f'{unit} ({factor * wrong + offset:.0f} degC)'
                 for unit, (factor, offset) in _OTHER_UNITS.items()
-                if _COLDEST <= factor * wrong + offset <= _HOTTEST
+                if lowest <= factor * wrong + offset <= highest
             ]
             seems = f'; it seems to be in {" or ".join(units)}' if units else ''
             raise RecordingError(
                 f'{name}: the temperature at {t[strange[0]]:.3f} s is {wrong:g}, which has to be '
-                f'from {_COLDEST:g} to {_HOTTEST:g} degC{seems}. Write it in degC, or leave '
+                f'from {lowest:g} to {highest:g} degC{seems}. Write it in degC, or leave '
                 'temperatures out with --temperature none'
             )
-        _, first = np.unique(np.floor(t / _APART), return_index=True)
+        _, first = np.unique(np.floor(t / _MIN_INTERVAL), return_index=True)
         kept.append((t[first], value[first]))
     every = np.unique(np.concatenate([t for t, _ in kept]))
     columns = [
@@ -117,7 +115,7 @@ def read_temperatures(bag: Bag, recording: Recording) -> Temperatures | None:
     found: dict[str, dict[int, float]] = {joint: {} for joint in recording.joints}
     source = dict.fromkeys(recording.joints, '')
     for topic in bag.topics():
-        if topic.type_name in (TEMPERATURE, _STATES):
+        if topic.type_name in (TEMPERATURE, _DYNAMIC_JOINT_STATE):
             for joint, stamp, value in _readings(bag, topic, recording):
                 found[joint].setdefault(stamp - recording.start_ns, value)
                 source[joint] = source[joint] or topic.name
@@ -138,7 +136,7 @@ def _readings(bag: Bag, topic: Topic, recording: Recording) -> Iterator[tuple[st
             cdr = block.message(index)
             length = int.from_bytes(cdr[12:16], 'little' if cdr[1] & 1 else 'big')
             frame = cdr[16 : 16 + length]  # in the header
-            if received - last.get(frame, -(10**18)) < 1e9 * _APART:
+            if received - last.get(frame, -(10**18)) < 1e9 * _MIN_INTERVAL:
                 continue
             last[frame] = received
             try:

@@ -28,7 +28,6 @@ from armid_ros.recording.message_types import message_type, MessageType, STRING,
 from armid_ros.recording.metadata import (
     bag_information,
     dump,
-    dump_qos,
     FILE_NAME,
     LATCHED,
     VOLATILE,
@@ -39,6 +38,7 @@ from mcap.opcode import Opcode
 import numpy as np
 import numpy.typing as npt
 from rosbags.interfaces import Qos
+from rosbags.rosbag2.metadata import dump_qos_v9
 
 # For JointState at 3 kHz (1 MB/s) chunks are closed by age, not by size.
 DEFAULT_CHUNK_SIZE = 512 * 1024
@@ -245,7 +245,7 @@ class BagWriter:
             name,
             self._schemas[described],
             {
-                'offered_qos_profiles': dump(dump_qos(topic.qos)).strip(),
+                'offered_qos_profiles': dump(dump_qos_v9(list(topic.qos))).strip(),
                 'topic_type_hash': described.type_hash,
             },
         )

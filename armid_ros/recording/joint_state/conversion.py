@@ -18,7 +18,7 @@ from armid_ros.recording.message_types import (
 )
 from armid_ros.recording.source import MessageBlock, Topic
 
-_INSIDE = re.compile(r'^\s*sensor_msgs/(?:msg/)?JointState\s+(\w+)', re.MULTILINE)
+_JOINT_STATE_FIELD = re.compile(r'^\s*sensor_msgs/(?:msg/)?JointState\s+(\w+)', re.MULTILINE)
 
 
 def holds_joint_state(topic: Topic) -> bool:
@@ -72,7 +72,7 @@ def require_standard(bag: Bag, topic: Topic) -> None:
 def _inside(described: MessageType) -> str:
     """Return the JointState field of a type, the measured one of several; '' if there is none."""
     own = described.definition.split('\n===', 1)[0]
-    found = _INSIDE.findall(own)
+    found = _JOINT_STATE_FIELD.findall(own)
     return next((name for name in found if 'measured' in name), found[0] if found else '')
 
 

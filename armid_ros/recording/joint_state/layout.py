@@ -22,8 +22,8 @@ from armid_ros.recording.message_types import BYTE_ORDERS, QUANTITIES
 import numpy as np
 import numpy.typing as npt
 
-# Encapsulation 4, stamp 8, then the length of frame_id.
-_FRAME = 12
+#: Offset of the length of frame_id, after the encapsulation (4) and the stamp (8).
+_FRAME_OFFSET = 12
 
 
 class MalformedMessage(ValueError):
@@ -69,8 +69,8 @@ class JointStateLayout:
             raise MalformedMessage(f'encapsulation {cdr[:2].hex(" ")!r} is not plain CDR')
         counts: list[int] = []
         try:
-            (frame_length,) = struct.unpack_from(order + 'I', cdr, _FRAME)
-            position = _align(_FRAME + 4 + frame_length, 4)
+            (frame_length,) = struct.unpack_from(order + 'I', cdr, _FRAME_OFFSET)
+            position = _align(_FRAME_OFFSET + 4 + frame_length, 4)
             (count,) = struct.unpack_from(order + 'I', cdr, position)
             if count > len(cdr):
                 raise MalformedMessage(f'{count} joint names in {len(cdr)} bytes')
@@ -98,7 +98,7 @@ class JointStateLayout:
     @property
     def names_offset(self) -> int:
         """Offset of the number of names."""
-        return _align(_FRAME + 4 + self.frame_length, 4)
+        return _align(_FRAME_OFFSET + 4 + self.frame_length, 4)
 
     @cached_property
     def names_end(self) -> int:
@@ -138,7 +138,7 @@ class JointStateLayout:
             'encapsulation': ('>u2', 0),
             'sec': (self.order + 'i4', 4),
             'nanosec': (self.order + 'u4', 8),
-            'frame_length': (self.order + 'u4', _FRAME),
+            'frame_length': (self.order + 'u4', _FRAME_OFFSET),
             'names': (('<u4', (words,)), self.names_offset),
         }
         for name, count, place in zip(QUANTITIES, self.counts, self.places, strict=True):

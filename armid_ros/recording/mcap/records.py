@@ -12,7 +12,6 @@ counts of the file are checked if possible. Specification: https://mcap.dev/spec
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from io import BytesIO
 import mmap
@@ -187,8 +186,8 @@ def _walk(found: FileMap) -> tuple[list[tuple[int, int, int]], int | None, int |
             if opcode == Opcode.CHUNK:
                 _add_chunk(found, begin, size, whole=False)
             break
-        if opcode in _NOTED:
-            _NOTED[opcode](found, begin, end)
+        if opcode in (Opcode.CHUNK, Opcode.MESSAGE_INDEX, Opcode.MESSAGE):
+            _add_data(found, opcode, begin, end)
         elif opcode in _DEFINITIONS:
             definitions.append((opcode, begin, end))
         elif opcode == Opcode.DATA_END:
@@ -248,26 +247,15 @@ def _add_chunk(found: FileMap, begin: int, end: int, *, whole: bool = True) -> N
     found.chunks.append(chunk)
 
 
-def _add_index(found: FileMap, begin: int, end: int) -> None:
-    """Note the index of a channel's messages in the last chunk."""
-    if end - begin < 6 or not found.chunks:
-        return
-    channel, count = struct.unpack_from('<HI', found.data, begin)
-    if end - begin == 6 + count:
-        found.chunks[-1].indexes[channel] = (begin + 6, count // 16)  # bytes of an entry
-
-
-def _add_loose(found: FileMap, begin: int, end: int) -> None:
-    """Note a message outside chunks."""
-    if end - begin < MESSAGE_HEADER:
+def _add_data(found: FileMap, opcode: int, begin: int, end: int) -> None:
+    """Note a chunk, the index of a channel's messages in the last chunk, or a loose message."""
+    if opcode == Opcode.CHUNK:
+        _add_chunk(found, begin, end)
+    elif opcode == Opcode.MESSAGE and end - begin < MESSAGE_HEADER:
         found.damage.add(f'the message at byte {begin} is too short for a message')
-        return
-    found.loose.append(begin - RECORD_HEADER)
-
-
-#: Handlers of the records, by opcode.
-_NOTED: dict[int, Callable[[FileMap, int, int], None]] = {
-    Opcode.CHUNK: _add_chunk,
-    Opcode.MESSAGE_INDEX: _add_index,
-    Opcode.MESSAGE: _add_loose,
-}
+    elif opcode == Opcode.MESSAGE:
+        found.loose.append(begin - RECORD_HEADER)
+    elif end - begin >= 6 and found.chunks:
+        channel, count = struct.unpack_from('<HI', found.data, begin)
+        if end - begin == 6 + count:
+            found.chunks[-1].indexes[channel] = (begin + 6, count // 16)  # bytes of an entry

@@ -71,12 +71,14 @@ class QuantityColumns:
     pattern : str
         Pattern that selects the columns.
     columns : tuple of TableColumn
-        One column per joint.
+        One column per joint; empty if the quantity is missing.
     labels : tuple of str
         Part of each column name that identifies the joint: its name, a number, or the whole column
         name.
     rest : mapping of str to TableColumn
         Columns of other joints with the same pattern, by their label.
+    missing : tuple of str
+        Joints without a column of numbers; with any, the quantity is missing.
     guessed : bool
         Whether the columns were guessed.
     unit : str
@@ -88,9 +90,10 @@ class QuantityColumns:
 
     quantity: QuantityName
     pattern: str
-    columns: tuple[TableColumn, ...]
-    labels: tuple[str, ...]
+    columns: tuple[TableColumn, ...] = ()
+    labels: tuple[str, ...] = ()
     rest: Mapping[str, TableColumn] = field(default_factory=dict)
+    missing: tuple[str, ...] = ()
     guessed: bool = False
     unit: str = ''
     factor: FloatArray = field(default_factory=lambda: np.ones(1))
@@ -174,9 +177,9 @@ def choose(
 
 def guess(
     table: Table, quantity: QuantityName, joints: Sequence[str] | None, rename: Rules = ()
-) -> tuple[QuantityColumns | None, tuple[str, tuple[str, ...]]]:
+) -> QuantityColumns:
     """
-    Return the likeliest columns of a quantity, and the most similar ones that lack joints.
+    Return the likeliest columns of a quantity.
 
     Parameters
     ----------
@@ -191,11 +194,9 @@ def guess(
 
     Returns
     -------
-    columns : QuantityColumns or None
-        None if no columns fit.
-    incomplete : (str, tuple of str)
-        Pattern of the columns of the most joints, and the joints without a column of numbers; the
-        pattern is empty if no column is that of a joint.
+    QuantityColumns
+        Without columns if none fit. Its pattern is then that of the columns of the most joints,
+        and empty if no column is that of a joint.
 
     """
     groups: dict[str, dict[str, TableColumn]] = {}  # by pattern, then by label of the joint
@@ -203,7 +204,7 @@ def guess(
         for pattern, label in _readings(column, joints, rename):
             groups.setdefault(pattern, {})[label] = column
     best: tuple[tuple[float, int], QuantityColumns] | None = None
-    incomplete = '', tuple(joints or ())
+    incomplete = QuantityColumns(quantity, '', missing=tuple(joints or ()))
     for pattern, members in groups.items():
         score = _score(pattern, quantity)
         family = _family(quantity, pattern, members, joints, rename)
@@ -215,10 +216,10 @@ def guess(
         if family is not None and (best is None or (score, len(family.columns)) > best[0]):
             best = (score, len(family.columns)), replace(family, guessed=True)
         names = [renamed(label, rename) for label in members]
-        lacking = tuple(joint for joint in joints or () if joint not in names)
-        if len(lacking) < len(incomplete[1]):
-            incomplete = pattern, lacking
-    return best and best[1], incomplete
+        missing = tuple(joint for joint in joints or () if joint not in names)
+        if len(missing) < len(incomplete.missing):
+            incomplete = QuantityColumns(quantity, pattern, missing=missing)
+    return best[1] if best else incomplete
 
 
 def guess_time(table: Table) -> TableColumn | None:

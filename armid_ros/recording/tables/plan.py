@@ -28,12 +28,12 @@ from armid_ros.recording.temperature import temperatures
 import numpy as np
 import numpy.typing as npt
 
-_OTHERS: tuple[QuantityName, ...] = ('velocity', 'effort', 'temperature')
-_SI = {'position': 'rad', 'velocity': 'rad/s', 'effort': 'N m', 'temperature': 'degC'}
+_OPTIONAL_QUANTITIES: tuple[QuantityName, ...] = ('velocity', 'effort', 'temperature')
+_SI_UNITS = {'position': 'rad', 'velocity': 'rad/s', 'effort': 'N m', 'temperature': 'degC'}
 #: Factors from units to SI.
-_FACTORS = {'deg': np.pi / 180, 'deg/s': np.pi / 180, 'mN m': 1e-3, 'N mm': 1e-3, 'mA': 1e-3}
-_FACTORS |= {'mrad': 1e-3, 'kN m': 1e3, 'rpm': 2 * np.pi / 60, 'mm': 1e-3, 'mm/s': 1e-3}
-_TURNS = ('deg', 'deg/s', 'rpm', 'mrad')
+_TO_SI = {'deg': np.pi / 180, 'deg/s': np.pi / 180, 'mN m': 1e-3, 'N mm': 1e-3, 'mA': 1e-3}
+_TO_SI |= {'mrad': 1e-3, 'kN m': 1e3, 'rpm': 2 * np.pi / 60, 'mm': 1e-3, 'mm/s': 1e-3}
+_ANGLE_UNITS = ('deg', 'deg/s', 'rpm', 'mrad')
 
 
 @dataclass(frozen=True)
@@ -59,8 +59,8 @@ class TablePlan:
         Settings of the user.
     notes : tuple of str
         Notes for the user.
-    missing : dict
-        By missing quantity: pattern of columns for some joints, and the joints without a column.
+    missing : tuple of QuantityColumns
+        Quantities without columns.
 
     """
 
@@ -72,7 +72,7 @@ class TablePlan:
     sources: tuple[QuantityColumns, ...]
     settings: ColumnSettings
     notes: tuple[str, ...]
-    missing: dict[QuantityName, tuple[str, tuple[str, ...]]]
+    missing: tuple[QuantityColumns, ...]
 
     @property
     def time_guessed(self) -> bool:
@@ -88,8 +88,8 @@ class TablePlan:
     def absent(self) -> tuple[str, ...]:
         """Return texts on missing quantities, such as 'effort of wrist'."""
         return tuple(
-            f'{quantity} of {", ".join(lacking)}' if pattern else quantity
-            for quantity, (pattern, lacking) in self.missing.items()
+            f'{one.quantity} of {", ".join(one.missing)}' if one.pattern else one.quantity
+            for one in self.missing
         )
 
     @property
@@ -113,9 +113,9 @@ class TablePlan:
             shown = ', '.join(names) if len(names) <= 3 else f'{names[0]}, .., {names[-1]}'
             guessed = ' (guessed)' if source.guessed else ''
             lines.append(f'  {source.quantity:9s} {shown}, in {source.unit}{guessed}')
-        for quantity, (pattern, lacking) in self.missing.items():
-            why = f": '{pattern}' has no column of numbers for {', '.join(lacking)}"
-            lines.append(f'  {quantity:9s} none{why if pattern else ""}')
+        for one in self.missing:
+            why = f": '{one.pattern}' has no column of numbers for {', '.join(one.missing)}"
+            lines.append(f'  {one.quantity:9s} none{why if one.pattern else ""}')
         lines.append(f'  joints    {", ".join(self.joints)}')
         if self.unread:
             lines.append(f'  not read  {self.unread}')
@@ -153,13 +153,12 @@ def plan(
 
     """
     position = _source(table, 'position', settings, joints)
-    if isinstance(position, tuple):
-        pattern, lacking = position
-        if pattern:
+    if not position.columns:
+        if position.pattern:
             raise RecordingError(
-                f"{table.source}: positions '{pattern}' have no numeric column for "
-                f'{", ".join(lacking)}; name their columns with --position or --rename, or leave '
-                f'joints out with --joints. Its columns are {table.listed()}'
+                f"{table.source}: positions '{position.pattern}' have no numeric column for "
+                f'{", ".join(position.missing)}; name their columns with --position or --rename, '
+                f'or leave joints out with --joints. Its columns are {table.listed()}'
             )
         of_joints = f' of {", ".join(joints)}' if joints else ''
         raise RecordingError(
@@ -168,28 +167,28 @@ def plan(
         )
     names = tuple(joints) if joints else position.joints(settings.rename)
     sliding = np.zeros(len(names), np.bool_) if slides is None else np.asarray(slides, np.bool_)
-    sources = [position]
-    missing: dict[QuantityName, tuple[str, tuple[str, ...]]] = {}
-    for quantity in _OTHERS:
+    sources, missing = [position], list[QuantityColumns]()
+    for quantity in _OPTIONAL_QUANTITIES:
         found = _source(table, quantity, settings, names)
-        if isinstance(found, tuple) and joints is None:
+        if not found.columns and joints is None:
             # match joints by number, because names differ or are missing
             numbers = [str(k) for k in range(len(position.columns))]
             by_number = _source(table, quantity, settings, numbers)
-            found = found if isinstance(by_number, tuple) else by_number
-        if not isinstance(found, tuple):
+            found = by_number if by_number.columns else found
+        if found.columns:
             sources.append(found)
         elif quantity != 'temperature':
-            missing[quantity] = found
+            missing.append(found)
     time, unit, rate = _time(table, settings)
     effort = next((one for one in sources if one.quantity == 'effort'), None)
-    notes = list(_far(position, settings, sliding))
+    notes = list(_position_notes(position, settings, sliding))
     if effort is not None and not settings.effort_scale:
         name = effort.pattern
         if effort.unit in ('A', 'mA') or 'load' in name.lower():
             notes.append(f"efforts '{name}' seem to be currents; --current-gain makes them N m")
     scaled = tuple(_scaled(source, settings, names, sliding) for source in sources)
-    return TablePlan(table, names, time, unit, rate, scaled, settings, tuple(notes), missing)
+    remarks = tuple(notes), tuple(missing)
+    return TablePlan(table, names, time, unit, rate, scaled, settings, *remarks)
 
 
 def _source(
@@ -197,28 +196,26 @@ def _source(
     quantity: QuantityName,
     settings: ColumnSettings,
     joints: Sequence[str] | None,
-) -> QuantityColumns | tuple[str, tuple[str, ...]]:
-    """Return the given or guessed columns of a quantity, or the joints without a column."""
-    asked = getattr(settings, quantity)
-    if asked is not None and asked.lower() == 'none':
-        return '', ()
-    incomplete: tuple[str, tuple[str, ...]] = '', ()
-    chosen: QuantityColumns | None
-    if asked is not None:
-        chosen = choose(table, quantity, asked, joints, settings.rename)
+) -> QuantityColumns:
+    """Return the given or guessed columns of a quantity, without columns if it is missing."""
+    given = getattr(settings, quantity)
+    if given is not None and given.lower() == 'none':
+        return QuantityColumns(quantity, '')
+    if given is not None:
+        chosen = choose(table, quantity, given, joints, settings.rename)
     else:
-        chosen, incomplete = guess(table, quantity, joints, settings.rename)
-    if chosen is None:
-        return incomplete
+        chosen = guess(table, quantity, joints, settings.rename)
+    if not chosen.columns:
+        return chosen
     for column in chosen.columns if chosen.guessed else ():
         table.column(column.bare_name)  # raises an error if columns of this name differ
     unit = next((column.unit for column in chosen.columns if column.unit), '')
     if not unit and set(words_of(chosen.pattern)) & set(CURRENTS):
         unit = 'A'
     if quantity == 'temperature':
-        return replace(chosen, unit=_SI[quantity])
-    factor = np.full(len(chosen.columns), _FACTORS.get(unit, 1.0))
-    return replace(chosen, unit=unit or _SI[quantity], factor=factor)
+        return replace(chosen, unit=_SI_UNITS[quantity])
+    factor = np.full(len(chosen.columns), _TO_SI.get(unit, 1.0))
+    return replace(chosen, unit=unit or _SI_UNITS[quantity], factor=factor)
 
 
 def _scaled(
@@ -236,15 +233,15 @@ def _scaled(
         given = per_joint(settings.effort_scale, joints, 'the scale of efforts')
         unit = 'units of the file' if source.unit == 'N m' else source.unit
         factor = given * (1e-3 if source.unit == 'mA' else 1.0)
-        return replace(source, factor=factor, unit=f'{unit} times {_short(given)}')
+        return replace(source, factor=factor, unit=f'{unit} times {_text(given)}')
     if settings.position_scale:
         given = per_joint(settings.position_scale, joints, 'the scale of positions')
-        return replace(source, factor=given, unit=f'units of the file times {_short(given)}')
-    if settings.degrees and source.unit not in _TURNS:
+        return replace(source, factor=given, unit=f'units of the file times {_text(given)}')
+    if settings.degrees and source.unit not in _ANGLE_UNITS:
         source = replace(source, factor=np.full(len(slides), np.pi / 180), unit='deg')
     if source.quantity == 'velocity' and source.unit == 'deg':
         source = replace(source, unit='deg/s')
-    if source.unit in _TURNS and slides.any():
+    if source.unit in _ANGLE_UNITS and slides.any():
         way = 'm' if source.quantity == 'position' else 'm/s'
         unit = f'{source.unit}, of joints that slide in {way}'
         return replace(source, factor=np.where(slides, 1.0, source.factor), unit=unit)
@@ -253,11 +250,11 @@ def _scaled(
     return source
 
 
-def _short(values: FloatArray) -> str:
+def _text(values: FloatArray) -> str:
     return ', '.join(dict.fromkeys(f'{value:.6g}' for value in values))
 
 
-def _far(
+def _position_notes(
     position: QuantityColumns, settings: ColumnSettings, slides: npt.NDArray[np.bool_]
 ) -> Iterator[str]:
     """Return notes on positions that are too large for rad or m."""
@@ -277,16 +274,16 @@ def _far(
 
 def _time(table: Table, settings: ColumnSettings) -> tuple[TableColumn | None, str, float | None]:
     """Return the column of time and its unit, or None and the rate."""
-    asked = settings.time
+    given = settings.time
     column: TableColumn | None = None
-    if asked is not None and asked.lower() != 'none':
-        column = table.column(asked)
+    if given is not None and given.lower() != 'none':
+        column = table.column(given)
         if column is None:
             raise RecordingError(
-                f"{table.source}: there is no column '{asked}' of time; its columns are "
+                f"{table.source}: there is no column '{given}' of time; its columns are "
                 f'{table.listed()}'
             )
-    elif settings.rate_hz is None and asked is None:
+    elif settings.rate_hz is None and given is None:
         column = guess_time(table)
     if column is not None:
         table.column(column.name)  # raises an error if columns of this name differ
@@ -300,7 +297,7 @@ def _time(table: Table, settings: ColumnSettings) -> tuple[TableColumn | None, s
     return None, 's', rate
 
 
-def _time_unit(table: Table, column: TableColumn, said: str | None) -> str:
+def _time_unit(table: Table, column: TableColumn, given: str | None) -> str:
     """Return the unit of a column of time, from settings, its name, or its steps."""
     where = f'{table.source}: column {column.name}'
     steps = np.diff(column.finite)
@@ -310,8 +307,8 @@ def _time_unit(table: Table, column: TableColumn, said: str | None) -> str:
             'Reverse the rows if the last row was measured first, or leave the column out with '
             '--time none --rate HZ if they are in order'
         )
-    if said or column.unit in TIME_UNITS:
-        return said or column.unit
+    if given or column.unit in TIME_UNITS:
+        return given or column.unit
     steps = steps[steps > 0.0]
     if not len(steps):
         raise RecordingError(f'{where} does not increase')

@@ -46,13 +46,13 @@ def read_text(path: Path) -> Table:
         )
     widths = [len(_elements(cell)) or None for cell in cells]
     heads: list[tuple[str, str, str]] = []
-    said = dict(enumerate(_split(units, separator)))
+    unit_of = dict(enumerate(_split(units, separator)))
     for k, (name, width) in enumerate(zip(names, widths, strict=True)):
         name = name or f'[{k}]'
         if width is None:
-            heads.append((name, '' if header else '[]', said.get(k, '')))
+            heads.append((name, '' if header else '[]', unit_of.get(k, '')))
         else:
-            heads += [(f'{name}[{i}]', name, said.get(k, '')) for i in range(width)]
+            heads += [(f'{name}[{i}]', name, unit_of.get(k, '')) for i in range(width)]
     columns = [name for name, _, _ in heads]
     values, words, notes, damage = _numbers(
         path, lines[first:], separator, columns, widths, first + 1
@@ -95,9 +95,9 @@ def _heading(path: Path, lines: list[str]) -> tuple[int, str, str]:
         if bare.startswith(_COMMENTS):
             comment = bare.lstrip('#% ')
         elif bare and _has_numbers(bare):
-            if not words and _as_many(comment, bare):
+            if not words and _same_width(comment, bare):
                 words = [comment]
-            if len(words) > 1 and _as_many(words[-2], words[-1]):
+            if len(words) > 1 and _same_width(words[-2], words[-1]):
                 return number, words[-2], words[-1]
             return number, (words or [''])[-1], ''
         elif bare:
@@ -120,7 +120,7 @@ def _has_numbers(line: str) -> bool:
     return count > len(cells) / 2
 
 
-def _as_many(header: str, row: str) -> bool:
+def _same_width(header: str, row: str) -> bool:
     """Return whether two lines have the same number of cells."""
     separator = _separator([row])
     return bool(header) and len(_split(header, separator)) == len(_split(row, separator))
@@ -168,7 +168,7 @@ def _numbers(
         if values.shape[1] == len(names):
             return values, {}, (), ()
     values = np.full((len(rows), len(names)), np.nan)
-    said: dict[int, dict[int, str]] = {}
+    texts: dict[int, dict[int, str]] = {}
     notes: tuple[str, ...] = ()
     damage: tuple[str, ...] = ()
     for k, line in enumerate(rows):
@@ -184,21 +184,21 @@ def _numbers(
             raise RecordingError(
                 f'{path}: {where} has {len(cells)} values, the others {len(widths)}'
             )
-        for j, cell in enumerate(_taken_apart(cells, widths, f'{path}: {where}')):
+        for j, cell in enumerate(_expanded_lists(cells, widths, f'{path}: {where}')):
             try:
                 values[k, j] = _number(cell, separator)
             except ValueError:
-                said.setdefault(j, {})[k] = cell
+                texts.setdefault(j, {})[k] = cell
     # a column with fewer numbers contains text
     numeric = np.isfinite(values).mean(axis=0) >= 0.5
-    wrong = [(j, *next(iter(of.items()))) for j, of in said.items() if numeric[j]]
+    wrong = [(j, *next(iter(of.items()))) for j, of in texts.items() if numeric[j]]
     if wrong:
         j, k, cell = wrong[0]
         raise RecordingError(
             f"{path}: line {first_line + k}, column {names[j]}: '{cell}' is no number"
         )
     words: dict[str, Sequence[str]] = {
-        names[j]: [of.get(k, '') for k in range(len(values))] for j, of in said.items()
+        names[j]: [of.get(k, '') for k in range(len(values))] for j, of in texts.items()
     }
     empty = np.argwhere(np.isnan(values) & numeric)
     if len(empty):
@@ -211,7 +211,7 @@ def _numbers(
     return values, words, notes, damage
 
 
-def _taken_apart(cells: list[str], widths: list[int | None], where: str) -> Iterator[str]:
+def _expanded_lists(cells: list[str], widths: list[int | None], where: str) -> Iterator[str]:
     """Yield cells, and for lists their elements."""
     for k, (cell, width) in enumerate(zip(cells, widths, strict=True)):
         elements = [cell] if width is None else _elements(cell)
