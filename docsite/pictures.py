@@ -23,8 +23,12 @@ from armid_ros.nodes.live import LiveDiagnosis, LiveSettings
 from armid_ros.nodes.live.request import answer
 from armid_ros.papers.elastic.identification.interaction import ideal_response
 from armid_ros.papers.elastic.identification.three_steps import identify_two_inertia
-from armid_ros.papers.elastic.plant import EXCITATION_RMS, resonance_experiments, run_elastic, WEAK
-from armid_ros.papers.elastic.work import SENSORS
+from armid_ros.papers.elastic.plant import (
+    ElasticSensors,
+    resonance_experiments,
+    RESONANCE_GAIN,
+    run_elastic,
+)
 from armid_ros.papers.exo.plant.gait import read_gait
 from armid_ros.papers.exo.plant.gait_cycle import check_cycle, gait_cycle
 from armid_ros.papers.exo.plant.walkers import walking_pair
@@ -328,10 +332,10 @@ def damaged() -> Figure:
 def springs() -> Figure:
     """Draw the responses of two joints with springs: measured, and with identified parameters."""
     shipped, rng = two_link_set('after'), np.random.default_rng(0)
-    plant, loop = two_link_plant(shipped.parameters), two_link_loop(shipped, WEAK)
-    plans = resonance_experiments(8, rms=EXCITATION_RMS, rng=rng)
+    plant, loop = two_link_plant(shipped.parameters), two_link_loop(shipped, RESONANCE_GAIN)
+    plans, sensors = resonance_experiments(8, rng), ElasticSensors(0.006, 0.003, 0.2)
     clean = [run_elastic(plant, loop, plan) for plan in plans]
-    runs = [SENSORS.measure(run, rng) for run in clean]
+    runs = [sensors.measure(run, rng) for run in clean]
     found = identify_two_inertia(runs, shipped.parameters, loop)
     figure = Figure(figsize=(WIDTH, 2.8), layout='constrained')
     panels = figure.subplots(1, 2, sharey=True)

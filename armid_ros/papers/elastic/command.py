@@ -129,12 +129,12 @@ def elastic(
     if demo and result.tuning is not None:
         story = report.tuning_story(result.tuning, printed or result.untuned, shipped)
         document['story'] = story
-        told = (
+        accuracy = (
             f'The tuning reduced the error against the true arm by a factor of '
             f'{story["factor"]:.0f}. The main parameters are within '
             f'{story["main_parameters_percent_after"]:.2g} % of the true ones.'
         )
-        verdict = replace(verdict, sentences=[*verdict.sentences, told])
+        verdict = replace(verdict, sentences=[*verdict.sentences, accuracy])
     shown = work.values_table if every else work.resonances_table
     table_shown = None if as_json else shown(document)
     options.deliver_page(staged, page, 'elastic', document, verdict, table_shown)

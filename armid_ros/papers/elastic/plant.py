@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from armid_ros.errors import TrajectoryError
@@ -113,23 +112,15 @@ def run_elastic(plant: Plant, loop: VelocityLoop, experiment: Experiment) -> Ela
     return ElasticRun(motor, Motion(joints, t, *trace.links), experiment.velocity)
 
 
-#: For the shipped two-link arm: rms torque of the multisine [N m], factor on the gains of the loop
-#: during the multisine, and steps of velocity [rad/s] in poses [rad] that identify all parameters.
-EXCITATION_RMS, WEAK = (60.0, 45.0), 0.15
-STEP_POSES = ((0.0, 0.0), (0.0, np.pi / 2), (0.0, np.pi / 4), (0.0, 3 * np.pi / 4))
-STEPS = ((1.0, 0.0), (0.0, 1.0), (1.0, -1.0), (1.0, 1.0))
+#: Factor on the gains of the velocity loop during the multisine.
+RESONANCE_GAIN = 0.15
 #: Step of experiments [s].
 _DT = 1e-3
 
 
-def resonance_experiments(
-    count: int,
-    *,
-    rms: npt.ArrayLike,
-    rng: np.random.Generator,
-) -> list[Experiment]:
+def resonance_experiments(count: int, rng: np.random.Generator) -> list[Experiment]:
     """
-    Return experiments that excite all joints through their resonances, in many poses.
+    Return experiments that excite both joints of the shipped arm through their resonances.
 
     The motors follow a slow sine of velocity under a loop of low gain, so that friction rarely
     changes its sign. A multisine of torque is added. Poses are random around the stretched arm,
@@ -139,43 +130,33 @@ def resonance_experiments(
     ----------
     count : int
         Number of experiments.
-    rms : array_like, shape (n,)
-        Rms torque of the multisine [N m].
     rng : numpy.random.Generator
         Source of phases and poses.
 
     """
-    size = np.asarray(rms, dtype=float)
+    rms = np.array([60.0, 45.0])  # of the multisine of each joint [N m]
     steps = round(4.0 / _DT)  # an experiment of 4 s
     t = _DT * np.arange(steps)[:, np.newaxis]
     experiments = []
     for _ in range(count):
         # 0.3 to 1 Hz and 0.8 rad/s; each experiment has its own frequency
-        rate = 2.0 * np.pi * rng.uniform(0.3, 1.0, len(size))
-        phase = 2.0 * np.pi * rng.random(len(size))
+        rate = 2.0 * np.pi * rng.uniform(0.3, 1.0, 2)
+        phase = 2.0 * np.pi * rng.random(2)
         ramp = np.minimum(t / 0.2, 1.0)
         velocity = ramp * 0.8 * np.cos(rate * t + phase)
         # band of the multisine [Hz]
-        torque = ramp * multisine(steps, _DT, (2.0, 100.0), size, rng)
-        pose = np.pi / 3.0 * rng.uniform(-1.0, 1.0, len(size))
+        torque = ramp * multisine(steps, _DT, (2.0, 100.0), rms, rng)
+        pose = np.pi / 3.0 * rng.uniform(-1.0, 1.0, 2)
         experiments.append(Experiment(pose, velocity, torque))
     return experiments
 
 
-def step_experiments(
-    poses: Sequence[npt.ArrayLike], velocities: Sequence[npt.ArrayLike]
-) -> list[Experiment]:
-    """
-    Return steps of the reference velocity from rest.
-
-    Parameters
-    ----------
-    poses, velocities : sequence of array_like, each of shape (n,)
-        Initial position [rad] and reference velocity [rad/s] of each experiment.
-
-    """
+def step_experiments() -> list[Experiment]:
+    """Return steps of the reference velocity, in poses that make all parameters identifiable."""
     steps = round(0.5 / _DT)  # an experiment of 0.5 s
+    angles = (0.0, np.pi / 2, np.pi / 4, 3 * np.pi / 4)  # of joint 2 [rad]
+    velocities = ((1.0, 0.0), (0.0, 1.0), (1.0, -1.0), (1.0, 1.0))  # [rad/s]
     return [
-        Experiment(np.asarray(q, dtype=float), np.tile(np.asarray(v, dtype=float), (steps, 1)))
-        for q, v in zip(poses, velocities, strict=True)
+        Experiment(np.array([0.0, angle]), np.tile(velocity, (steps, 1)))
+        for angle, velocity in zip(angles, velocities, strict=True)
     ]

@@ -43,7 +43,7 @@ import numpy as np
 import numpy.typing as npt
 
 #: Largest rms difference between measured decoupled response and model for a good grade [dB].
-_CLOSE_DB = 0.5
+_MAX_ERROR_DB = 0.5
 
 
 def elastic_report(
@@ -96,12 +96,12 @@ def verdict(result: TwoInertiaIdentification) -> VerdictSection:
     interval = ' (95 %)' if result.tuning is not None else ''
     sentences = [f'The joint stiffness is {" and ".join(springs)}{interval}.']
     poor = [
-        joint for k, joint in enumerate(result.joints) if decibels_apart(result, k) > _CLOSE_DB
+        joint for k, joint in enumerate(result.joints) if response_error(result, k) > _MAX_ERROR_DB
     ]
     beware = (
         [
             f'{", ".join(poor)}: the measured response differs from that of motor, spring and '
-            f'link by more than {_CLOSE_DB:g} dB.'
+            f'link by more than {_MAX_ERROR_DB:g} dB.'
         ]
         if poor
         else []
@@ -125,16 +125,18 @@ def verdict(result: TwoInertiaIdentification) -> VerdictSection:
     return VerdictSection(grade, tone, sentences, beware, step=step)
 
 
+def named_rows(document: dict[str, Any]) -> list[dict[str, Any]]:
+    """Return the rows of parameters and total damping of a document, with names in words."""
+    words = {symbol: f'{name_in_words(field)} ({symbol})' for field, symbol, _ in PER_JOINT}
+    rows = [*document['parameters'], *document.get('total_damping', [])]
+    return [row | {'name': words.get(row['name'], row['name'])} for row in rows]
+
+
 def _parameters_section(
     result: TwoInertiaIdentification, known: TwoLinkParameters | None, source: str
 ) -> ContentSection:
     """Return a section with parameters, intervals and reference parameters."""
-    names = parameter_names(result.joints)
-    long = {symbol: f'{name_in_words(field)} ({symbol})' for field, symbol, _ in PER_JOINT}
-    lines = [(long.get(name.name, name.name), name.joint, name.unit) for name in names]
-    values, untuned = unpack(result.parameters).tolist(), unpack(result.untuned).tolist()
-    base = None if known is None else unpack(known).tolist()
-    std: list[float] = []
+    untuned = np.concatenate([unpack(result.untuned), result.untuned.total_damping])
     text = 'From the frequency responses. Step responses would tune them and give intervals.'
     heads = ['Parameter', 'Joint', 'Estimate']
     if result.tuning is not None:
@@ -143,27 +145,21 @@ def _parameters_section(
             'well, dl + dm gear². The shares of link and motor are those of the start values.'
         )
         heads += ['± 95 %', 'Untuned']
-        std = result.tuning.estimate.std.tolist()
-        for k, total in enumerate(total_damping(result)):
-            lines.append((total['name'], total['joint'], total['unit']))
-            values.append(total['value'])
-            std.append(total['std'])
-            untuned.append(float(result.untuned.total_damping[k]))
-            if known is not None and base is not None:
-                base.append(float(known.total_damping[k]))
-    if base is not None:
+    if known is not None:
         text += f' Compared with {source}.'
         heads += ['Known', 'Difference']
+        base = np.concatenate([unpack(known), known.total_damping])
     rows = []
-    for k, (name, joint, unit) in enumerate(lines):
-        row = [pretty(name), joint]
-        if std:
-            row += [*measured(values[k], HALF_WIDTH * std[k]), digits(untuned[k], 4)]
+    for k, one in enumerate(named_rows(elastic_document(result, ''))):
+        value, std = one['value'], one['std']
+        row = [pretty(one['name']), one['joint']]
+        if std is None:
+            row.append(f'{value:.4g}')
         else:
-            row.append(f'{values[k]:.4g}')
-        if base is not None:
-            row += [f'{base[k]:g}', f'{100.0 * (values[k] / base[k] - 1.0):+.2f} %']
-        rows.append([*row, pretty(unit)])
+            row += [*measured(value, HALF_WIDTH * std), digits(untuned[k], 4)]
+        if known is not None:
+            row += [f'{base[k]:g}', f'{100.0 * (value / base[k] - 1.0):+.2f} %']
+        rows.append([*row, pretty(one['unit'])])
     table = DataTable([*heads, 'Unit'], rows, words=(0, 1, len(heads)))
     return ContentSection('Parameters', [Paragraph(text), table])
 
@@ -187,7 +183,7 @@ def rigid_section(fit: RigidFit) -> ContentSection:
 
 
 #: Frequency ranges of the plots and of the comparison of responses [Hz].
-_SHOWN, _COMPARED = (2.0, 100.0), (5.0, 60.0)
+_SHOWN_BAND, _COMPARED_BAND = (2.0, 100.0), (5.0, 60.0)
 _ROLES: tuple[Role, Role] = ('residual', 'predicted')
 _SIZE = 'magnitude [dB re rad/(N m s)]'
 
@@ -211,10 +207,10 @@ def responses_section(result: TwoInertiaIdentification) -> ContentSection:
     )
 
 
-def decibels_apart(result: TwoInertiaIdentification, joint: int) -> float:
+def response_error(result: TwoInertiaIdentification, joint: int) -> float:
     """Return the difference of measured and model responses of a joint, 5 to 60 Hz [dB]."""
     measured = result.measured[joint]
-    seen = (measured.frequency >= _COMPARED[0]) & (measured.frequency <= _COMPARED[1])
+    seen = (measured.frequency >= _COMPARED_BAND[0]) & (measured.frequency <= _COMPARED_BAND[1])
     ideal = ideal_response(result.parameters, joint, measured.frequency[seen])[:, 0, 0]
     return decibel_error(measured.decoupled[seen, 0], ideal)
 
@@ -224,9 +220,9 @@ def _joint(
 ) -> Iterator[tuple[str, str, Sequence[Templated]]]:
     """Yield panels of one joint: decoupled, and from motor torque alone."""
     measured, joint, parameters = result.measured[k], result.joints[k], result.parameters
-    seen = (measured.frequency >= _SHOWN[0]) & (measured.frequency <= _SHOWN[1])
+    seen = (measured.frequency >= _SHOWN_BAND[0]) & (measured.frequency <= _SHOWN_BAND[1])
     own = measured.frequency[seen]
-    frequency = np.unique(np.concatenate([np.geomspace(*_SHOWN, 300), own]))
+    frequency = np.unique(np.concatenate([np.geomspace(*_SHOWN_BAND, 300), own]))
     decoupled = ideal_response(parameters, k, frequency)[:, 0, 0]
     subspaces = result.systems[k].response(frequency)[:, 0, 0]
     coupled = coupled_response(parameters, result.angles, frequency)[:, k]
@@ -239,10 +235,10 @@ def _joint(
         (high, f'resonance {high:.1f} Hz', False),
     ]
     modelled = [('any linear model', subspaces), ('motor, spring and link', decoupled)]
-    within = (own >= _COMPARED[0]) & (own <= _COMPARED[1])
+    within = (own >= _COMPARED_BAND[0]) & (own <= _COMPARED_BAND[1])
     rows = at[within]
     errors = (
-        decibels_apart(result, k),
+        response_error(result, k),
         decibel_error(alone[rows], decoupled[rows]),
         decibel_error(alone[rows], coupled[rows]),
     )
@@ -312,7 +308,7 @@ def steps_section(tuning: Tuning) -> ContentSection:
     t = np.asarray(1e3 * tuning.steps.dt * np.arange(len(tuning.measured)), dtype=np.float64)
     panels = []
     for k, pose in enumerate(np.degrees(tuning.steps.q[:, 1])):
-        asked = tuning.steps.reference[-1, k]
+        reference = tuning.steps.reference[-1, k]
         charts = [
             Chart(
                 t,
@@ -329,7 +325,7 @@ def steps_section(tuning: Tuning) -> ContentSection:
             )
             for link in range(2)
         ]
-        name = f'joint 2 at {pose:.0f}°, {asked[0]:g} and {asked[1]:g} rad/s reference'
+        name = f'joint 2 at {pose:.0f}°, {reference[0]:g} and {reference[1]:g} rad/s reference'
         panels.append((name, '', charts))
     return ContentSection('Step responses', [Paragraph(text), Panels(panels)])
 

@@ -11,20 +11,16 @@ from typing import Any
 
 from armid_ros.cli.terminal import Tick
 from armid_ros.errors import RobotError
-from armid_ros.estimate import name_in_words
 from armid_ros.files import Staged
 from armid_ros.motion import FloatArray
-from armid_ros.papers.elastic.identification.response import PER_JOINT
 from armid_ros.papers.elastic.plant import (
     ElasticSensors,
-    EXCITATION_RMS,
     resonance_experiments,
+    RESONANCE_GAIN,
     run_elastic,
     step_experiments,
-    STEP_POSES,
-    STEPS,
-    WEAK,
 )
+from armid_ros.papers.elastic.report import named_rows
 from armid_ros.recording.elastic import write_runs
 from armid_ros.recording.writer import require_new
 from armid_ros.robots import Robot
@@ -41,9 +37,6 @@ import numpy as np
 Table = tuple[Sequence[str], Sequence[Sequence[str]]]
 #: Recordings that --demo makes.
 DEMO_BAGS = ('resonances', 'steps')
-#: Noise of the simulated sensors: rates in rad/s, accelerations in rad/s^2, at the joints.
-SENSORS = ElasticSensors(motor_velocity=0.006, link_velocity=0.003, link_acceleration=0.2)
-STEP_SENSORS = ElasticSensors(motor_velocity=0.002, link_velocity=0.002, link_acceleration=0.2)
 
 
 def machine(**given: str | None) -> tuple[FloatArray, TwoLinkParameters, VelocityLoop]:
@@ -83,15 +76,11 @@ def simulate(
     plant = two_link_plant(shipped.parameters)
     sensors = LinkAccelerometers(robot, np.outer(radius, [1.0, 0.0, 0.0]))
     plans = (
-        (
-            resonances,
-            two_link_loop(shipped, WEAK),
-            resonance_experiments(experiments, rms=EXCITATION_RMS, rng=rng),
-            SENSORS,
-        ),
-        (steps, two_link_loop(shipped), step_experiments(STEP_POSES, STEPS), STEP_SENSORS),
+        (resonances, RESONANCE_GAIN, resonance_experiments(experiments, rng), (0.006, 0.003)),
+        (steps, 1.0, step_experiments(), (0.002, 0.002)),
     )
-    for path, loop, plan, noise in plans:
+    for path, gain, plan, velocities in plans:
+        loop, noise = two_link_loop(shipped, gain), ElasticSensors(*velocities, 0.2)
         runs = []
         for number, experiment in enumerate(plan):
             tick(number / len(plan), f'simulating {path.name}')
@@ -122,14 +111,13 @@ def resonances_table(document: dict[str, Any]) -> Table:
 
 def values_table(document: dict[str, Any]) -> Table:
     """Return all parameters with their standard deviations."""
-    words = {name: name_in_words(field) for field, name, _ in PER_JOINT}
     return ('parameter', 'joint', 'value', 'std', 'unit'), [
         (
-            f'{words[row["name"]]} ({row["name"]})' if row['name'] in words else row['name'],
+            row['name'],
             row['joint'],
             f'{row["value"]:.5g}',
             '' if row['std'] is None else f'{row["std"]:.2g}',
             row['unit'],
         )
-        for row in (*document['parameters'], *document.get('total_damping', []))
+        for row in named_rows(document)
     ]

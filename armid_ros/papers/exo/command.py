@@ -109,8 +109,8 @@ def exo(
         machine, wearer = (replace(one, source=source) for one in both)
         found = work.identify_ties(pair, machine, wearer, inertias, tick)
         walked = work.walk(pair, gait, stiffness, tick) if bag is None else None
-    asked = {'inertias': inertias, 'topics': topics}
-    origin = provenance([path], asked, seed if bag is None else None)
+    used = {'inertias': inertias, 'topics': topics}
+    origin = provenance([path], used, seed if bag is None else None)
     shown = work.recorded_motions(pair, machine, wearer)
     if bag is None:
         shown = work.single_support(pair, gait)

@@ -89,8 +89,8 @@ def find_slack(problem: Callable[[float], InteractionProblem]) -> Slack:
     return Slack(best, std, (misfit(0.0) - found.misfit) / noise, found)
 
 
-#: Samples are averaged to about this rate [Hz], far above the frequencies of human motion.
-_RATE = 100.0
+#: Rate of the averaged samples [Hz], far above the frequencies of human motion.
+_AVERAGED_RATE = 100.0
 
 
 @dataclass
@@ -103,12 +103,12 @@ class _Averages:
     _group: list[tuple[float, FloatArray]] = field(default_factory=list)
 
     def take(self, t: float, row: FloatArray) -> None:
-        if self._group and not 0.0 < t - self._group[-1][0] < 1.0 / _RATE:
+        if self._group and not 0.0 < t - self._group[-1][0] < 1.0 / _AVERAGED_RATE:
             if t <= self._group[-1][0]:
                 self.clear()
             self._close()
         self._group.append((t, row))
-        if t - self._group[0][0] >= 0.75 / _RATE:
+        if t - self._group[0][0] >= 0.75 / _AVERAGED_RATE:
             self._close()
 
     def clear(self) -> None:

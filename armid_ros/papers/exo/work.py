@@ -21,7 +21,12 @@ from armid_ros.papers.exo.plant.leg_pair import (
     walking,
 )
 from armid_ros.papers.exo.plant.walkers import walking_pair
-from armid_ros.papers.exo.report.walk import DrivenJoint, SimulatedWalk, SOFTER, SOURCE_ERROR
+from armid_ros.papers.exo.report.walk import (
+    DrivenJoint,
+    SimulatedWalk,
+    SOURCE_ERROR,
+    STIFFNESS_ERROR,
+)
 from armid_ros.recording import recorded_together, Recording, write_joint_states
 from armid_ros.recording.writer import whole_bag
 import numpy as np
@@ -53,7 +58,7 @@ def walk(pair: TiedPair, gait: Gait, stiffness: float | None, tick: Tick) -> Sim
     tick(0.6, 'walking a whole cycle')
     walkers = walking_pair(stiffness)
     cycle, rate = gait_cycle(walkers, gait), read_assumptions()['torque_rate'].value
-    soft = walkers.with_stiffness((1.0 - SOFTER) * walkers.stiffness)
+    soft = walkers.with_stiffness((1.0 - STIFFNESS_ERROR) * walkers.stiffness)
     shared = ground_by_shares(cycle)
     driven = [
         DrivenJoint(

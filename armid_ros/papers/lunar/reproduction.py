@@ -311,13 +311,13 @@ def _repeat(
         noise = table.noise * rng.normal(size=made.tau.shape)
     tau, source = made.tau + noise, f'the run of table {table.number}'
     recording = Recording(joints=made.joints, t=made.t, q=made.q, tau=tau, source=source)
-    believed = load_robot('humanoid_arm', gravity=table.gravity)
+    nominal = load_robot('humanoid_arm', gravity=table.gravity)
     # masses of the description relative to the arm
-    believed = believed.with_inertias(0.8 * believed.rigid_parameters)
+    nominal = nominal.with_inertias(0.8 * nominal.rigid_parameters)
     torques = [truth.torque(motion) for motion in tests]
     methods = []
     for slow in (True, False):
-        described = ArmModel(believed, quasi_static=slow)
+        described = ArmModel(nominal, quasi_static=slow)
         result = identify(described, [recording], rng=np.random.default_rng(0))
         arm = replace(result.arm, quasi_static=slow)
         found = [arm.torque(motion) for motion in tests]

@@ -3,7 +3,7 @@
 """Experiments with the two-link arm, recorded in MuJoCo for independent tests."""
 
 from armid_ros.motion import ElasticRun
-from armid_ros.papers.elastic.plant import WEAK
+from armid_ros.papers.elastic.plant import RESONANCE_GAIN, step_experiments
 from armid_ros.robots.two_link import two_link_set, TwoLinkParameters
 from armid_ros.simulation.elastic import two_link_loop
 import numpy as np
@@ -15,7 +15,6 @@ from tests.papers.elastic.two_link_in_mujoco import (
     mujoco_arm,
     run_mujoco,
     SENSORS,
-    steps,
 )
 
 
@@ -29,12 +28,12 @@ def truth() -> TwoLinkParameters:
 def clean_steps(truth) -> list[ElasticRun]:
     """Return step responses without noise."""
     loop, engine = two_link_loop(two_link_set('after')), mujoco_arm(truth, MANY)
-    return [run_mujoco(engine, loop, experiment) for experiment in steps()]
+    return [run_mujoco(engine, loop, experiment) for experiment in step_experiments()]
 
 
 @pytest.fixture(scope='session')
 def runs(truth) -> list[ElasticRun]:
     """Return twelve noisy experiments of 4 s through the resonances."""
     rng = np.random.default_rng(3)
-    loop, engine = two_link_loop(two_link_set('after'), WEAK), mujoco_arm(truth)
+    loop, engine = two_link_loop(two_link_set('after'), RESONANCE_GAIN), mujoco_arm(truth)
     return [SENSORS.measure(run_mujoco(engine, loop, e), rng) for e in excitation(12)]

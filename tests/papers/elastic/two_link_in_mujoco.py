@@ -15,12 +15,8 @@ from armid_ros.motion import ElasticRun, FloatArray
 from armid_ros.papers.elastic.identification.response import unpack
 from armid_ros.papers.elastic.plant import (
     ElasticSensors,
-    EXCITATION_RMS,
     Experiment,
     resonance_experiments,
-    step_experiments,
-    STEP_POSES,
-    STEPS,
 )
 from armid_ros.robots import load_robot
 from armid_ros.robots.two_link import ROBOT, TwoLinkParameters
@@ -80,12 +76,7 @@ def modes(plant: Plant, q: FloatArray, *, locked: bool = False) -> FloatArray:
 
 def excitation(count: int, seed: int = 0) -> list[Experiment]:
     """Return experiments that excite the resonances."""
-    return resonance_experiments(count, rms=EXCITATION_RMS, rng=np.random.default_rng(seed))
-
-
-def steps() -> list[Experiment]:
-    """Return the step experiments for tuning."""
-    return step_experiments(STEP_POSES, STEPS)
+    return resonance_experiments(count, np.random.default_rng(seed))
 
 
 def mujoco_arm(parameters: TwoLinkParameters, substeps: int = 20):

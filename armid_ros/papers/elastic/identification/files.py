@@ -29,7 +29,7 @@ import numpy.typing as npt
 #: Alternative topic of the motors.
 _OTHER_MOTOR = '/motor/joint_states'
 #: Length of the shortest experiment [s].
-_SHORTEST = 0.2
+_MIN_DURATION = 0.2
 
 
 def read_runs(
@@ -68,7 +68,7 @@ def read_runs(
         read_recording(path, joints=robot.joints, topic=topic, settings=settings)
         for topic in names
     ]
-    felt = [read_accelerations(path, imu_topic(name), settings) for name in robot.links]
+    readings = [read_accelerations(path, imu_topic(name), settings) for name in robot.links]
     if read is not None:
         read(*recordings)
     if recordings[0].tau is None or any(recording.dq is None for recording in recordings):
@@ -78,24 +78,19 @@ def read_runs(
         )
     stamps = [  # [us]
         *(np.rint(r.start_ns / 1000 + r.t * 1e6).astype(int) for r in recordings),
-        *(np.rint(f[0] / 1000).astype(int) for f in felt),
+        *(np.rint(f[0] / 1000).astype(int) for f in readings),
     ]
     common = _common(path, (*names, *map(imu_topic, robot.links)), stamps)
-    motor, link, asked = (
-        recording.select(np.flatnonzero(np.isin(own, common)))
-        for recording, own in zip(recordings, stamps, strict=False)
-    )
-    sideways = [
-        values[np.searchsorted(own, common, sorter=np.argsort(own)), 1]
-        for (_, values), own in zip(felt, stamps[3:], strict=True)
-    ]
+    places = [np.intersect1d(own, common, return_indices=True)[1] for own in stamps]
+    motor, link, reference = (r.select(k) for r, k in zip(recordings, places, strict=False))
+    sideways = [values[k, 1] for (_, values), k in zip(readings, places[3:], strict=True)]
     assert motor.dq is not None and motor.tau is not None
-    assert link.dq is not None and asked.dq is not None
+    assert link.dq is not None and reference.dq is not None
     ddq = _accelerations(robot, np.asarray(radius, dtype=float), link.q, link.dq, sideways)
     period = float(np.median(np.diff(motor.t)))
-    left = asked.q - motor.q
+    lag = reference.q - motor.q
     runs = []
-    for stood, start, stop in _experiments(motor.t, np.any(asked.dq != 0.0, axis=1), period):  # noqa: RUF069 - as commanded
+    for rest, start, stop in _experiments(motor.t, np.any(reference.dq != 0.0, axis=1), period):  # noqa: RUF069 - as commanded
         rows = slice(start, stop)
         t = np.asarray(period * np.arange(stop - start), dtype=np.float64)
         zero = np.zeros((stop - start, 2))
@@ -103,14 +98,14 @@ def read_runs(
             ElasticRun(
                 Motion(robot.joints, t, motor.q[rows], motor.dq[rows], zero, motor.tau[rows]),
                 Motion(robot.joints, t, link.q[rows], link.dq[rows], ddq[rows]),
-                asked.dq[rows],
-                left[stood:start].mean(axis=0) if stood < start else np.zeros(2),
+                reference.dq[rows],
+                lag[rest:start].mean(axis=0) if rest < start else np.zeros(2),
             )
         )
     if not runs:
         raise RecordingError(
-            f'{path}: {REFERENCE} has no motion of {_SHORTEST:g} s or more; record the reference '
-            'of the velocity loops'
+            f'{path}: {REFERENCE} has no motion of {_MIN_DURATION:g} s or more; record the '
+            'reference of the velocity loops'
         )
     return runs
 
@@ -156,17 +151,17 @@ def _experiments(
 ) -> list[tuple[int, int, int]]:
     """Return parts with motion: last sample at rest, first sample of motion, and end."""
     # time of rest between two experiments [s]
-    pause, shortest = round(0.1 / period), round(_SHORTEST / period)
+    pause, shortest = round(0.1 / period), round(_MIN_DURATION / period)
     found = []
     cuts = np.flatnonzero(np.diff(t) > 1.5 * period) + 1
     for rows in np.split(np.arange(len(t)), cuts):
         active = rows[moving[rows]]
-        stood = int(rows[0])
+        rest = int(rows[0])
         for part in np.split(active, np.flatnonzero(np.diff(active) > pause) + 1):
             if len(part) >= shortest:
                 start = int(part[0])
-                found.append((max(stood, start - pause), start, int(part[-1]) + 1))
-            stood = int(part[-1]) + 1 if len(part) else stood
+                found.append((max(rest, start - pause), start, int(part[-1]) + 1))
+            rest = int(part[-1]) + 1 if len(part) else rest
     return found
 
 

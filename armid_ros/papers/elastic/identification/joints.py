@@ -27,12 +27,13 @@ from armid_ros.robots import Robot
 import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
+from scipy.linalg import block_diag
 from scipy.signal import butter, sosfiltfilt
 
 IntArray = npt.NDArray[np.intp]
 
-CUTOFF = 8.0
-
+#: Cut-off of the signals [Hz].
+_CUTOFF = 8.0
 
 #: Time between samples [s], positions of motor and link at the joint [rad], and torque of the
 #: spring [N m], each of shape (N,).
@@ -54,8 +55,6 @@ class TransmissionFit:
         Twist per velocity: delay of the link encoder after the motor encoder [s].
     correlation : float
         Of compliance and backlash, -1 to 1; near either end the two are collinear.
-    reversals : int
-        Number of flank changes; without any, backlash is an offset.
     explained : float
         R^2 of the whole model.
 
@@ -65,7 +64,6 @@ class TransmissionFit:
     backlash: tuple[float, float, float]
     delay: tuple[float, float, float]
     correlation: float
-    reversals: int
     explained: float
 
     @property
@@ -106,7 +104,7 @@ def fit_transmission(records: Sequence[TwoEncoders], rng: np.random.Generator) -
     if reversals >= 4:
         backlash = _interval(2.0 * found[1], 2.0 * spread[:, 1])
         correlation = float(np.corrcoef(spread[:, 0], spread[:, 1])[0, 1])
-    left = twist - table @ found
+    residual = twist - table @ found
     # the interval of the stiffness is unbounded if that of the compliance contains zero
     compliance, lower, upper = _interval(found[0], spread[:, 0])
     stiffness = [1.0 / c if c > 0.0 else np.inf for c in (compliance, upper, lower)]
@@ -115,22 +113,21 @@ def fit_transmission(records: Sequence[TwoEncoders], rng: np.random.Generator) -
         backlash,
         _interval(found[2], spread[:, 2]),
         correlation,
-        reversals,
-        1.0 - float(left @ left / np.sum((twist - twist.mean()) ** 2)),
+        1.0 - float(residual @ residual / np.sum((twist - twist.mean()) ** 2)),
     )
 
 
 def _columns(record: TwoEncoders) -> tuple[FloatArray, FloatArray, FloatArray, int]:
     """Return columns, twist, times and the number of flank changes of one recording."""
     dt, *signals = record
-    sections = butter(4, CUTOFF, fs=1.0 / dt, output='sos')
+    sections = butter(4, _CUTOFF, fs=1.0 / dt, output='sos')
     motor, link, torque = (sosfiltfilt(sections, x) for x in signals)
     velocity = np.gradient(motor, dt)
     # velocity below which a joint is at rest, as a share of the largest velocity
     moving = np.abs(velocity) > 0.02 * np.abs(velocity).max()
     ends = round(0.3 / dt)
     moving[:ends] = moving[-ends:] = False
-    moving &= np.arange(len(moving)) % max(round(0.25 / CUTOFF / dt), 1) == 0
+    moving &= np.arange(len(moving)) % max(round(0.25 / _CUTOFF / dt), 1) == 0
     # torque range in which the flank changes, as a share of the median torque
     flank = np.tanh(torque / (0.05 * np.median(np.abs(torque))))
     own = np.column_stack([torque, flank, velocity, motor, np.ones(len(motor))])
@@ -143,21 +140,15 @@ def _stacked_recordings(
     pieces: Sequence[tuple[FloatArray, FloatArray, FloatArray, int]],
 ) -> tuple[FloatArray, FloatArray, list[IntArray]]:
     """Stack recordings, with own slope and offset of each, and cut them into blocks."""
-    rows = sum(len(twist) for _, twist, _, _ in pieces)
-    shared, count = pieces[0][0].shape[1] - 2, len(pieces)
-    table = np.zeros((rows, shared + 2 * count))
+    shared = np.vstack([own[:, :-2] for own, *_ in pieces])
+    table = np.hstack([shared, block_diag(*(own[:, -2:] for own, *_ in pieces))])
     blocks: list[IntArray] = []
-    twist, at = np.empty(rows), 0
-    for number, (own, values, t, _) in enumerate(pieces):
-        part = slice(at, at + len(values))
-        table[part, :shared] = own[:, :shared]
-        table[part, shared + 2 * number : shared + 2 * number + 2] = own[:, shared:]
-        twist[part] = values
-        # bootstrap blocks of 0.5 s
-        labels = (t / 0.5).astype(int)
-        blocks += [at + np.flatnonzero(labels == label) for label in np.unique(labels)]
-        at += len(values)
-    return table, twist, blocks
+    first = 0
+    for _, _, t, _ in pieces:
+        labels = (t / 0.5).astype(int)  # bootstrap blocks of 0.5 s
+        blocks += [first + np.flatnonzero(labels == label) for label in np.unique(labels)]
+        first += len(t)
+    return table, np.concatenate([twist for _, twist, _, _ in pieces]), blocks
 
 
 def _drawn(
@@ -182,10 +173,6 @@ def _drawn(
 def _interval(value: float, spread: FloatArray) -> tuple[float, float, float]:
     lower, upper = np.quantile(spread, [0.025, 0.975])
     return float(value), float(lower), float(upper)
-
-
-#: Shortest used stretch without a pause [s].
-_SHORTEST = 2.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -255,10 +242,11 @@ def fit_springs(
         If no stretch is long enough, or a joint hardly moves.
 
     """
-    stretches = [piece for pair in sides for piece in _stretches(*pair)]
+    shortest = 2.0  # used stretch [s]
+    stretches = [piece for pair in sides for piece in _stretches(*pair, shortest)]
     if not stretches:
         raise IdentificationError(
-            f'springs: there is no stretch of {_SHORTEST:g} s without a pause in the recordings'
+            f'springs: there is no stretch of {shortest:g} s without a pause in the recordings'
         )
     loads = [inverse_dynamics(robot, link) for _, link in stretches]
     q = np.concatenate([link.q for _, link in stretches])
@@ -281,10 +269,12 @@ def fit_springs(
     return found
 
 
-def _stretches(motors: Recording, links: Recording) -> list[tuple[Motion, Motion]]:
+def _stretches(
+    motors: Recording, links: Recording, shortest: float
+) -> list[tuple[Motion, Motion]]:
     """Return filtered motions of motors and links without pauses, with the motor torque."""
     period = motors.period
-    sections = butter(4, CUTOFF, fs=1.0 / period, output='sos')
+    sections = butter(4, _CUTOFF, fs=1.0 / period, output='sos')
 
     def smooth(at: FloatArray, times: FloatArray, values: FloatArray) -> FloatArray:
         even = np.column_stack([np.interp(at, times, column) for column in values.T])
@@ -294,7 +284,7 @@ def _stretches(motors: Recording, links: Recording) -> list[tuple[Motion, Motion
     cuts = np.flatnonzero(np.diff(motors.t) > 5.0 * period) + 1
     pieces = []
     for rows in np.split(np.arange(len(motors)), cuts):
-        if len(rows) * period < _SHORTEST:
+        if len(rows) * period < shortest:
             continue
         t = np.asarray(period * np.arange(len(rows)), dtype=np.float64)
         at = motors.t[rows[0]] + t
@@ -317,7 +307,7 @@ def _motor(motors: Sequence[Motion], loads: Sequence[FloatArray], joint: int) ->
         if motor.tau is None:
             return None
         inner = slice(len(motor) // 20, -(len(motor) // 20) - 1)
-        sections = butter(4, CUTOFF, fs=1.0 / (motor.t[1] - motor.t[0]), output='sos')
+        sections = butter(4, _CUTOFF, fs=1.0 / (motor.t[1] - motor.t[0]), output='sos')
         signs = sosfiltfilt(sections, direction(motor.dq), axis=0)
         columns = [motor.ddq, motor.dq, signs, np.ones_like(motor.q)]
         tables.append(np.column_stack([column[inner, joint] for column in columns]))

@@ -32,6 +32,7 @@ PER_JOINT = (
     ('motor_damping', 'dm', 'N m s/rad'),
     ('spring_damping', 'dg', 'N m s/rad'),
 )
+#: Number of tuned parameters: alpha, beta, gamma, and those of both joints.
 SIZE = 3 + 2 * len(PER_JOINT)
 
 
@@ -60,9 +61,7 @@ def parameter_names(joints: tuple[str, ...]) -> tuple[ParameterName, ...]:
 #: Real values, or complex values whose imaginary part is an infinitesimal change.
 DualArray = npt.NDArray[Any]
 #: Imaginary step; its square is below the rounding error, so derivatives have no truncation error.
-_STEP = 1e-30
-#: Number of integration steps per sample.
-_SUBSTEPS = 2
+_COMPLEX_STEP = 1e-30
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,9 +133,9 @@ def sensitivities(
     derivatives : ndarray, shape (N, E, 4, D)
 
     """
-    values = _point(parameters) + 1j * _STEP * directions
+    values = _point(parameters) + 1j * _COMPLEX_STEP * directions
     found = _simulate(steps, values, parameters.gear)
-    return found[:, :, 0].real, np.moveaxis(found.imag / _STEP, 2, 3)
+    return found[:, :, 0].real, np.moveaxis(found.imag / _COMPLEX_STEP, 2, 3)
 
 
 def ringing(steps: Steps, parameters: TwoLinkParameters) -> FloatArray:
@@ -151,8 +150,8 @@ def ringing(steps: Steps, parameters: TwoLinkParameters) -> FloatArray:
 
     """
     values = np.tile(_point(parameters).astype(complex), (4, 1))
-    found = _simulate(steps, values, parameters.gear, 1j * _STEP * np.eye(4))
-    return np.moveaxis(found.imag / _STEP, 2, 3)
+    found = _simulate(steps, values, parameters.gear, 1j * _COMPLEX_STEP * np.eye(4))
+    return np.moveaxis(found.imag / _COMPLEX_STEP, 2, 3)
 
 
 def _point(parameters: TwoLinkParameters) -> FloatArray:
@@ -163,8 +162,8 @@ def _simulate(
     steps: Steps, values: DualArray, gear: FloatArray, rest: DualArray | None = None
 ) -> DualArray:
     """Simulate E experiments with D parameter vectors and initial states each; (N, E, D, 4)."""
-    experiments, sets = len(steps.q), len(values)
-    arm = _Arm(np.tile(values, (experiments, 1)), gear, steps.dt / _SUBSTEPS)
+    experiments, sets, substeps = len(steps.q), len(values), 2
+    arm = _Arm(np.tile(values, (experiments, 1)), gear, steps.dt / substeps)
     size = experiments * sets
     dtype = values.dtype
     q2 = np.repeat(steps.q[:, 1], sets).astype(dtype)
@@ -174,14 +173,14 @@ def _simulate(
     dv = np.zeros((size, 4), dtype)
     modes = np.zeros((size, 2), int)
     integral = np.repeat(steps.integral, sets, axis=0).astype(dtype)
-    limit = np.repeat(steps.reference, sets, axis=1)
+    references = np.repeat(steps.reference, sets, axis=1)
     out = np.empty((len(steps.reference), size, 4), np.complex128)
-    for k, reference in enumerate(limit):
+    for k, reference in enumerate(references):
         out[k] = x[:, 2:]
         error = reference - x[:, 2:4]
         integral = integral + steps.dt * error
         torque = steps.loop.proportional * error + steps.loop.integral * integral
-        for _ in range(_SUBSTEPS):
+        for _ in range(substeps):
             q2, x, dv, modes = arm.advance(q2, x, dv, modes, torque)
     return out.reshape(len(out), experiments, sets, 4)
 

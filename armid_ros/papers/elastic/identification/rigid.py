@@ -27,9 +27,9 @@ from scipy.signal import butter, sosfiltfilt
 #: Cut-off of the signals [Hz]: about a tenth of the lowest resonance of such arms.
 CUTOFF = 2.5
 #: Time at both ends in which the filter has not settled [s].
-_ENDS = 0.4
+_SETTLING_TIME = 0.4
 #: Rows per period of the cut-off frequency.
-_KEPT = 10
+_ROWS_PER_PERIOD = 10
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,7 +78,8 @@ def fit_rigid(runs: Sequence[ElasticRun]) -> RigidFit:
     problem = [part for number, run in enumerate(runs) for part in _rows(run, str(number))]
     if not problem:
         raise IdentificationError(
-            f'the rigid fit needs experiments of more than {2 * _ENDS:g} s; there are none'
+            f'the rigid fit needs experiments of more than {2 * _SETTLING_TIME:g} s; there are '
+            'none'
         )
     normal = NormalEquations.of(problem)
     products = normal.summed()[:-1, :-1]
@@ -107,7 +108,7 @@ def fit_rigid(runs: Sequence[ElasticRun]) -> RigidFit:
     scores = rows * (target - rows @ solution.values)[:, np.newaxis]
     scores = scores.reshape(-1, len(joints), rows.shape[1]).sum(axis=1)
     # correlation time of errors: two periods of the cut-off
-    middle = score_products(by_stretch(problem, scores), 2 * _KEPT)
+    middle = score_products(by_stretch(problem, scores), 2 * _ROWS_PER_PERIOD)
     freedom = len(rows) / max(len(rows) - rows.shape[1], 1)
     bread = np.asarray(np.linalg.inv(rows.T @ rows), dtype=np.float64)
     estimate = Estimate(names, solution.values, freedom * sandwich(bread, middle))
@@ -119,7 +120,7 @@ def _rows(run: ElasticRun, source: str) -> list[Regression]:
     motor, link = run.motor, run.link
     assert motor.tau is not None
     dt = float(motor.t[-1] - motor.t[0]) / (len(motor) - 1)
-    ends = round(_ENDS / dt)
+    ends = round(_SETTLING_TIME / dt)
     if len(motor) <= 2 * ends + 1:
         return []
     table = np.zeros((len(link), 2, 9))
@@ -131,7 +132,7 @@ def _rows(run: ElasticRun, source: str) -> list[Regression]:
     between[:, [0, 1], [6, 7]] = direction(motor.dq)[:-1]
     between[:, :, 8] = motor.tau[:-1]
     sections = butter(4, CUTOFF, fs=1.0 / dt, output='sos')
-    kept = slice(ends, -ends, max(round(1.0 / (_KEPT * CUTOFF) / dt), 1))
+    kept = slice(ends, -ends, max(round(1.0 / (_ROWS_PER_PERIOD * CUTOFF) / dt), 1))
     rows = sosfiltfilt(sections, between, axis=0)[kept]
     moved = link.select(slice(0, -1)).select(kept).with_torque(rows[:, :, 8])
     return [Regression(source, moved, np.ones(moved.q.shape, dtype=bool), rows[:, :, :8])]

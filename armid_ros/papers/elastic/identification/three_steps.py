@@ -46,12 +46,6 @@ import numpy as np
 import numpy.typing as npt
 from scipy.optimize import least_squares
 
-#: Prior standard deviation of the logarithm of the friction ratio.
-_SPLIT = np.log(2.0)
-#: Standard deviations of the initial vibration: twist of the springs [rad] and velocity of the
-#: links [rad/s], some tenths of a second after a step of 1 rad/s.
-_RINGING = np.array([1e-5, 1e-5, 1e-3, 1e-3])
-
 
 @dataclass(frozen=True, eq=False)
 class Tuning:
@@ -119,11 +113,12 @@ def tune(
     base = np.concatenate([unpack(start), start.coulomb])
     # prior of the logarithms of the factors dl (7, 8) and dm (9, 10), rows of unit deviation
     prior = np.zeros((4, SIZE + 2))
-    prior[[0, 1], [7, 8]], prior[[0, 1], [9, 10]] = 1.0 / _SPLIT, -1.0 / _SPLIT
+    ratio_std = np.log(2.0)  # of the logarithm of the ratio of link and motor friction
+    prior[[0, 1], [7, 8]], prior[[0, 1], [9, 10]] = 1.0 / ratio_std, -1.0 / ratio_std
     # the standard deviation of the logarithms of the Coulomb torques is 0.1
     prior[[2, 3], [SIZE, SIZE + 1]] = 10.0
     weight = np.ones(measured.shape[-1])
-    white = _Whitener.of(steps, start, weight)
+    whitened = _whitening(steps, start, weight)
 
     def arm(factors: FloatArray) -> TwoLinkParameters:
         values = base * np.exp(factors)
@@ -131,13 +126,13 @@ def tune(
 
     def residual(factors: FloatArray) -> FloatArray:
         simulated = velocities(steps, arm(factors))
-        left = white((simulated - measured)[..., np.newaxis] / weight[:, np.newaxis])
-        return np.concatenate([left.ravel(), prior @ factors])
+        residuals = whitened((simulated - measured)[..., np.newaxis] / weight[:, np.newaxis])
+        return np.concatenate([residuals.ravel(), prior @ factors])
 
     def jacobian(factors: FloatArray) -> FloatArray:
         now = base * np.exp(factors)
         _, slopes = sensitivities(steps, arm(factors), np.diag(now))
-        slopes = white(slopes / weight[:, np.newaxis])
+        slopes = whitened(slopes / weight[:, np.newaxis])
         return np.vstack([slopes.reshape(-1, len(base)), prior])
 
     factors = np.zeros(len(base))
@@ -146,15 +141,15 @@ def tune(
             residual, factors, jac=jacobian, method='trf', x_scale='jac', xtol=1e-9
         )
         factors = fit.x
-        left = fit.fun[: -len(prior)].reshape(-1, len(weight)) * weight
-        weight = np.sqrt(np.mean(left**2, axis=0)) + 1e-12
-        white = _Whitener.of(steps, arm(factors), weight)
+        residuals = fit.fun[: -len(prior)].reshape(-1, len(weight)) * weight
+        weight = np.sqrt(np.mean(residuals**2, axis=0)) + 1e-12
+        whitened = _whitening(steps, arm(factors), weight)
     after = arm(factors)
     found = unpack(after)
-    rows, left = jacobian(factors), residual(factors)
+    rows, residuals = jacobian(factors), residual(factors)
     # residuals are correlated, so scores are summed over channels of a sample, without the prior
-    white_noise, data = _covariance(rows), len(left) - len(prior)
-    scores = (rows * left[:, np.newaxis])[:data].reshape(*measured.shape, -1).sum(axis=2)
+    white_noise, data = _covariance(rows), len(residuals) - len(prior)
+    scores = (rows * residuals[:, np.newaxis])[:data].reshape(*measured.shape, -1).sum(axis=2)
     lags = max(1, count // 10)  # residuals are correlated over at most a tenth of an experiment
     middle = prior.T @ prior + score_products(list(scores.transpose(1, 0, 2)), lags)
     relative = widened(white_noise, white_noise, middle)[:SIZE, :SIZE]
@@ -168,28 +163,26 @@ def tune(
     )
 
 
-@dataclass(frozen=True, eq=False)
-class _Whitener:
-    """Whitening of velocities for the initial vibrations of the arm."""
+def _whitening(
+    steps: Steps, parameters: TwoLinkParameters, weight: FloatArray
+) -> Callable[[FloatArray], FloatArray]:
+    """Return a function that whitens velocities, (N, E, C, D), for the initial vibrations."""
+    # twist of the springs [rad] and velocity of the links [rad/s], some tenths of a second after
+    # a step of 1 rad/s
+    std = np.array([1e-5, 1e-5, 1e-3, 1e-3])
+    slopes = ringing(steps, parameters) * std / weight[:, np.newaxis]
+    flat = np.moveaxis(slopes, 1, 0).reshape(slopes.shape[1], -1, slopes.shape[3])
+    shapes, sizes, _ = np.linalg.svd(flat, full_matrices=False)  # of the vibrations
+    shares = 1.0 - 1.0 / np.sqrt(1.0 + sizes**2)  # that are removed
 
-    shapes: FloatArray  # (E, 4, N C): orthonormal basis of the vibrations
-    shares: FloatArray  # (E, 4): share of each that is removed
-
-    @classmethod
-    def of(cls, steps: Steps, parameters: TwoLinkParameters, weight: FloatArray) -> _Whitener:
-        slopes = ringing(steps, parameters) * _RINGING / weight[:, np.newaxis]
-        flat = np.moveaxis(slopes, 1, 0).reshape(slopes.shape[1], -1, slopes.shape[3])
-        shapes, sizes, _ = np.linalg.svd(flat, full_matrices=False)
-        return cls(shapes.transpose(0, 2, 1), 1.0 - 1.0 / np.sqrt(1.0 + sizes**2))
-
-    def __call__(self, values: FloatArray) -> FloatArray:
-        """Whiten values of shape (N, E, C, D)."""
+    def whitened(values: FloatArray) -> FloatArray:
         flat = np.moveaxis(values, 1, 0).reshape(values.shape[1], -1, values.shape[3])
-        part = self.shares[..., np.newaxis] * (self.shapes @ flat)
-        clean = flat - self.shapes.transpose(0, 2, 1) @ part
+        part = shares[..., np.newaxis] * (shapes.transpose(0, 2, 1) @ flat)
         count, experiments, channels, columns = values.shape
-        clean = clean.reshape(experiments, count, channels, columns)
+        clean = (flat - shapes @ part).reshape(experiments, count, channels, columns)
         return np.asarray(np.moveaxis(clean, 0, 1))
+
+    return whitened
 
 
 def _covariance(jacobian: FloatArray) -> FloatArray:

@@ -19,6 +19,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
+from armid_ros.model import inverse_dynamics
 from armid_ros.model.kinematics import points_motion
 from armid_ros.motion import FloatArray, Motion, read_only
 from armid_ros.papers.exo.plant.gait import Gait, read_assumptions
@@ -44,10 +45,9 @@ from armid_ros.papers.exo.plant.walkers import (
 from armid_ros.robots import Robot
 import numpy as np
 import numpy.typing as npt
-import pinocchio as pin
 
 #: Integration steps per cycle.
-_STEPS = 2400
+_STEPS_PER_CYCLE = 2400
 _PLANE = np.array([0, 2])
 
 
@@ -156,17 +156,6 @@ class GaitCycle:
         return PairMotion(self.own.motion, self.other.motion)
 
 
-@dataclass(frozen=True)
-class _Course:
-    """Points of one machine relative to its hips over a cycle, at every half integration step."""
-
-    contact: FloatArray  # (2 K, 4, 2)
-    contact_speed: FloatArray
-    tied: FloatArray  # (2 K, S, 2)
-    pull: FloatArray  # (2 K, 2): weight and inertial force of the limbs [N]
-    mass: float
-
-
 def gait_cycle(pair: TiedPair, gait: Gait) -> GaitCycle:
     """
     Simulate a walking pair until its motion is periodic, and return one cycle.
@@ -180,41 +169,43 @@ def gait_cycle(pair: TiedPair, gait: Gait) -> GaitCycle:
 
     """
     known = read_assumptions()
-    cycle, late = known['cycle_time'].value, known['exoskeleton_delay'].value
-    worn = walkable(gait, leg_length(pair.other), cycle)
+    cycle, delay = known['cycle_time'].value, known['exoskeleton_delay'].value
+    wearer_gait = walkable(gait, leg_length(pair.other), cycle)
     phase = np.arange(100) / 100.0
     offset = np.radians(known['walking_offset_deg'].value)
-    asked = known['exoskeleton_scale'].value * worn.gait(phase) + offset
-    own = walkable(
-        Gait.fit(phase, asked, harmonics=8),
+    desired = known['exoskeleton_scale'].value * wearer_gait.gait(phase) + offset
+    own_gait = walkable(
+        Gait.fit(phase, desired, harmonics=8),
         leg_length(pair.robot),
         cycle,
-        stride=worn.stride,
-        lean=worn.lean,
+        stride=wearer_gait.stride,
+        lean=wearer_gait.lean,
     )
-    half = np.arange(2 * _STEPS) / (2.0 * _STEPS)
-    moves = [
-        _joint_motion(robot, plan, half * cycle, half - lag / cycle, cycle)
-        for robot, plan, lag in ((pair.robot, own, late), (pair.other, worn, 0.0))
-    ]
-    courses = (_course(pair, moves[0], False), _course(pair, moves[1], True))
+    half = np.arange(2 * _STEPS_PER_CYCLE) / (2.0 * _STEPS_PER_CYCLE)
+    robots = pair.robot, pair.other
+    legs = PairMotion(
+        _joint_motion(pair.robot, own_gait, half * cycle, half - delay / cycle, cycle),
+        _joint_motion(pair.other, wearer_gait, half * cycle, half, cycle),
+    )
     places, speeds = [], []  # planned position and velocity of the hips, machine and wearer
-    for plan, lag in ((own, late), (worn, 0.0)):
+    for plan, lag in ((own_gait, delay), (wearer_gait, 0.0)):
         count = len(plan.hips)
         path = plan.hips + np.outer(np.arange(count) / count, [plan.stride, 0.0])
         speeds.append(np.gradient(path, axis=0)[2] * count / cycle)
         places.append(path[0] - speeds[-1] * lag)
     start = np.concatenate([*places, *speeds])
-    states, rates = _walk(pair, courses, start, cycle)
-    rows = np.append(np.arange(0, 2 * _STEPS, 2), 0)
-    motions = PairMotion(
-        _placed(pair.robot, moves[0], rows, states[:, :2], states[:, 4:6], rates[:, 4:6], cycle),
-        _placed(pair.other, moves[1], rows, states[:, 2:4], states[:, 6:], rates[:, 6:], cycle),
-    )
-    ground = [
-        _ground_forces(robot, motion)
-        for robot, motion in zip((pair.robot, pair.other), motions, strict=True)
-    ]
+    states, rates = _walk(pair, legs, start, cycle)
+    rows = np.append(np.arange(0, 2 * _STEPS_PER_CYCLE, 2), 0)
+    whole, ground = [], []
+    for k, (robot, motion) in enumerate(zip(robots, legs, strict=True)):
+        parts = [part[rows] for part in (motion.q, motion.dq, motion.ddq)]
+        hips = states[:, 0, k], states[:, 1, k], rates[:, 1, k]
+        for values, moved in zip(parts, hips, strict=True):
+            values[:, floating(robot)[:2]] = moved
+        whole.append(Motion(motion.joints, np.linspace(0.0, cycle, len(rows)), *parts))
+        place, speed = _contact_motion(robot, whole[k])
+        ground.append(read_only(ground_force(place[..., 1], speed[..., 1], speed[..., 0])))
+    motions = PairMotion(*whole)
     found = walking_torques(pair, motions, ground[0], ground[1])
     own, other = (
         WalkingMachine(*parts)
@@ -223,14 +214,14 @@ def gait_cycle(pair: TiedPair, gait: Gait) -> GaitCycle:
             (pair.other, motions.other, ground[1], -found.forces, found.other_tau),
         )
     )
-    return GaitCycle(pair, read_only(np.linspace(0.0, 1.0, _STEPS + 1)), own, other)
+    return GaitCycle(pair, read_only(np.linspace(0.0, 1.0, _STEPS_PER_CYCLE + 1)), own, other)
 
 
-def _ground_forces(robot: Robot, motion: Motion) -> FloatArray:
-    """Return the ground forces on heels and toes along a motion, shape (N, 4, 2) [N]."""
+def _contact_motion(robot: Robot, motion: Motion) -> tuple[FloatArray, FloatArray]:
+    """Return positions and velocities of heels and toes, forward and up, each (N, 4, 2)."""
     place, jacobian = points_motion(robot, *contacts(robot), motion.q)
     speed = np.einsum('ncxj,nj->ncx', jacobian, motion.dq)
-    return read_only(ground_force(place[..., 2], speed[..., 2], speed[..., 0]))
+    return place[..., _PLANE], speed[..., _PLANE]
 
 
 def walking_torques(
@@ -273,78 +264,55 @@ def _joint_motion(
     return Motion(robot.joints, t, *parts)
 
 
-def _course(pair: TiedPair, motion: Motion, other: bool) -> _Course:
-    robot = pair.other if other else pair.robot
-    joints, points = contacts(robot)
-    ties = [(t.other_joint, t.other_point) if other else (t.joint, t.point) for t in pair.ties]
-    contact, jacobian = points_motion(robot, joints, points, motion.q)
-    speed = np.einsum('ncxj,nj->ncx', jacobian, motion.dq)
-    tied, _ = points_motion(
-        robot, [joint for joint, _ in ties], np.array([point for _, point in ties]), motion.q
-    )
-    data = robot.model.createData()
-    acceleration = np.empty((len(motion), 2))  # of the centre of mass
-    for k, row in enumerate(zip(motion.q, motion.dq, motion.ddq, strict=True)):
-        pin.centerOfMass(robot.model, data, *map(np.array, row))
-        acceleration[k] = data.acom[0][_PLANE]
-    mass = float(robot.rigid_parameters[::10].sum())
-    pull = mass * (robot.gravity[_PLANE] - acceleration)
-    return _Course(contact[..., _PLANE], speed[..., _PLANE], tied[..., _PLANE], pull, mass)
-
-
 def _walk(
-    pair: TiedPair, courses: tuple[_Course, _Course], start: FloatArray, cycle: float
+    pair: TiedPair, legs: PairMotion, start: FloatArray, cycle: float
 ) -> tuple[FloatArray, FloatArray]:
-    """Integrate both hips (Runge-Kutta 4); return states and their rates in the last cycle."""
-    own, far = courses
-    masses = np.array([own.mass, own.mass, far.mass, far.mass])
+    """
+    Integrate the hips of both machines (Runge-Kutta 4), with prescribed legs.
+
+    States and rates of the last cycle have the shape (N, 2, 2, 2): position and velocity, of the
+    machine and its wearer, forward and up.
+
+    """
+    robots = pair.robot, pair.other
+    ends = [_contact_motion(robot, motion) for robot, motion in zip(robots, legs, strict=True)]
+    contact, contact_speed = (np.stack(part, axis=1) for part in zip(*ends, strict=True))
+    # weight and inertial force of the bodies if the hips do not move [N]
+    pull = np.stack(
+        [
+            -inverse_dynamics(robot, motion)[:, floating(robot)[:2]]
+            for robot, motion in zip(robots, legs, strict=True)
+        ],
+        axis=1,
+    )
+    way = pair.geometry(*legs).way[..., _PLANE]
+    mass = np.array([[robot.rigid_parameters[::10].sum()] for robot in robots])
 
     def rate(k: int, x: FloatArray) -> FloatArray:
-        k %= 2 * _STEPS
-        pulls = []
-        for course, place, speed in ((own, x[:2], x[4:6]), (far, x[2:4], x[6:])):
-            points = course.contact[k] + place
-            moving = course.contact_speed[k] + speed
-            touch = ground_force(points[:, 1], moving[:, 1], moving[:, 0])
-            pulls.append(course.pull[k] + touch.sum(axis=0))
-        way = own.tied[k] - far.tied[k] + (x[:2] - x[2:4])
-        spring = pair.forces(way).sum(axis=0)
-        force = np.concatenate([pulls[0] + spring, pulls[1] - spring])
-        return np.concatenate([x[4:], force / masses])
+        k %= 2 * _STEPS_PER_CYCLE
+        hips, velocity = x.reshape(2, 2, 2)
+        points = contact[k] + hips[:, np.newaxis]
+        moving = contact_speed[k] + velocity[:, np.newaxis]
+        force = ground_force(points[..., 1], moving[..., 1], moving[..., 0]).sum(axis=1)
+        spring = pair.forces(way[k] + hips[0] - hips[1]).sum(axis=0)
+        force += pull[k] + np.stack([spring, -spring])
+        return np.concatenate([velocity.ravel(), (force / mass).ravel()])
 
-    h, x = cycle / _STEPS, start
-    states, rates = np.empty((_STEPS + 1, 8)), np.empty((_STEPS + 1, 8))
+    h, x = cycle / _STEPS_PER_CYCLE, start
+    states, rates = np.empty((2, _STEPS_PER_CYCLE + 1, 8))
     for _ in range(3):  # the last one is returned
-        for step in range(_STEPS):
+        for step in range(_STEPS_PER_CYCLE):
             states[step] = x
             rates[step], x = runge_kutta(rate, 2 * step, h, x)
         states[-1], rates[-1] = x, rate(0, x)
-    return states, rates
-
-
-def _placed(
-    robot: Robot,
-    legs: Motion,
-    rows: npt.NDArray[np.intp],
-    place: FloatArray,
-    speed: FloatArray,
-    rate: FloatArray,
-    cycle: float,
-) -> Motion:
-    """Return the motion of the legs with the simulated motion of the hips."""
-    parts = [np.array(part[rows]) for part in (legs.q, legs.dq, legs.ddq)]
-    hips = floating(robot)[:2]
-    for values, found in zip(parts, (place, speed, rate), strict=True):
-        values[:, hips] = found
-    t = np.linspace(0.0, cycle, len(rows))
-    return Motion(legs.joints, t, *parts)
+    return states.reshape(-1, 2, 2, 2), rates.reshape(-1, 2, 2, 2)
 
 
 def check_cycle(
     cycle: GaitCycle,
     joint: str,
     rate: float,
-    believed: TiedPair | None = None,
+    assumed: TiedPair | None = None,
     ground_forces: FloatArray | None = None,
 ) -> GaitCheck:
     """
@@ -361,7 +329,7 @@ def check_cycle(
         The joint that follows its torque.
     rate : float
         Torque samples per second, joined by cubic splines.
-    believed : TiedPair, optional
+    assumed : TiedPair, optional
         The machines for which the torques are computed; by default the simulated ones.
     ground_forces : ndarray, shape (N, 4, 2), optional
         Forces on heels and toes for which the torques are computed [N]; by default the simulated
@@ -369,7 +337,7 @@ def check_cycle(
 
     """
     pair, motions = cycle.pair, cycle.motions
-    torque = driving_torque(cycle, joint, rate, believed, ground_forces)
+    torque = driving_torque(cycle, joint, rate, assumed, ground_forces)
     hips = [pair.robot.joints[place] for place in floating(pair.robot)[:2]]
     moved = drive_by_torque(pair, *motions, [*hips, joint], torque, on_ground=True)
     return GaitCheck(joint, motions.own.q[::2, pair.robot.index(joint)], moved)
@@ -379,14 +347,14 @@ def driving_torque(
     cycle: GaitCycle,
     joint: str,
     rate: float,
-    believed: TiedPair | None = None,
+    assumed: TiedPair | None = None,
     ground_forces: FloatArray | None = None,
 ) -> DrivingTorque:
     """Return zero force on the hips and the interpolated torque of a joint, (3,) [N, N m]."""
     tau = cycle.own.tau
-    if believed is not None or ground_forces is not None:
+    if assumed is not None or ground_forces is not None:
         ground = cycle.own.ground if ground_forces is None else ground_forces
-        pair = believed or cycle.pair
+        pair = assumed or cycle.pair
         tau = walking_torques(pair, cycle.motions, ground, cycle.other.ground).tau
     curve = splined(cycle.own.motion.t, tau[:, [cycle.pair.robot.index(joint)]], rate)
     return lambda t: np.concatenate([[0.0, 0.0], curve(t)])

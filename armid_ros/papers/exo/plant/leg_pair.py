@@ -180,10 +180,13 @@ def leg_pair(
 
     """
     exo, human = load_robot('exoskeleton_legs'), load_robot('human_legs')
-    ties = leg_ties(exo, human, segments)
-    if stiffness is None:
-        stiffness = read_assumptions()['interaction_stiffness'].value
-    return TiedPair(exo, human, ties, np.asarray(stiffness, dtype=float))
+    return TiedPair(exo, human, leg_ties(exo, human, segments), assumed_stiffness(stiffness))
+
+
+def assumed_stiffness(stiffness: npt.ArrayLike | None) -> FloatArray:
+    """Return a stiffness of springs [N/m]; by default that of ``assumptions.yaml``."""
+    assumed = read_assumptions()['interaction_stiffness'].value
+    return np.asarray(assumed if stiffness is None else stiffness, dtype=float)
 
 
 def walking(pair: TiedPair, gait: Gait, t: FloatArray) -> PairMotion:

@@ -217,10 +217,6 @@ class GaitCheck:
         return float(np.degrees(np.abs(self.error).max()))
 
 
-#: Number of samples per block of the simulation.
-_BLOCK = 50
-
-
 @dataclass(frozen=True, eq=False)
 class PairSample:
     """
@@ -324,9 +320,10 @@ class SimulatedPair:
     def advance(self) -> PairSample:
         """Simulate one sample, and return the sensor readings."""
         self._steps += 1
-        if self._block is None or self._steps - self._first > _BLOCK:
+        size = 50  # samples of a block
+        if self._block is None or self._steps - self._first > size:
             self._first = self._steps - 1
-            t = (self._first + np.arange(_BLOCK + 1)) / self._rate
+            t = (self._first + np.arange(size + 1)) / self._rate
             own, other = stepping(self.pair, self._gait, t)
             own = self._driven(own) if self._columns else own
             tau = np.array(pair_torques(self.pair, own, other).tau)

@@ -24,7 +24,7 @@ from dataclasses import dataclass, replace
 
 from armid_ros.motion import FloatArray
 from armid_ros.papers.exo.plant.gait import Gait, read_assumptions
-from armid_ros.papers.exo.plant.leg_pair import TiedPair
+from armid_ros.papers.exo.plant.leg_pair import assumed_stiffness, TiedPair
 from armid_ros.robots import load_robot, Robot
 from armid_ros.robots.load import robot_from_urdf
 from armid_ros.robots.ties import centroid_ties
@@ -38,8 +38,6 @@ _HARMONICS = 8
 _SAMPLES = 100
 #: Intervals with heel and toe on the ground, in cycles since heel strike.
 HEEL_DOWN, TOE_DOWN = (0.0, 0.42), (0.12, 0.62)
-#: Standard deviation of a foot on the ground from its fixed position [m].
-_PLACE = 0.3e-3
 
 
 @dataclass(frozen=True)
@@ -105,7 +103,7 @@ def foot_points(
     thigh = angles[:, 0] - lean
     shank = thigh - angles[:, 1]
     foot = shank + angles[:, 2]
-    heel = hips + leg.thigh * _hanging(thigh) + leg.shank * _hanging(shank)
+    heel = hips + leg.thigh * _downward(thigh) + leg.shank * _downward(shank)
     return heel, heel + leg.foot * np.column_stack([np.cos(foot), np.sin(foot)])
 
 
@@ -132,40 +130,48 @@ def walkable(
         Distance per cycle [m] and lean of the trunk [rad]; fitted to the curves by default.
 
     """
-    curves = _Curves(cycle, stride, lean)
-    phase, count, paths = curves.phase, curves.basis.shape[1], curves.even.shape[1]
-    wanted = gait(phase)
+    phase = np.arange(_SAMPLES) / _SAMPLES
+    turn = 2.0 * np.pi * np.outer(phase, np.arange(1, _HARMONICS + 1))
+    basis = np.hstack([np.ones((_SAMPLES, 1)), np.cos(turn), np.sin(turn)])
+    even = np.hstack([basis[:, :1], np.cos(turn[:, 1::2]), np.sin(turn[:, 1::2])])
+    waves = np.concatenate([[0.0], *2 * [np.arange(2, _HARMONICS + 1, 2)]])
+    bent = -((2.0 * np.pi * waves / cycle) ** 2) * even  # second derivative of the path
+    count, paths, wanted = basis.shape[1], even.shape[1], gait(phase)
     heel_down, toe_down = _inside(phase, HEEL_DOWN), _inside(phase, TOE_DOWN)
-    swing = _inside(phase, (0.68, 0.93))
+    swing, foot_std = _inside(phase, (0.68, 0.93)), 0.3e-3  # of a foot that stands [m]
 
-    def feet(x: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return distances of heel and toe from the fixed foot, and height of the lower."""
-        angles, hips, own_lean, own_stride = curves.of(x)
-        way = np.column_stack([own_stride * phase, np.zeros(_SAMPLES)])
-        heel, toe = foot_points(angles, hips + way, own_lean, leg)
-        stand, far = np.array([x[-1], 0.0]), np.array([leg.foot, 0.0])
-        return heel - stand, toe - stand - far, np.minimum(heel[:, 1], toe[:, 1])
+    def curves(x: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, float, float]:
+        """Return angles, path of the hips and its acceleration [m/s^2], lean and stride."""
+        # coefficients of hip, knee, ankle and path, lean, stride, position of the fixed foot
+        joints, path = x[: 3 * count].reshape(3, count).T, x[3 * count : -3].reshape(2, paths).T
+        own_lean = float(x[-3]) if lean is None else lean
+        own_stride = float(x[-2]) if stride is None else stride
+        return basis @ joints, even @ path, bent @ path, own_lean, own_stride
 
     def residual(x: FloatArray) -> FloatArray:
-        heel, toe, lowest = feet(x)
+        angles, hips, acceleration, own_lean, own_stride = curves(x)
+        way = np.column_stack([own_stride * phase, np.zeros(_SAMPLES)])
+        heel, toe = foot_points(angles, hips + way, own_lean, leg)
+        lowest = np.minimum(heel[:, 1], toe[:, 1])
+        heel, toe = heel - [x[-1], 0.0], toe - [x[-1] + leg.foot, 0.0]
         return np.concatenate(
             [
-                # angles keep to the given curves, the hips accelerate little [m/s^2], and the foot
-                # is 20 mm above the ground in mid-swing
-                ((curves.of(x)[0] - wanted) / np.radians([3.0, 3.0, 10.0])).ravel() / 10.0,
-                heel[heel_down].ravel() / _PLACE / 10.0,
-                toe[toe_down].ravel() / _PLACE / 10.0,
-                (curves.hurry(x) / np.array([1.0, 1.5])).ravel() / 10.0,
+                # angles keep to the given curves, the hips accelerate little, and the foot is
+                # 20 mm above the ground in mid-swing
+                ((angles - wanted) / np.radians([3.0, 3.0, 10.0])).ravel() / 10.0,
+                heel[heel_down].ravel() / foot_std / 10.0,
+                toe[toe_down].ravel() / foot_std / 10.0,
+                (acceleration / np.array([1.0, 1.5])).ravel() / 10.0,
                 np.minimum(lowest[swing] - 0.02, 0.0) / 3e-3,
             ]
         )
 
     start = np.zeros(3 * count + 2 * paths + 3)
-    start[: 3 * count] = np.linalg.lstsq(curves.basis, wanted, rcond=None)[0].T.ravel()
+    start[: 3 * count] = np.linalg.lstsq(basis, wanted, rcond=None)[0].T.ravel()
     start[3 * count + paths] = 0.9 * (leg.thigh + leg.shank)
     start[-3:] = 0.15 if lean is None else lean, 1.6 * (leg.thigh + leg.shank), 0.3
     found = least_squares(residual, start, x_scale='jac').x
-    angles, hips, own_lean, own_stride = curves.of(found)
+    angles, hips, _, own_lean, own_stride = curves(found)
     return WalkableGait(
         Gait.fit(phase, angles, harmonics=_HARMONICS),
         own_lean,
@@ -174,43 +180,7 @@ def walkable(
     )
 
 
-class _Curves:
-    """Curves of a leg and a path of the hips, by the coefficients of their series."""
-
-    # order of the vector: hip, knee, ankle, path of the hips forward and up, lean, stride,
-    # position of the fixed foot
-
-    def __init__(self, cycle: float, stride: float | None, lean: float | None):
-        self.phase = np.arange(_SAMPLES) / _SAMPLES
-        turn = 2.0 * np.pi * np.outer(self.phase, np.arange(1, _HARMONICS + 1))
-        self.basis = np.hstack([np.ones((_SAMPLES, 1)), np.cos(turn), np.sin(turn)])
-        self.even = np.hstack([self.basis[:, :1], np.cos(turn[:, 1::2]), np.sin(turn[:, 1::2])])
-        waves = np.concatenate([[0.0], *2 * [np.arange(2, _HARMONICS + 1, 2)]])
-        self._bent = -((2.0 * np.pi * waves / cycle) ** 2) * self.even
-        self._stride, self._lean = stride, lean
-
-    def of(self, x: FloatArray) -> tuple[FloatArray, FloatArray, float, float]:
-        """Return angles, path of the hips, lean and stride."""
-        count = self.basis.shape[1]
-        angles = self.basis @ x[: 3 * count].reshape(3, count).T
-        lean, stride = x[-3:-1].tolist()
-        return (
-            angles,
-            self.even @ self._path(x),
-            lean if self._lean is None else self._lean,
-            stride if self._stride is None else self._stride,
-        )
-
-    def hurry(self, x: FloatArray) -> FloatArray:
-        """Return the acceleration of the hips, shape (N, 2) [m/s^2]."""
-        return np.asarray(self._bent @ self._path(x))
-
-    def _path(self, x: FloatArray) -> FloatArray:
-        paths = self.even.shape[1]
-        return x[3 * self.basis.shape[1] : -3].reshape(2, paths).T
-
-
-def _hanging(angle: FloatArray) -> FloatArray:
+def _downward(angle: FloatArray) -> FloatArray:
     """Return downward unit vectors, rotated forward by angles, shape (N, 2)."""
     return np.column_stack([np.sin(angle), -np.cos(angle)])
 
@@ -249,7 +219,7 @@ FLOATING = ('forward', 'up', 'lean')
 _LEG = ('hip', 'knee', 'ankle')
 #: Links of a leg and their axes: flexion and dorsiflexion are positive.
 _LINKS, _AXES = ('thigh', 'shank', 'foot'), ('0 -1 0', '0 1 0', '0 -1 0')
-#: Number of springs of a walking pair: one per thigh and shank.
+#: Segments with a spring of a walking pair.
 SEGMENTS = tuple(f'{side}_{link}' for side in SIDES for link in ('shank', 'thigh'))
 
 
@@ -315,13 +285,11 @@ def walking_pair(stiffness: npt.ArrayLike | None = None) -> TiedPair:
 
     """
     exo, human = (walker(load_robot(name)) for name in ('exoskeleton_legs', 'human_legs'))
-    moved = {'shank': 'knee', 'thigh': 'hip'}
-    joints = [f'{s.split("_")[0]}_{moved[s.split("_")[1]]}' for s in SEGMENTS]
+    # a knee moves the shank, and a hip the thigh
+    joints = [s.replace('shank', 'knee').replace('thigh', 'hip') for s in SEGMENTS]
     ties = centroid_ties(exo, human, [(f'exo_{j}', f'human_{j}') for j in joints])
     named = tuple(replace(tie, name=s) for tie, s in zip(ties, SEGMENTS, strict=True))
-    if stiffness is None:
-        stiffness = read_assumptions()['interaction_stiffness'].value
-    return TiedPair(exo, human, named, np.asarray(stiffness, dtype=float))
+    return TiedPair(exo, human, named, assumed_stiffness(stiffness))
 
 
 def columns(robot: Robot, side: str) -> list[int]:

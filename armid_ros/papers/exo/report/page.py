@@ -28,8 +28,8 @@ from armid_ros.report.page import Page, Section
 from armid_ros.report.provenance import Provenance
 import numpy as np
 
-#: Share of the value above which the width of its interval is poor.
-_NARROW = 0.1
+#: Share of a stiffness that the half-width of a narrow interval has at most.
+_MAX_HALF_WIDTH = 0.1
 
 
 def exo_report(
@@ -87,7 +87,7 @@ def verdict(found: Sequence[Interaction], walked: SimulatedWalk | None) -> Verdi
         name.replace('_', ' ')
         for part in found[1:]
         for name, value, std in zip(part.segments, part.stiffness, part.std, strict=True)
-        if HALF_WIDTH * std > _NARROW * abs(value)
+        if HALF_WIDTH * std > _MAX_HALF_WIDTH * abs(value)
     ]
     if walked is not None:
         each = ', '.join(f'{one.right.joint} {one.right.most:.2g}°' for one in walked.driven)
@@ -97,7 +97,7 @@ def verdict(found: Sequence[Interaction], walked: SimulatedWalk | None) -> Verdi
     )
     if k - reach <= 0.0:
         return VerdictSection('no interaction', 'fair', ['No interaction was identified.'], beware)
-    sure = reach < _NARROW * k
+    sure = reach < _MAX_HALF_WIDTH * k
     return VerdictSection(
         'found' if sure else 'uncertain', 'good' if sure else 'fair', sentences, beware
     )

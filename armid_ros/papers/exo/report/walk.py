@@ -27,7 +27,7 @@ _ABSCISSA = 'gait cycle of the right leg'
 
 
 #: Relative error of the stiffness of springs that are too soft.
-SOFTER = 0.2
+STIFFNESS_ERROR = 0.2
 #: Largest error of the position of a torque-driven joint in the source [deg].
 SOURCE_ERROR = {'exo_right_hip': 1.5, 'exo_right_knee': 2.5}
 
@@ -193,7 +193,7 @@ def by_torque_section(walked: SimulatedWalk) -> ContentSection:
         'through swing and stance; hips are free, all other joints move as prescribed. Largest '
         'errors over the cycle:'
     )
-    soft = f'Springs {100.0 * SOFTER:g} % too soft [°]'
+    soft = f'Springs {100.0 * STIFFNESS_ERROR:g} % too soft [°]'
     heads = ('Joint', 'Source [°]', 'Here [°]', soft, 'Feet of the source [°]')
     phase, rows, panels = walked.cycle.phase[::2], [], []
     for right, softer, shared in walked.driven:

@@ -13,13 +13,13 @@ from armid_ros.papers.elastic.identification.response import (
     velocities,
 )
 from armid_ros.papers.elastic.identification.three_steps import tune, Tuning
-from armid_ros.papers.elastic.plant import ElasticSensors, run_elastic
+from armid_ros.papers.elastic.plant import ElasticSensors, run_elastic, step_experiments
 from armid_ros.robots.two_link import two_link_set
 from armid_ros.simulation.elastic import two_link_loop, two_link_plant
 import numpy as np
 import pytest
 
-from tests.papers.elastic.two_link_in_mujoco import errors, steps
+from tests.papers.elastic.two_link_in_mujoco import errors
 
 pytestmark = pytest.mark.long
 
@@ -36,7 +36,7 @@ def experiments(clean_steps) -> Steps:
 @pytest.mark.parametrize('number', range(4))
 def test_simulation_is_that_of_the_plant(experiments, truth, number) -> None:
     """The same scheme, written for the links' equations and for any URDF."""
-    run = run_elastic(two_link_plant(truth), LOOP, steps()[number])
+    run = run_elastic(two_link_plant(truth), LOOP, step_experiments()[number])
     found = velocities(experiments, truth)[:, number]
     np.testing.assert_allclose(found[:, :2], run.motor.dq, atol=1e-9)
     np.testing.assert_allclose(found[:, 2:], run.link.dq, atol=1e-9)

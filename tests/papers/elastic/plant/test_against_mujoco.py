@@ -2,20 +2,20 @@
 # SPDX-License-Identifier: Apache-2.0
 """Elastic joints against MuJoCo: other dynamics, other integration, other friction."""
 
-from armid_ros.papers.elastic.plant import run_elastic
+from armid_ros.papers.elastic.plant import run_elastic, step_experiments
 from armid_ros.robots.two_link import two_link_set
 from armid_ros.simulation.elastic import two_link_loop, two_link_plant
 import numpy as np
 import pytest
 
-from tests.papers.elastic.two_link_in_mujoco import MANY, mujoco_arm, run_mujoco, steps
+from tests.papers.elastic.two_link_in_mujoco import MANY, mujoco_arm, run_mujoco
 
 
 @pytest.mark.parametrize('number', [0, 3])
 def test_steps_move_both_alike(number) -> None:
     """The error of MuJoCo itself at 5 us is about 1e-4 rad/s, falling with the first power."""
     shipped = two_link_set('after')
-    experiment = steps()[number]
+    experiment = step_experiments()[number]
     loop = two_link_loop(shipped)
     ours = run_elastic(two_link_plant(shipped.parameters, substeps=4), loop, experiment)
     theirs = run_mujoco(mujoco_arm(shipped.parameters, MANY), loop, experiment)

@@ -8,7 +8,7 @@ from armid_ros.arm import ArmModel
 from armid_ros.effects import make_effect
 from armid_ros.errors import ModelError, TrajectoryError
 from armid_ros.motion import Motion
-from armid_ros.papers.elastic.plant import Experiment, run_elastic, step_experiments
+from armid_ros.papers.elastic.plant import Experiment, run_elastic
 from armid_ros.robots import load_robot
 from armid_ros.robots.two_link import two_link_set
 from armid_ros.simulation import Elasticity, Plant, step
@@ -147,7 +147,7 @@ def test_backlash_lets_the_link_fly_between_its_flanks() -> None:
 
 
 def test_step_response_is_that_of_the_literature() -> None:
-    (experiment,) = step_experiments([[0.0, 0.0]], [[0.5, 0.0]])
+    experiment = Experiment(np.zeros(2), np.tile([0.5, 0.0], (500, 1)))
     run = run_elastic(two_link_plant(SHIPPED.parameters), two_link_loop(SHIPPED), experiment)
     first, second = run.link.dq.T
     assert 1e3 * run.link.t[np.argmax(first > 0.45)] == pytest.approx(68.0, abs=3.0)
