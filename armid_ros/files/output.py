@@ -34,7 +34,7 @@ from armid_ros.version import GENERATOR
 
 #: Model file that may be in a folder without a document; schemas of results that replace it.
 _MODEL = 'model.yaml'
-_WITH_MODEL = ('armid/identification/1', 'armid/diagnosis/1')
+_SCHEMAS_WITH_MODEL = ('armid/identification/1', 'armid/diagnosis/1')
 #: Files and folders of each kind of result, by schema; the JSON document comes first.
 _WRITES = {
     'armid/identification/1': (
@@ -90,11 +90,11 @@ DOCUMENTS = tuple(
 #: Folder in which a run writes until its result is complete.
 STAGING = '.armid-part'
 #: Pattern of message types in metadata.yaml, and message types of a bag with a planned motion.
-_KIND = re.compile(r'^ *type: *(\S+)', re.MULTILINE)
-_OF_A_PLAN = {'trajectory_msgs/msg/JointTrajectory', 'std_msgs/msg/String'}
+_MESSAGE_TYPE = re.compile(r'^ *type: *(\S+)', re.MULTILINE)
+_PLAN_TYPES = {'trajectory_msgs/msg/JointTrajectory', 'std_msgs/msg/String'}
 _MARK = re.compile(re.escape(GENERATOR).encode() + rb'|schema"?: *"?armid/[a-z_]+/[0-9]')
 #: Endings of files with a mark.
-_MARKED = ('.html', '.json', '.yaml', '.rviz', 'plotjuggler.xml')
+_MARKED_SUFFIXES = ('.html', '.json', '.yaml', '.rviz', 'plotjuggler.xml')
 
 
 def write_file(path: str | Path, content: str | bytes) -> None:
@@ -115,17 +115,17 @@ def write_file(path: str | Path, content: str | bytes) -> None:
 
     """
     path = Path(path)
-    beside = path.with_name(f'.{path.name}.part')
+    temporary = path.with_name(f'.{path.name}.part')
     data = content.encode('utf-8', 'backslashreplace') if isinstance(content, str) else content
     try:
-        beside.unlink(missing_ok=True)
+        temporary.unlink(missing_ok=True)
         flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW | os.O_CLOEXEC
-        with os.fdopen(os.open(beside, flags, 0o666), 'wb') as stream:
+        with os.fdopen(os.open(temporary, flags, 0o666), 'wb') as stream:
             stream.write(data)
-        beside.replace(path)
+        temporary.replace(path)
     except OSError as error:
         with suppress(OSError):
-            beside.unlink(missing_ok=True)
+            temporary.unlink(missing_ok=True)
         raise OutputError(f'{settled(path)}: cannot be written: {error.strerror}') from error
 
 
@@ -219,7 +219,7 @@ def locked(path: Path) -> Iterator[None]:
 def _refuse_other_results(path: Path, schema: str, robot: str) -> None:
     """Refuse a folder with a document, or only a model, of another kind or robot."""
     there = [name for name in DOCUMENTS if os.path.lexists(path / name)]
-    if not there and schema in _WITH_MODEL and os.path.lexists(path / _MODEL):
+    if not there and schema in _SCHEMAS_WITH_MODEL and os.path.lexists(path / _MODEL):
         there = [_MODEL]
     for name in there:
         load = load_yaml if name == _MODEL else json.loads
@@ -338,7 +338,7 @@ def refuse_replacing(folder: Path, names: Collection[str]) -> None:
 
 def _foreign(folder: Path, names: Sequence[str]) -> Iterator[str]:
     """Return foreign files; those that cannot have a mark count only if there are no others."""
-    known = [name for name in names if name.endswith(_MARKED)]
+    known = [name for name in names if name.endswith(_MARKED_SUFFIXES)]
     return (name for name in known or names if not is_own(folder / name))
 
 
@@ -348,15 +348,15 @@ def is_plan(path: Path) -> bool:
         text = read_text(path / 'metadata.yaml', OutputError)
     except OutputError:
         return False
-    kinds = set(_KIND.findall(text))
-    return 'trajectory_msgs/msg/JointTrajectory' in kinds <= _OF_A_PLAN
+    kinds = set(_MESSAGE_TYPE.findall(text))
+    return 'trajectory_msgs/msg/JointTrajectory' in kinds <= _PLAN_TYPES
 
 
 def is_own(path: Path) -> bool:
     """Return whether a document, page or trajectory is a result of this package."""
     if path.is_dir():
         return is_plan(path)
-    if not path.name.endswith(_MARKED):
+    if not path.name.endswith(_MARKED_SUFFIXES):
         return False
     try:
         with open_regular(path, OutputError) as stream:

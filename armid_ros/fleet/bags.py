@@ -22,8 +22,8 @@ _DATE = re.compile(r'(?<!\d)(20\d\d)([-_]?)(\d\d)\2(\d\d)(?!\d)')
 #: Length of a day [ns].
 DAY_NS = 86_400 * 10**9
 #: Largest length of an arm's name in a file name [bytes]; file systems allow 255 in total.
-LONGEST_NAME = 240
-_WILD = re.compile(r'[*?\[]')
+_MAX_NAME = 240
+_WILDCARD = re.compile(r'[*?\[]')
 #: Keys of stores for the version of a file, the most reliable first.
 _VERSIONS = ('ETag', 'etag', 'md5Hash', 'mtime', 'LastModified', 'updated', 'created')
 
@@ -113,7 +113,7 @@ def find_bags(patterns: Sequence[str], arm_pattern: str | None = None) -> list[B
         if not bags:
             raise FleetError(
                 f'{pattern}: there is no bag; a bag is a .mcap or .db3 file or a rosbag2 directory'
-                + ('' if _WILD.search(pattern) else f', as in "{pattern.rstrip("/")}/*/*"')
+                + ('' if _WILDCARD.search(pattern) else f', as in "{pattern.rstrip("/")}/*/*"')
             )
         for at, size, version in bags:
             url = filesystem.unstrip_protocol(at)
@@ -124,10 +124,10 @@ def find_bags(patterns: Sequence[str], arm_pattern: str | None = None) -> list[B
                     raise FleetError(f'{url}: --arm {arm_pattern} does not match this URL')
                 arm = match.group(1) or ''
             length = len(file_name(arm).encode())
-            if not 0 < length <= LONGEST_NAME:
+            if not 0 < length <= _MAX_NAME:
                 raise FleetError(
                     f'{url}: its arm is named {arm!r}, of {length} bytes in a path; a name has '
-                    f"1 to {LONGEST_NAME}: choose a part of the path with --arm 'robots/([^/]+)/'"
+                    f"1 to {_MAX_NAME}: choose a part of the path with --arm 'robots/([^/]+)/'"
                 )
             plain = at if url.startswith('file://') else url
             found[plain] = BagFile(arm, plain, _day(at), size, version)
@@ -163,7 +163,7 @@ def _bags(
 
 def _arm(pattern: str, path: str) -> str:
     """Return the part that the first wildcard matches; the folder if that part is the bag."""
-    wild = [k for k, part in enumerate(pattern.split('/')) if _WILD.search(part)]
+    wild = [k for k, part in enumerate(pattern.split('/')) if _WILDCARD.search(part)]
     parts = path.rstrip('/').split('/')
     last = len(parts) - 1
     at = min(wild[0] if wild else last, max(last - 1, 0))

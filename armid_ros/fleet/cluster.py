@@ -16,9 +16,9 @@ import dask
 from distributed import Client, LocalCluster
 
 #: Timeout of the connection to a cluster [s].
-ANSWER = 30.0
+CONNECT_TIMEOUT = 30.0
 #: Settings that reduce the work of Dask for its dashboard, which is not used here.
-_QUIET = {
+_DASK_SETTINGS = {
     'distributed.worker.profile.enabled': False,
     'distributed.admin.tick.interval': '1s',
     'distributed.admin.system-monitor.interval': '2s',
@@ -55,7 +55,7 @@ def connected(scheduler: str | None, workers: int | None = None) -> Iterator[Cli
             yield client
         return
     try:
-        client = Client(scheduler, timeout=ANSWER)
+        client = Client(scheduler, timeout=CONNECT_TIMEOUT)
     except (OSError, ValueError, TimeoutError) as error:
         raise FleetError(f'--scheduler {scheduler}: does not answer: {error}') from error
     with client:
@@ -77,7 +77,7 @@ def _local(count: int) -> Iterator[Client]:
     try:
         with tempfile.TemporaryDirectory(prefix='armid-fleet-') as folder:
             with (
-                dask.config.set(_QUIET),
+                dask.config.set(_DASK_SETTINGS),
                 LocalCluster(
                     n_workers=count,
                     threads_per_worker=1,

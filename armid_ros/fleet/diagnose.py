@@ -35,7 +35,7 @@ import pyarrow as pa
 #: An arm to be diagnosed, with its bags: an entry of ``cases``.
 Case = dict[str, Any]
 #: Number of bags before a change for the identification, and after it for the diagnosis.
-BEFORE, AFTER = 3, 3
+_N_BAGS = 3
 
 DIAGNOSES = pa.schema(
     [
@@ -89,12 +89,12 @@ def cases(found: Watch, arms: Sequence[str] = (), everyone: bool = False) -> lis
         middle = max(1, len(urls) // 2)
         before, after = urls[:middle], urls[middle:]
         if arm.named and arm.named[0].kind == 'trend':
-            before, after = urls[: min(BEFORE, middle)], urls[-min(AFTER, len(urls) - middle) :]
+            before, after = urls[: min(_N_BAGS, middle)], urls[middle:][-_N_BAGS:]
         elif arm.named:
             cut = max(1, urls.index(arm.bag_at(arm.named[0])['bag']))
             before, after = urls[:cut], urls[cut:]
         if len(urls) >= 2:
-            some.append({'arm': arm.arm, 'baseline': before[-BEFORE:], 'bags': after[:AFTER]})
+            some.append({'arm': arm.arm, 'baseline': before[-_N_BAGS:], 'bags': after[:_N_BAGS]})
     return some
 
 

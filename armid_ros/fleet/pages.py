@@ -112,7 +112,7 @@ def _arm_page(found: Watch, arm: WatchedArm, diagnoses: Diagnoses) -> str:
     shown = [one for one in arm.series if len(one.values)]
     shown.sort(key=lambda one: order.get(one.parameter, len(order)))
     cut = sum(one.parameter in order for one in shown)
-    said = (
+    hint = (
         'Every point is a bag with its 95 % interval, in order of time, with a link to the bag '
         'below. A dashed line marks the change. Numbers after a name are the range of the '
         'vertical axis.'
@@ -122,7 +122,7 @@ def _arm_page(found: Watch, arm: WatchedArm, diagnoses: Diagnoses) -> str:
     if rest:
         line = f'{counted(len(rest), "parameter")} without a change'
         curves.append(Fold(line, [SmallMultiples(rest)]))
-    sections.append(ContentSection('Parameters over time', [Paragraph(said, 'hint'), *curves]))
+    sections.append(ContentSection('Parameters over time', [Paragraph(hint, 'hint'), *curves]))
     rows, steps = [], {one.series.parameter for one in arm.named if one.kind == 'step'}
     for row in (one for one in arm.wear if (one['name'], one['joint']) not in steps):
         std = (row['upper'] - row['lower']) / (2.0 * HALF_WIDTH)

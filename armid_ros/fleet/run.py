@@ -29,11 +29,8 @@ import numpy as np
 
 #: Number of times that Dask repeats a task if its store failed.
 RETRIES = 3
-#: Largest size [bytes] and number of bags of one task. A task then takes about a second, so that
-#: the overhead of Dask is small.
-TASK_BYTES, TASK_BAGS = 16_000_000, 16
 #: Status of tasks if the scheduler was lost.
-_BROKEN = ('cancelled', 'lost')
+_LOST_STATUS = ('cancelled', 'lost')
 
 
 @dataclass(frozen=True)
@@ -160,11 +157,13 @@ def grouped(bags: Sequence[BagFile]) -> tuple[Group, ...]:
     cluster. A bag of unknown size forms a separate group.
 
     """
+    # a task takes about a second, so that the overhead of Dask is small
+    most_bytes, most_bags = 16_000_000, 16
     groups: list[list[BagFile]] = []
     total = 0
     for bag in bags:
-        size = bag.size or TASK_BYTES
-        if not groups or total + size > TASK_BYTES or len(groups[-1]) == TASK_BAGS:
+        size = bag.size or most_bytes
+        if not groups or total + size > most_bytes or len(groups[-1]) == most_bags:
             groups.append([])
             total = 0
         groups[-1].append(bag)
@@ -176,7 +175,7 @@ def identify_fleet(
     client: Client,
     bags: Sequence[BagFile],
     job_of: Mapping[str, Job],
-    tell: Callable[[int, int], None] = lambda finished, bags: None,
+    report: Callable[[int, int], None] = lambda finished, bags: None,
 ) -> FleetOutcome:
     """
     Identify every arm of a fleet.
@@ -189,7 +188,7 @@ def identify_fleet(
         All bags.
     job_of : mapping of str to Job
         Model and filters of every arm.
-    tell : callable
+    report : callable
         Callback with the number of finished bags and the number of all bags.
 
     Raises
@@ -198,7 +197,7 @@ def identify_fleet(
         If the scheduler was lost; finished results are kept for a run with `resume`.
 
     """
-    run = _Run(client, bags, job_of, tell)
+    run = _Run(client, bags, job_of, report)
     run.work()
     outcomes = sorted(run.outcomes, key=lambda one: one.arm)
     filters = {job.arm.robot.name: job.filters for job in job_of.values()}
@@ -234,10 +233,10 @@ class _Run:
         client: Client,
         bags: Sequence[BagFile],
         job_of: Mapping[str, Job],
-        tell: Callable[[int, int], None],
+        report: Callable[[int, int], None],
     ) -> None:
         self._client, self._job_of = client, job_of
-        self._tell, self._bags = tell, len(bags)
+        self._report, self._bags = report, len(bags)
         self._ended: set[str] = set()
         self._jobs: dict[str, Future] = {}
         self._waiting: deque[_Waiting] = deque()
@@ -270,7 +269,7 @@ class _Run:
                 # An arm that had finished also fails if its worker ends and its tasks cannot be
                 # repeated.
                 outcome = None
-            if future.status in _BROKEN:
+            if future.status in _LOST_STATUS:
                 raise FleetError(
                     'the scheduler was lost, and with it the tasks; finished results are kept: '
                     'run the same command again with --resume'
@@ -285,7 +284,7 @@ class _Run:
     def _count(self, bags: Sequence[BagFile]) -> None:
         """Count finished bags and report the progress."""
         self._ended.update(bag.url for bag in bags)
-        self._tell(len(self._ended), self._bags)
+        self._report(len(self._ended), self._bags)
 
     def _submit(self, task: Callable[..., Any], *arguments: Any, **options: Any) -> Future:
         return self._client.submit(task, *arguments, pure=False, **options)

@@ -299,7 +299,7 @@ def test_a_scheduler_that_is_lost_leaves_what_is_done_for_the_next_run(
 
 
 def test_a_scheduler_that_does_not_answer_is_said_at_once(monkeypatch):
-    monkeypatch.setattr('armid_ros.fleet.cluster.ANSWER', 0.5)
+    monkeypatch.setattr('armid_ros.fleet.cluster.CONNECT_TIMEOUT', 0.5)
     with socket.socket() as free:
         free.bind(('127.0.0.1', 0))
         address = f'tcp://127.0.0.1:{free.getsockname()[1]}'
