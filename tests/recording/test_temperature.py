@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Temperatures of joints in bags and tables."""
+"""Temperatures of joints in bags."""
 
 from dataclasses import replace
 import struct
@@ -104,20 +104,6 @@ def test_ros2_control_has_temperatures_as_an_interface(tmp_path):
             writer.write('/dynamic_joint_states', cdr, 10**9 + k * 10**7)
     back = read_recording(tmp_path / 'bag', joints=JOINTS)
     np.testing.assert_allclose(back.temperature.at(T[:1]), [[31.0, 41.0]])
-
-
-def test_a_table_has_columns_of_temperatures(tmp_path):
-    """As RTDE of Universal Robots names them; a slow sensor leaves cells empty."""
-    rows = ['timestamp,actual_q_0,actual_q_1,joint_temperatures_0,joint_temperatures_1']
-    for k, (t, q) in enumerate(zip(T, Q, strict=True)):
-        heat = ['', ''] if k % 50 else [f'{25 + t}', '31']
-        rows.append(','.join([f'{t}', *(f'{x}' for x in q), *heat]))
-    (tmp_path / 'run.csv').write_text('\n'.join(rows))
-    found = read_anything(tmp_path / 'run.csv')
-    np.testing.assert_allclose(found.temperature.at([1.0]), [[26.0, 31.0]])
-    (tmp_path / 'run.csv').write_text('\n'.join(rows).replace(',31', ',310'))
-    with pytest.raises(RecordingError, match=r'run.csv: column joint_temperatures_1: .*kelvin'):
-        read_anything(tmp_path / 'run.csv')
 
 
 def test_temperatures_have_a_column_for_each_joint():

@@ -3,6 +3,7 @@
 """Columns are matched to joints by name, else by number; what is guessed is said to be."""
 
 from armid_ros.errors import RecordingError
+from armid_ros.recording.anything import read_anything
 from armid_ros.recording.columns import ColumnSettings, numbers
 from armid_ros.recording.tables import measured, open_table, plan, Table, TableColumn
 import numpy as np
@@ -208,3 +209,17 @@ def test_large_ways_of_a_joint_that_slides_are_doubted_apart():
     assert '180 m' in note and '--position-scale 1,0.001' in note
     scaled = ColumnSettings(position_scale=(1.0, 0.001))
     assert not plan(columns, scaled, JOINTS, [False, True]).notes
+
+
+def test_a_table_has_columns_of_temperatures(tmp_path):
+    """As RTDE of Universal Robots names them; a slow sensor leaves cells empty."""
+    rows = ['timestamp,actual_q_0,actual_q_1,joint_temperatures_0,joint_temperatures_1']
+    for k, t in enumerate(np.arange(400) / 100.0):
+        heat = ['', ''] if k % 50 else [f'{25 + t}', '31']
+        rows.append(','.join([f'{t}', f'{np.sin(t)}', f'{np.cos(t)}', *heat]))
+    (tmp_path / 'run.csv').write_text('\n'.join(rows))
+    found = read_anything(tmp_path / 'run.csv')
+    np.testing.assert_allclose(found.temperature.at([1.0]), [[26.0, 31.0]])
+    (tmp_path / 'run.csv').write_text('\n'.join(rows).replace(',31', ',310'))
+    with pytest.raises(RecordingError, match=r'run.csv: column joint_temperatures_1: .*kelvin'):
+        read_anything(tmp_path / 'run.csv')
