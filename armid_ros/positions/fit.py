@@ -262,8 +262,7 @@ def _judged(problem: _Problem, x: FloatArray, free: npt.NDArray[np.bool_]) -> Po
     weighted = problem.slopes(x, np.arange(count)) / sigma[:, np.newaxis]
     gradients = np.einsum('mjp,mj->mp', weighted, residuals / sigma)
     t = np.concatenate([k * 1e6 + window.t for k, window in enumerate(problem.windows)])
-    # residuals are correlated within blocks of 0.5 s
-    _, block = np.unique(np.floor(t / 0.5), return_inverse=True)
+    _, block = np.unique(np.floor(t / 0.5), return_inverse=True)  # of correlated residuals
     scores = np.zeros((block.max() + 1, count))
     np.add.at(scores, block, gradients)
     information = np.einsum('mjp,mjr->pr', weighted, weighted)
@@ -302,9 +301,7 @@ def _judged(problem: _Problem, x: FloatArray, free: npt.NDArray[np.bool_]) -> Po
             values[some] -= covariance @ gradients.sum(axis=0)[some] * problem.size[some]
             deviation[some] = own * problem.size[some]
         ratio, ratio_std = (each[1 : n + 1] / x[1 : n + 1] for each in (values, deviation))
-    errors_of_tracking = [
-        w.commands.mean(np.append(w.t, w.t[-1] + 1e-3))[0] - w.q for w in problem.windows
-    ]
+    tracking = [w.commands.mean(np.append(w.t, w.t[-1] + 1e-3))[0] - w.q for w in problem.windows]
     return PositionFit(
         model.arm(x),
         model.parameters,
@@ -313,7 +310,7 @@ def _judged(problem: _Problem, x: FloatArray, free: npt.NDArray[np.bool_]) -> Po
         tuple(reasons),
         ratio,
         ratio_std,
-        np.sqrt(np.mean(np.concatenate(errors_of_tracking) ** 2, axis=0)),
+        np.sqrt(np.mean(np.concatenate(tracking) ** 2, axis=0)),
         residual,
         noise,
         sum(float(w.t[-1] - w.t[0]) for w in problem.windows),

@@ -111,10 +111,9 @@ def tune(
         [np.hstack([run.motor.dq[:count], run.link.dq[:count]]) for run in runs], axis=1
     )
     base = np.concatenate([unpack(start), start.coulomb])
-    # prior of the logarithms of the factors dl (7, 8) and dm (9, 10), rows of unit deviation
+    # prior of the ratio of link (7, 8) to motor friction (9, 10): a factor of two
     prior = np.zeros((4, SIZE + 2))
-    ratio_std = np.log(2.0)  # of the logarithm of the ratio of link and motor friction
-    prior[[0, 1], [7, 8]], prior[[0, 1], [9, 10]] = 1.0 / ratio_std, -1.0 / ratio_std
+    prior[[0, 1], [7, 8]], prior[[0, 1], [9, 10]] = np.array([1.0, -1.0]) / np.log(2.0)
     # the standard deviation of the logarithms of the Coulomb torques is 0.1
     prior[[2, 3], [SIZE, SIZE + 1]] = 10.0
     weight = np.ones(measured.shape[-1])
