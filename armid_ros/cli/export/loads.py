@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass, replace
 from itertools import permutations
 
@@ -12,6 +12,7 @@ from armid_ros.arm import ArmModel
 from armid_ros.errors import meant, ModelError
 from armid_ros.motion import FloatArray
 from armid_ros.robots import NO_MASS
+from armid_ros.robots.description import parse_xml
 from armid_ros.robots.robot import PER_LINK
 import numpy as np
 import pinocchio as pin
@@ -59,13 +60,14 @@ def load_of(arm: ArmModel, joint: str | None = None, frame: str | None = None) -
     joint : str, optional
         Joint that moves the payload, if there are payloads on several.
     frame : str, optional
-        A link that moves with the payload; by default tool0, flange, or the last one
-        along fixed joints.
+        A link that moves with the payload; by default tool0, flange, or the only link without
+        mass and shape at the end of a fixed joint on the last moving link.
 
     Raises
     ------
     ModelError
-        There is no such payload or frame, a joint moves behind it, or the mass is not positive.
+        There is no such payload or frame, several links may be the flange, a joint moves behind
+        it, or the mass is not positive.
 
     """
     payloads: dict[str, FloatArray] = {}
@@ -100,13 +102,34 @@ def load_of(arm: ArmModel, joint: str | None = None, frame: str | None = None) -
     links = {str(one.name): one.placement for one in frames}
     # ROS-Industrial calls the frame of a flange tool0 or flange
     usual = [name for name in ('tool0', 'flange') if name in links]
-    frame = frame or [*links, *usual[::-1]][-1]
+    ends = usual[:1] or (list(links) if len(links) == 1 else _bare_ends(arm, joint, links))
+    if frame is None and len(ends) != 1:
+        raise ModelError(
+            f"the link at the flange of joint '{joint}' is unknown: name it with --frame; "
+            f'{", ".join(links)} move with the payload'
+        )
+    frame = frame or ends[0]
     if frame not in links:
         raise ModelError(
             f"'{frame}' is no link that moves with the payload of joint '{joint}': name "
             f'{" or ".join(links)} with --frame{meant(frame, links)}'
         )
     return CarriedLoad(joint, frame, links[frame].actInv(pin.Inertia.FromDynamicParameters(ten)))
+
+
+def _bare_ends(arm: ArmModel, joint: str, links: Collection[str]) -> list[str]:
+    """Return links without mass, shape and children that are fixed to the link of a joint."""
+    root = parse_xml(arm.robot.urdf)
+    last = arm.robot.tree.links[arm.robot.tree.index(joint)]
+    ends: dict[str | None, list[str]] = {}  # children by parent
+    for one in root.iter('joint'):
+        parent, child = one.find('parent'), one.find('child')
+        if parent is not None and child is not None:
+            ends.setdefault(parent.get('link'), []).append(str(child.get('link')))
+    bare = {one.get('name') for one in root.iter('link') if not len(one)}
+    return [
+        name for name in ends.get(last, []) if name in links and name in bare and name not in ends
+    ]
 
 
 def universal_robots(load: CarriedLoad) -> str:
