@@ -231,6 +231,8 @@ def project_options(
         option = options.get(key)
         if option is None or option.name is None or words & {*option.opts, *option.secondary_opts}:
             continue
+        if (name, key) == ('export', 'robot') and key not in own:
+            continue  # the robot of the model is the default
         values = value if isinstance(value, list) else [value]
         text = ','.join(map(str, values))
         found[option.name] = values if option.multiple else text if value is values else value

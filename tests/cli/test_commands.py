@@ -10,6 +10,7 @@ import shlex
 import subprocess
 import sys
 
+import armid_ros as ar
 from armid_ros.cli import choices
 from armid_ros.cli.commands import main
 from armid_ros.cli.terminal import progress_line, say
@@ -52,6 +53,14 @@ def test_options_of_a_project_are_taken_and_printed_where_none_is_typed(
         assert 'gravity' in armid('inspect', bags[0], code=2).stderr
     project.write_text(f'robot = "{ROBOT}"\npackage = "mine=."\nclearance = 0.1\n')
     assert '--package mine=.\n' in armid('inspect', bags[0]).stderr
+
+
+def test_the_robot_of_a_project_does_not_replace_that_of_an_exported_model(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / 'armid.toml').write_text('robot = "humanoid_arm"\n')
+    ar.save_model(tmp_path / 'model.yaml', ar.ArmModel.of(ROBOT), str(ROBOT))
+    armid('export', 'model.yaml', '--to', 'urdf', '--out', 'arm.urdf')
+    assert ar.load_robot('arm.urdf').joints == ar.load_robot(ROBOT).joints
 
 
 #: What takes long to import, and the packages of armid_ros that import it.
