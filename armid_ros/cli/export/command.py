@@ -4,7 +4,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
+import re
 
 from armid_ros.cli import parameters
 from armid_ros.cli.terminal import say
@@ -37,7 +40,8 @@ _KINDS_OF = {'joint': LOADS, 'frame': LOADS, 'spread': ('ranges',)}
 @click.option('--joint', help='Joint that moves the payload; needed if several have one.')
 @click.option(
     '--frame',
-    help='Link whose frame the load data are in; tool0, flange or the last one by default.',
+    help='Link whose frame the load data are in; by default tool0, flange, or the only link '
+    'without mass and shape fixed to the last moving link.',
 )
 @click.option(
     '--spread',
@@ -82,7 +86,7 @@ def export(
     notes: tuple[str, ...] = ()
     if kind in ('cpp', 'python'):
         text, left_out = torque_code(arm, kind, str(model))
-        notes = tuple(f'not in the torque: {line}' for line in left_out)
+        notes = _left_out('the torque', left_out)
     elif kind in LOADS:
         text, notes = load_text(load_of(arm, joint, frame), kind, str(model))
     elif kind == 'ranges':
@@ -90,8 +94,19 @@ def export(
     else:
         made = arm_sdf(arm, str(model)) if kind == 'sdf' else urdf_or_mjcf(arm, kind, str(model))
         text, left_out = made
-        notes = tuple(f'not in the model: {line}' for line in left_out)
+        notes = _left_out('this file', left_out)
+    with suppress(OSError):  # reported when the file is written
+        out.parent.mkdir(parents=True, exist_ok=True)
     write_file(out, text)
     for note in notes:
         say(f'note: {note}')
     say(f'{out}: written')
+
+
+def _left_out(where: str, lines: Sequence[str]) -> tuple[str, ...]:
+    """Return one note on omitted parts, with values in two digits; the file has all digits."""
+    short = [
+        re.sub(r'^\w+: (.+ = )(\S+)', lambda value: f'{value[1]}{float(value[2]):.2g}', line)
+        for line in lines
+    ]
+    return (f'not in {where}: {"; ".join(short)}',) if short else ()

@@ -108,6 +108,16 @@ def test_every_kind_is_a_file_that_names_its_model(kind, carrying, tmp_path):
         assert 'ripple_sine of elbow = 0.2' in printed and 'ripple_sine of elbow = 0.2' in text
 
 
+def test_omitted_values_are_one_note_of_two_digits(carrying, tmp_path):
+    arm = ar.ArmModel.of(ROBOT, effects=('torque_ripple@elbow:ripple_sine=0.123456',))
+    ar.save_model(carrying, arm, str(ROBOT))
+    out = tmp_path / 'new' / 'folder' / 'arm.urdf'  # the folders are made
+    printed = run(carrying, '--to', 'urdf', '--out', out)
+    assert printed.count('note: not in this file:') == 1
+    assert 'ripple_sine of elbow = 0.12 N m' in printed
+    assert '0.123456' in out.read_text()
+
+
 def test_what_cannot_be_written_is_an_error_with_the_answer(carrying, tmp_path):
     to_cpp = (carrying, '--to', 'cpp', '--out', tmp_path / 'o')
     assert '--frame belongs to --to ur' in run(*to_cpp, '--frame', 'forearm', code=2)
