@@ -99,37 +99,38 @@ def load_of(arm: ArmModel, joint: str | None = None, frame: str | None = None) -
             'onto the last link, or leave out the joints of a gripper with --robot and --joints'
         )
     frames = [f for f in model.frames if (f.parentJoint, f.type) == (number, pin.FrameType.BODY)]
-    links = {str(one.name): one.placement for one in frames}
+    placements = {str(one.name): one.placement for one in frames}
+    frame = frame or _flange(arm, joint, placements)
+    if frame not in placements:
+        raise ModelError(
+            f"'{frame}' is no link that moves with the payload of joint '{joint}': name "
+            f'{" or ".join(placements)} with --frame{meant(frame, placements)}'
+        )
+    placement = placements[frame]
+    return CarriedLoad(joint, frame, placement.actInv(pin.Inertia.FromDynamicParameters(ten)))
+
+
+def _flange(arm: ArmModel, joint: str, links: Collection[str]) -> str:
+    """Return the only link that can be the flange; otherwise raise a ModelError."""
     # ROS-Industrial calls the frame of a flange tool0 or flange
     usual = [name for name in ('tool0', 'flange') if name in links]
-    ends = usual[:1] or (list(links) if len(links) == 1 else _bare_ends(arm, joint, links))
-    if frame is None and len(ends) != 1:
+    root = parse_xml(arm.robot.urdf)
+    last = arm.robot.tree.links[arm.robot.tree.index(joint)]
+    children: dict[str | None, list[str]] = {}
+    for one in root.iter('joint'):
+        parent, child = one.find('parent'), one.find('child')
+        if parent is not None and child is not None:
+            children.setdefault(parent.get('link'), []).append(str(child.get('link')))
+    # links without mass, shape and children, fixed to the link that the joint moves
+    bare = {one.get('name') for one in root.iter('link') if not len(one)} - children.keys()
+    ends = [name for name in children.get(last, []) if name in links and name in bare]
+    ends = usual[:1] or (list(links) if len(links) == 1 else ends)
+    if len(ends) != 1:
         raise ModelError(
             f"the link at the flange of joint '{joint}' is unknown: name it with --frame; "
             f'{", ".join(links)} move with the payload'
         )
-    frame = frame or ends[0]
-    if frame not in links:
-        raise ModelError(
-            f"'{frame}' is no link that moves with the payload of joint '{joint}': name "
-            f'{" or ".join(links)} with --frame{meant(frame, links)}'
-        )
-    return CarriedLoad(joint, frame, links[frame].actInv(pin.Inertia.FromDynamicParameters(ten)))
-
-
-def _bare_ends(arm: ArmModel, joint: str, links: Collection[str]) -> list[str]:
-    """Return links without mass, shape and children that are fixed to the link of a joint."""
-    root = parse_xml(arm.robot.urdf)
-    last = arm.robot.tree.links[arm.robot.tree.index(joint)]
-    ends: dict[str | None, list[str]] = {}  # children by parent
-    for one in root.iter('joint'):
-        parent, child = one.find('parent'), one.find('child')
-        if parent is not None and child is not None:
-            ends.setdefault(parent.get('link'), []).append(str(child.get('link')))
-    bare = {one.get('name') for one in root.iter('link') if not len(one)}
-    return [
-        name for name in ends.get(last, []) if name in links and name in bare and name not in ends
-    ]
+    return ends[0]
 
 
 def universal_robots(load: CarriedLoad) -> str:

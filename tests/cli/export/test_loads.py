@@ -101,7 +101,7 @@ def test_the_default_frame_is_the_bare_end_of_the_last_link_or_is_asked_for():
 
     assert load(text + fixed('wrist', 'link8')).frame == 'link8'
     for other in (fixed('link8', 'hand'), fixed('wrist', 'camera')):
-        with pytest.raises(ModelError, match='--frame; wrist, .*link8'):
+        with pytest.raises(ModelError, match=r'--frame; wrist, .*link8'):
             load(text + fixed('wrist', 'link8') + other)
 
 
