@@ -93,10 +93,8 @@ def verdict(comparison: Comparison) -> tuple[str, str]:
 
 def next_step(comparison: Comparison) -> str:
     """Return the next step, which a command follows."""
-    if comparison.unusable:
-        return 'Find the effect that the unusable model lacks, before you compare.'
-    if comparison.anything:
-        return 'If you did not expect this change, find its cause in the later recordings.'
+    if comparison.anything or comparison.unusable:
+        return 'If you did not expect this, find its cause in the later recordings.'
     return 'Identify from all recordings together, for smaller intervals.'
 
 

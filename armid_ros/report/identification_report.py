@@ -124,8 +124,7 @@ def identification_report(
         grade = graded(result, description, recordings, validation, validation_recordings)
     every = [*recordings, *validation_recordings]
     judgement = judge(result, validation, every, verification, grade.word == 'unusable')
-    is_urdf = assessment.reference == 'description'
-    unlike = _contradictions(result, description) if is_urdf else []
+    urdf = assessment.reference == 'description'
     read = [
         *((one, 'training', training.get(one.source, ())) for one in recordings),
         *((one, 'held-out', validation.get(one.source, ())) for one in validation_recordings),
@@ -135,7 +134,7 @@ def identification_report(
         VerdictSection(
             grade.word,
             TONES[grade.word],
-            (*grade.reasons, *unlike, *judgement.sentences),
+            (*grade.reasons, *_contradictions(result, description) * urdf, *judgement.sentences),
             judgement.beware,
             error_bars(described, training, validation, result.halves),
             ''.join(judgement.next_steps[:1]),

@@ -110,7 +110,7 @@ def headline(remarks: Sequence[Remark], found: LinkCheck | None) -> tuple[str, .
         f'{digits(found.fitted_error_percent)} % with fitted links.'
     )
     if found.fault:
-        first = f'The recording cannot check the links: {_sentence(found.fault)}'
+        first = _sentence(f'the recording cannot check the links: {found.fault}')
     elif found.agrees:
         first = 'The links of the URDF agree with the recording.'
     elif found.explained < 0.9:  # with a smaller share, links are not the cause

@@ -20,8 +20,6 @@ import numpy as np
 #: Condition numbers: an excitation is good below the first (Presse and Gautier 1993), and weak
 #: above the second.
 GOOD_CONDITION, WEAK_CONDITION = 100.0, 1000.0
-
-
 #: Next step with a good model.
 USE = 'Use model.yaml for simulation and control, in the range of the recorded motions.'
 #: A limitation and its remedy; one of them may be empty.
@@ -146,9 +144,9 @@ def _of_errors(
         ratio *= min(float(stronger), 1.0)
         if ratio > 1.3:  # the model is fitted to the noise
             yield (
-                f'The held-out residual is {digits(ratio)} times the training residual, in N m '
-                'and relative to the torque: the model overfits, the held-out motion leaves the '
-                'range of the training data, or the arm has changed.',
+                f'The residual on recordings not used for the fit is {digits(ratio)} times that '
+                'of the fit: the model overfits, these motions leave the range of the '
+                'training data, or the arm has changed.',
                 'Train on more recordings, over all poses and speeds that matter. If the arm '
                 'may have changed, run armid diagnose.',
             )

@@ -109,7 +109,7 @@ def _ties(finding: Finding) -> dict[str, Any]:
         return {}
     rows = []
     for tie in finding.ties:
-        _, value, std = finding.values_of(tie.joint)[0]
+        _, value, std, _ = next(row for row in finding.rows if row[0].joint == tie.joint)
         rows.append(
             {
                 'segment': tie.name,

@@ -102,11 +102,15 @@ class Finding:
     probability: float = 0.0
 
     @property
-    def had(self) -> tuple[float, ...]:
-        """Value of the given model for each parameter; 0 if unknown or inside its interval."""
-        known = self.added_to or (0.0,) * len(self.values)
-        pairs = zip(known, self.std, strict=True)
-        return tuple(value if abs(value) > HALF_WIDTH * std else 0.0 for value, std in pairs)
+    def rows(self) -> list[tuple[ParameterName, float, float, float]]:
+        """Parameters, values, deviations, and known values of the given model, 0 for a load."""
+        given = (0.0,) * len(self.values) if self.weighs or not self.added_to else self.added_to
+        return [
+            (name, value, std, before if abs(before) > HALF_WIDTH * std else 0.0)
+            for name, value, std, before in zip(
+                self.parameters, self.values, self.std, given, strict=True
+            )
+        ]
 
     @property
     def other_causes(self) -> tuple[Rival, ...]:
@@ -151,11 +155,6 @@ class Finding:
     def place_of(self, joint: str) -> str:
         """Return the name of the tied segment of a joint, or of the joint without a tie."""
         return next((tie.name for tie in self.ties if tie.joint == joint), joint)
-
-    def values_of(self, joint: str) -> list[tuple[ParameterName, float, float]]:
-        """Return name, value and standard deviation of the parameters of one joint."""
-        rows = zip(self.parameters, self.values, self.std, strict=True)
-        return [row for row in rows if row[0].joint == joint]
 
 
 @dataclass(frozen=True)

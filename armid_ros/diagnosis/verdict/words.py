@@ -209,8 +209,7 @@ def _subject(finding: Finding) -> str:
     subject = name_in_words(finding.name)
     places = [finding.place_of(joint) for joint in finding.joints]
     if finding.weighs:
-        rows = zip(finding.parameters, finding.values, finding.std, strict=True)
-        mass, std = next(((m, s) for p, m, s in rows if p.unit == 'kg'), (0.0, 0.0))
+        mass, std = next((row[1:3] for row in finding.rows if row[0].unit == 'kg'), (0.0, 0.0))
         if not abs(mass) > HALF_WIDTH * std:
             return f'{subject} on {places[0]} (these data do not determine its mass)'
         gone = ' that was put down' if mass < 0.0 else ''
@@ -234,20 +233,14 @@ def _subject(finding: Finding) -> str:
 def _change(finding: Finding) -> str:
     """Return the change of an effect that the given model has in one joint, or ''."""
     rows = _rows(finding)
-    if finding.weighs or len(finding.joints) != 1 or len(rows) != 1 or not rows[0][3]:
+    if len(finding.joints) != 1 or len(rows) != 1 or not rows[0][3]:
         return ''
     return f'{"rose" if rows[0][1] > 0.0 else "fell"} {_with_degrees(*rows[0])}'
 
 
 def _rows(finding: Finding) -> list[tuple[ParameterName, float, float, float]]:
-    """
-    Return parameter, value, standard deviation, and value in the given model, of a cause.
-
-    Values whose interval includes zero are left out, unless all do.
-
-    """
-    rows = zip(finding.parameters, finding.values, finding.std, finding.had, strict=True)
-    every = [row for row in rows if not vague(finding, *row[:3])]
+    """Return the values of a cause whose interval excludes zero; all if there are none."""
+    every = [row for row in finding.rows if not vague(finding, *row[:3])]
     return [row for row in every if excludes_zero(row[1], row[2])] or every
 
 

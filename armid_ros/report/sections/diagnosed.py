@@ -97,9 +97,7 @@ def named_rows(
     """
     rows = []
     for finding in findings:
-        values = list(
-            zip(finding.parameters, finding.values, finding.std, finding.had, strict=True)
-        )
+        values = finding.rows
         if certain:
             values = [row for row in values if excludes_zero(row[1], row[2])] or values
         rows += [

@@ -7,8 +7,10 @@ import re
 
 from armid_ros.arm import ArmModel
 from armid_ros.effects import make_effect
+from armid_ros.identification.assess import mistakes
 from armid_ros.identification.assess.hypotheses import in_unit, other_gravity
 from armid_ros.identification.assess.mistakes import find_mistake
+from armid_ros.identification.assess.prediction_error import PredictionError
 from armid_ros.identification.rows.checks import unit_of
 from armid_ros.identification.rows.signals import conditioning, SignalSettings
 from armid_ros.recording import read_recording
@@ -92,6 +94,18 @@ def test_recordings_of_arms_drawn_at_random_have_none(name, seed):
     source = str(real_recordings.example_robot(paths[name])) if name in paths else name
     robot = load_robot(source)
     assert find(robot, recording_of(robot, seed)) is None
+
+
+def test_links_that_absorb_a_missing_effect_are_no_mistake(robot, sound, monkeypatch):
+    """A hypothesis that only brings the fitted links back to their prior is not accepted."""
+    ones = np.ones(robot.n_joints)
+
+    def error(_robot, _motions, one, *, near):
+        off = 110.0 if one.kind == 'nothing' else 20.0
+        return PredictionError(0.4 * ones, ones, off if near else 0.0)
+
+    monkeypatch.setattr(mistakes, '_error', error)
+    assert find(robot, sound) is None
 
 
 def test_a_few_seconds_have_no_mistake(robot, sound):
