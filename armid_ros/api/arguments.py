@@ -29,7 +29,7 @@ RobotLike = Robot | ArmModel | str | Path
 RecordingLike = Recording | str | Path
 #: A random generator, or a seed.
 Rng = np.random.Generator | int
-#: Callback with the completed share of the work, and with the name of a new step.
+#: Callback; its arguments are the completed share of the work, and the name of a new step.
 Progress = Callable[..., None]
 
 #: One number or one per joint, also as text: '1798/7, 50'.
@@ -66,7 +66,7 @@ def describes_robot(one: RobotLike | RecordingLike) -> bool:
 
 
 def source_of(robot: Robot) -> str:
-    """Return the reference to a robot for files: its shipped name, its path, or its name."""
+    """Return how files refer to a robot: by its shipped name, its path, or its own name."""
     for name in shipped_robots():
         if robot.path == shipped_path(name):
             return name
@@ -74,7 +74,7 @@ def source_of(robot: Robot) -> str:
 
 
 def arm_of(arm: RobotLike, effects: str = USUAL) -> ArmModel:
-    """Return an arm model; without a model, a robot, name or path has the usual friction."""
+    """Return an arm model; a robot, a name or a path of a robot gets the usual friction."""
     if isinstance(arm, ArmModel):
         return arm
     if not isinstance(arm, Robot) and is_model(arm):
@@ -83,7 +83,7 @@ def arm_of(arm: RobotLike, effects: str = USUAL) -> ArmModel:
 
 
 def drivable(arm: RobotLike) -> ArmModel:
-    """Return an arm model; TrajectoryError if a name or path has joints outside all arms."""
+    """Return an arm model; raise TrajectoryError if a named robot has joints outside its arms."""
     model = arm_of(arm)
     others = joints_beside_arms(model.robot) if isinstance(arm, str | Path) else ()
     if others:
@@ -129,7 +129,7 @@ def some_recordings_of(
 
 
 def with_sources_apart(*groups: list[Recording]) -> tuple[list[Recording], ...]:
-    """Add numbers to equal source names of recordings, except existing paths."""
+    """Add numbers to equal source names of recordings; names of existing paths stay."""
     taken: dict[str, int] = {}
 
     def named(recording: Recording) -> Recording:
@@ -190,7 +190,7 @@ def read_recording(
     time, position, velocity, effort, temperature : str, optional
         Columns of a table: a name, names with commas, ``'q{}'`` for the joint's name or number;
         ``'[1..7]'`` for columns without names, counted from 0; ``'none'`` to skip the
-        quantity, of a bag only temperatures. Guessed by default.
+        quantity (of a bag, only temperatures can be skipped). Guessed by default.
     time_unit : {'s', 'ms', 'us', 'ns'}, optional
         Unit of the column of time; guessed by default.
     rate_hz : float, optional
@@ -205,7 +205,7 @@ def read_recording(
     gear : float or sequence of float
         Turns of the motor per turn of the joint, if the values are those of the motors.
     coupling : sequence of (str, str, float)
-        Motor, joint, and turns of the motor per turn of that other joint, for wrists.
+        For coupled wrists: motor, other joint, and turns of the motor per turn of that joint.
     rename : mapping of str to str
         Beginnings of joint names in the file, and their replacements:
         ``{'fer_': 'panda_'}``.
@@ -220,7 +220,7 @@ def read_recording(
     Raises
     ------
     RecordingError
-        With the file, the topic, joint, column or line, and the remedy.
+        The message has the file, the topic, joint, column or line, and the remedy.
 
     Examples
     --------

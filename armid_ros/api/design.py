@@ -85,7 +85,7 @@ def design_excitation(
     start : ndarray, shape (n,), optional
         Pose to leave from and to return to [rad or m]; the free pose nearest to zero by default.
     after : recording or path, or several
-        Recordings whose information the trajectory adds to.
+        Earlier recordings; the trajectory adds to their information.
     rival : ArmModel, optional
         With ``criterion='T'``: model with the rival effects in place of those of ``arm``.
     progress : callable, optional
@@ -101,15 +101,15 @@ def design_excitation(
     harmonics : int
         Fourier harmonics per joint.
     acceleration, noise : ndarray, shape (n,)
-        Acceleration limits [rad/s^2 or m/s^2], by default the top speed in 0.25 s; standard
+        Acceleration limits [rad/s^2 or m/s^2], by default the top speed per 0.25 s; standard
         deviation of the torque noise [N m or N], by default 1 % of the torque limits.
     clearance : float
         Distance to keep between bodies that may touch [m].
     starts, iterations, candidates : int
-        Number of searches, by default 4, and 1 above 20 joints; of iterations of each search;
+        Number of searches (default 4, above 20 joints 1), of iterations of each search, and
         of random trajectories at the start.
     time_budget : float
-        Processor time [s]: by default 120, and above 20 joints 25.
+        Largest processor time [s]; by default 120, or 25 for more than 20 joints.
 
     Returns
     -------
@@ -120,7 +120,7 @@ def design_excitation(
     ------
     TrajectoryError
         If no trajectory is inside the limits; the message names the limit or the bodies that
-        touch. If the height of the floor is unknown.
+        touch. Also if the height of the floor is unknown.
 
     Examples
     --------
@@ -180,7 +180,7 @@ def _searched(
     rival: ArmModel | None,
     progress: Callable[[DesignProgress], None] | None,
 ) -> ExcitationResult:
-    """Check that a start pose is free, then search for the trajectory."""
+    """Search for the trajectory, after a check that the start pose is free of collisions."""
     planner = TransferPlanner.of(model, scene, settings.speed)
     if start is None:
         planner.free_start()  # raises an error before the search if no pose is free

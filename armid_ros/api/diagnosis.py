@@ -71,7 +71,7 @@ class DiagnosisResult(ShownModel):
     description : ArmModel
         The diagnosed model, without the named effects.
     recordings, held_out, baseline : tuple of Recording
-        Recordings that are diagnosed, only predicted, and from when the model was right.
+        Recordings to diagnose, recordings only to predict, and recordings of the healthy arm.
     settings : DiagnosisSettings
         Settings of the diagnosis.
     misfit : Misfit or None
@@ -85,7 +85,7 @@ class DiagnosisResult(ShownModel):
     next_run : NextRun or None
         A motion that separates ambiguous names.
     no_run : str
-        Why no motion separates them.
+        Why no motion separates ambiguous names; empty if there is one, or none is needed.
     notes : tuple of str
         Reasons why the residual or a simulation is missing.
 
@@ -255,7 +255,7 @@ class DiagnosisResult(ShownModel):
         return replace(result, next_run=run, no_run='; '.join(why))
 
     def _steps(self, model: str) -> list[str]:
-        """Return the next steps, with the path of the model."""
+        """Return the next steps for the user, which name the path of the model."""
         worse = dict.fromkeys(joint for pair in self.forward for joint in pair.worse)
         learned = self.residual is not None
         steps = next_steps(self.core, self.next_run, self.no_run, model, tuple(worse), learned)
@@ -343,7 +343,7 @@ def diagnose(
     cutoff : float, optional
         Cut-off of the position filter [Hz]; from the noise by default.
     decimation : int, optional
-        Keep one of this many samples.
+        Decimation: one sample out of this many is kept.
     material : float
         Share of a joint's torque below which an effect does not matter.
     everything : bool
@@ -353,7 +353,7 @@ def diagnose(
     misfit : Misfit, optional
         Misfit of the model at its identification; by default that of ``arm``.
     partner : Partner, optional
-        Machine or person that was recorded with the arm, and may be tied to it.
+        Second machine or person in the same recordings, which springs may tie to the arm.
     rng : int or Generator
         Seed, or source of randomness.
     progress : callable, optional

@@ -64,7 +64,7 @@ class ExcitationResult(Shown):
     given_start : ndarray, shape (n,), or None
         Start and end pose [rad or m]; the free pose nearest to zero by default.
     after : tuple of str
-        Names of the recordings whose information the trajectory adds to.
+        Names of earlier recordings; the trajectory adds to their information.
     seed : int
         Seed of the search.
     with_isolability : bool
@@ -124,7 +124,7 @@ class ExcitationResult(Shown):
 
     @cached_property
     def planner(self) -> TransferPlanner:
-        """Return the planner of approach and return motions."""
+        """Return the planner of the motions from the start pose to the trajectory and back."""
         return TransferPlanner.of(self.arm, self.scene, self.core.settings.speed)
 
     @cached_property
@@ -152,7 +152,7 @@ class ExcitationResult(Shown):
 
     @cached_property
     def run(self) -> Run:
-        """Return the trajectory with approach and return; TrajectoryError if none is found."""
+        """Return the trajectory and the motions to and from it; TrajectoryError without a path."""
         excitation = self.core.excitation
         return plan_run(excitation, self.planner, self.start, WAYPOINT_RATE, seed=self.seed)
 
@@ -165,7 +165,7 @@ class ExcitationResult(Shown):
 
     @cached_property
     def fitness(self) -> Fitness:
-        """Return the results of the checks of the run."""
+        """Return the results of the checks of limits, clearance and floor along the run."""
         return fitness(self.run.motion(), self.scene)
 
     def document(self, origin: ResultOrigin = DEFAULT_ORIGIN) -> dict[str, Any]:

@@ -348,7 +348,7 @@ def identify(
     cutoff : float, optional
         Cut-off of the position filter [Hz]; from the noise by default.
     decimation : int, optional
-        Keep one of this many samples.
+        Decimation: one sample out of this many is kept.
     physical : bool or PhysicalSettings, optional
         Fit physically consistent links, which simulators need. By default such links are fitted
         if they increase the torque error by a tenth at most.
@@ -373,7 +373,7 @@ def identify(
         If the data identify no parameter, or no joint moves in the held-out recordings. The
         message states the reason and the remedy.
     RecordingError
-        If no recording is given, or a recording is given twice, or both held out and fitted.
+        If no recording is given, one is given twice, or one is both fitted and held out.
 
     Examples
     --------

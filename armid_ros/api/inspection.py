@@ -222,7 +222,7 @@ class CheckResult(Shown):
 
     @property
     def wrong(self) -> bool:
-        """Whether a value is impossible, or a recording contradicts a link."""
+        """Whether a value of the description is impossible, or a recording contradicts a link."""
         impossible = any(one.weight == 'bad' for one in self.remarks)
         return impossible or (self.links is not None and not self.links.agrees)
 

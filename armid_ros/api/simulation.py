@@ -110,7 +110,7 @@ def reference_of(
         Result of ``design_excitation``, a motion, or a file of either; by default the result of
         a short search.
     rng : numpy.random.Generator
-        Draws the starts of the search.
+        Source of the random start values of the search.
     settings : ReadSettings
         Settings of the reader of bags.
 

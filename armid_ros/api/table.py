@@ -101,7 +101,7 @@ class Shown(ABC):
         """Return a summary."""
 
     def stated(self, origin: ResultOrigin, robot: Robot | None = None) -> ResultOrigin:
-        """Return the origin with robot and next step: a sentence or a command."""
+        """Return the origin with the robot's name and the next step, a sentence or a command."""
         shown, known = self.summary(), origin if robot is None else origin.of(source_of(robot))
         step = origin.step or ''.join(shown.steps[:1]) or f'armid {shown.then}'
         return replace(known, step=step)

@@ -46,7 +46,7 @@ class ArmModel:
     """
     A rigid body plus effects: tau = Y pi + sum over effects of tau_e(motion; theta_e).
 
-    Motions are recorded motions; the model includes the effects of the sensors.
+    Motions are as recorded by sensors; the model includes the errors of these sensors.
 
     Attributes
     ----------
@@ -205,7 +205,7 @@ class ArmModel:
         return self._acting.robot
 
     def along(self, motion: Motion) -> ArmModel:
-        """Return the arm with effects that follow further signals of a recording."""
+        """Return the arm with effects that use further recorded signals, such as temperatures."""
         effects = tuple(effect.along(motion) for effect in self.effects)
         known = all(new is old for new, old in zip(effects, self.effects, strict=True))
         return self if known else replace(self, effects=effects)
@@ -407,7 +407,7 @@ class ArmModel:
         return columns
 
     def with_load_friction(self, motion: Motion, columns: FloatArray) -> FloatArray:
-        """Add load-dependent friction to changes of the load, (N, n, P)."""
+        """Add the change of load-dependent friction to changes of the load torque, (N, n, P)."""
         friction = self._acting.dry_friction
         if friction is None or friction.load_share is None:
             return columns
@@ -417,7 +417,7 @@ class ArmModel:
         return np.asarray(columns + along @ (gain[:, :, np.newaxis] * (along.T @ columns)))
 
     def felt(self, motion: Motion) -> Motion:
-        """Return the link motion for the rigid body; if quasi-static, its positions at rest."""
+        """Return the link motion for the rigid body; if quasi-static, with the links at rest."""
         return motion.at_rest() if self.quasi_static else motion
 
     def base_parameters(

@@ -90,7 +90,7 @@ def place_values(
     """
     Return values by attribute and joint, and a line for each value that a format cannot contain.
 
-    The attribute names the place of an effect, and is empty if there is none. Effects that
+    The attribute is where the format has an effect, and is empty if it has none. Effects that
     change the rigid body are part of it, and appear in neither.
 
     """

@@ -116,7 +116,7 @@ class Misfit:
 
 
 def louder(now: FloatArray, before: FloatArray) -> FloatArray:
-    """Return the ratio of present to earlier rms torque, at least 1, (n,)."""
+    """Return the ratio of rms torque now to that of the identification, 1 or more, (n,)."""
     return np.asarray(np.maximum(now / np.maximum(before, 1e-12), 1.0))
 
 

@@ -252,7 +252,7 @@ def with_named(arm: ArmModel, effect: Effect, values: FloatArray) -> ArmModel:
 
 
 def place_in(arm: ArmModel, effect: Effect) -> tuple[int, list[int]] | None:
-    """Return the index of an effect and the rows of its parameters; None if one is missing."""
+    """Return the index of the same effect in the arm, and the rows of its parameters, or None."""
     wanted = [(p.name, p.joint) for p in effect.parameters(arm.robot)]
     for position, own in enumerate(arm.effects):
         if isinstance(effect, type(own)) and not own.shapes and not own.points:
@@ -264,7 +264,7 @@ def place_in(arm: ArmModel, effect: Effect) -> tuple[int, list[int]] | None:
 
 def in_words(arm: ArmModel) -> ArmModel:
     """
-    Return the arm with its effects translated into those of the catalogue.
+    Return the arm with search-only effects replaced by effects of the catalogue.
 
     Effects for searches only are converted: a gravity vector becomes base tilt and gravity
     magnitude.
@@ -324,7 +324,7 @@ def _wrong_unit(row: Mapping[str, Any], units: Collection[str]) -> str:
 def _rows(
     document: Mapping[str, Any], text: str
 ) -> Iterator[tuple[tuple[str | int, ...], Any, tuple[str, ...]]]:
-    """Yield the place of each parameter, the parameter, and its permitted units (empty: any)."""
+    """Yield for each parameter its keys in the file, the parameter, and its units (empty: any)."""
     for k, row in enumerate(document['rigid_parameters']):
         yield ('rigid_parameters', k), row, link_unit(_name(row))
     for k, entry in enumerate(document['effects']):

@@ -28,7 +28,7 @@ def call(action: str, share: float | None, node: str, timeout: float) -> None:
     """
     Start, rehearse or stop the run of an excitation_publisher, or set its speed.
 
-    SHARE, 0.1 to 1, belongs to speed: the share of the planned speed for the next start.
+    SHARE, 0.1 to 1, is for the action speed: share of the planned speed at the next start.
 
     """
     if (action == 'speed') != (share is not None):

@@ -3,7 +3,7 @@
 """
 Choices of options, copied from the packages, so help needs no import.
 
-A test compares each with the package.
+A test compares each copy with its original in the package.
 
 """
 

@@ -46,14 +46,14 @@ COMMANDS = {
 
 #: Defaults of options, in the current folder.
 FILE = 'armid.toml'
-#: Context key of notes that are printed on stderr after the work; errors have one line.
+#: Context key of notes, which are printed on stderr after the work; an error prints one line.
 NOTES = 'armid.notes'
 #: Context key of the arguments as typed.
 TYPED = 'armid.typed'
 
 
 class Commands(click.Group):
-    """Imports commands late, and reports bad input as one line on stderr and exit code 2."""
+    """Command group: imports a command when used, reports bad input on stderr with exit code 2."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         """List the commands in the order of the work, commands of plug-ins last."""

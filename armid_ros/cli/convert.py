@@ -44,8 +44,8 @@ def convert(
     Convert a CSV, NPZ, ... table or a ROS 1 bag into a ROS 2 bag.
 
     Tables are CSV (.tsv, .txt, .gz too), NPZ and NPY, MAT, HDF5, Parquet, and folders of LeRobot
-    datasets. Columns without an option are guessed and printed. Several tables have columns of
-    the same rows. Bags of ROS 1 and ROS 2 are copied; joints may be renamed.
+    datasets. Columns without an option are guessed and printed. Several tables are joined column
+    by column and need equal rows. Bags of ROS 1 and ROS 2 are copied; joints may be renamed.
 
     """
     from armid_ros.cli import options

@@ -251,7 +251,7 @@ def open_partner(
     Raises
     ------
     ModelError
-        If it is not clear where the two may be tied, or a tie names no joint.
+        If --tie is needed to choose the joints that may be tied, or names an unknown joint.
 
     """
     from armid_ros.effects.tied import Partner
@@ -304,7 +304,7 @@ def _tie(text: str, robot: Robot, other: Robot) -> Tie:
 
     ends = [[*listed(end, '@'), ''] for end in parted(text, '=')]
     if len(ends) != 2:
-        raise ModelError(f"--tie '{text}' has to be JOINT=JOINT, of the arm and of its partner")
+        raise ModelError(f"--tie '{text}' has to be ARM_JOINT=PARTNER_JOINT")
     (joint, point, *_), (far, far_point, *_) = ends
     (tie,) = centroid_ties(robot, other, [(joint, far)])
     return replace(

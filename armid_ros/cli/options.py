@@ -58,7 +58,7 @@ def stage(out: Path, schema: str, robot: str = '', also: Collection[str] = ()) -
     """
     Create and lock a folder for the results of this command; return the staging folder.
 
-    Only when the command keeps the staging folder, files appear in the folder. Other files of an
+    Files appear in the folder only when the command keeps the staging folder. Other files of an
     earlier result are then removed, except a description that --robot names. With --force, files
     that are not replaced stay.
 
@@ -264,7 +264,7 @@ def model_of(path: Path, robot: Robot | None) -> ArmModel:
         typed, known = (','.join(f'{part:g}' for part in vector) for vector in (given, own))
         raise ModelError(
             f'{path}: its gravity is {known}, and --gravity is {typed}: leave --gravity out, or '
-            'write this gravity into the file if the arm is there now'
+            'write this gravity into the file if the arm is now mounted so'
         )
     return arm
 
@@ -331,7 +331,7 @@ def read(paths: Sequence[Path], robot: Robot, topic: str | None) -> list[Recordi
 
 
 def kept_source(source: str, robot: Robot, out: Path) -> str:
-    """Return the reference to the robot for files; write a robot from a bag to the folder."""
+    """Return how files refer to the robot; a description in a bag is written to the folder."""
     if source == '-':
         write_file(out / 'robot.urdf', robot.urdf)
         return 'robot.urdf'

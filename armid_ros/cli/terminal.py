@@ -43,7 +43,7 @@ def progress(what: str) -> Iterator[Tick]:
             while not done.wait(10.0):
                 share, spent = shares[0], time.monotonic() - start
                 rest = spent * (1.0 / share - 1.0) if share else math.inf
-                # a share that does not grow with time predicts nothing
+                # if the share has not grown, the remaining time cannot be predicted
                 click.echo(progress_line(steps[0], share, spent, rest < before), err=True)
                 before = min(before, rest)
 

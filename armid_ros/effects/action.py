@@ -23,7 +23,7 @@ import numpy as np
 #: Torque of the actuators [N m] as a function of time, position and velocity.
 TorqueLaw = Callable[[FloatArray, FloatArray, FloatArray], FloatArray]
 
-#: Dry friction [N m], or a share of the load [-], below this is zero.
+#: Dry friction [N m], or a load share [-], below this value counts as zero.
 NO_FRICTION = 1e-12
 
 
@@ -47,7 +47,7 @@ class DryFriction:
     lower, upper : ndarray, shape (m,)
         Torque while the element moves backwards, and forwards [N m]; lower <= upper.
     load_share : ndarray, shape (m,), or None
-        Change of both levels, away from each other, per torque of the rigid body [-].
+        Widening of both levels per torque of the rigid body [-]: the lower falls, the upper rises.
 
     """
 

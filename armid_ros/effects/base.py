@@ -156,7 +156,7 @@ class Effect(ABC):
     @classmethod
     def places(cls, robot: Robot) -> tuple[tuple[str, ...], ...]:
         """
-        Return the sets of joints of single causes: single joints, pairs or the whole arm.
+        Return the sets of joints on which one cause can act: single joints, pairs, or all.
 
         Raises
         ------
@@ -169,7 +169,7 @@ class Effect(ABC):
 
     @classmethod
     def as_change(cls) -> type[Effect]:
-        """Return the class for a change between two days, as the effect may exist already."""
+        """Return the class for a change between two days if the effect may exist before."""
         return cls
 
     def particulars(self) -> dict[str, Any]:

@@ -209,7 +209,7 @@ class ThermalFriction(Effect):
 
     @classmethod
     def as_change(cls) -> type[Effect]:
-        """Return the class that also contains a change from the beginning."""
+        """Return the class that also has a change that is present from the beginning."""
         return ThermalChange
 
     def columns(self, motion: Motion, arm: Arm) -> FloatArray:

@@ -43,7 +43,7 @@ class Attached(Effect):
         return robot.moving
 
     def _default_shape(self, robot: Robot) -> FloatArray:
-        """Attach to the centres of mass, at most the reach of the arm away from the joint."""
+        """Attach to the centres of mass, no farther from a joint than the reach of the arm."""
         values, model = self.shape_values, robot.model
         reach = max(float(np.linalg.norm(place.translation)) for place in model.jointPlacements)
         for row, joint in zip(values, self.joints, strict=True):
@@ -54,7 +54,7 @@ class Attached(Effect):
         return values
 
     def shape_starts(self, unexplained: Unexplained, arm: Arm) -> tuple[FloatArray, ...]:
-        """Return the present geometry as start value; other shapes have grids."""
+        """Return start values: present coordinates of points, and a grid for each other shape."""
         return tuple(
             self.shape_values[:, [index]]
             if shape.unit == 'm' and shape.lower < 0.0

@@ -238,7 +238,7 @@ class LearnedTorque(Effect):
 
 
 def counted(inputs: FloatArray, knee: float) -> FloatArray:
-    """Convert velocities among inputs, (..., 3), to the scale u of `TorqueMap`."""
+    """Return inputs, (..., 3), with the velocity converted to the scale u of `TorqueMap`."""
     velocity = knee * np.arcsinh(inputs[..., 1] / knee)
     return np.stack([inputs[..., 0], velocity, inputs[..., 2]], axis=-1)
 

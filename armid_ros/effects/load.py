@@ -133,7 +133,7 @@ class PayloadChange(Payload):
     """
     Change of the payload of a link, which may be negative.
 
-    A negative mass is a payload that was put down. The model contains it in the link.
+    A negative mass is a payload that was put down, and that the model has as part of the link.
 
     """
 

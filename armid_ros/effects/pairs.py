@@ -194,7 +194,7 @@ class TorqueCrosstalk(_Pairs, TorqueReading):
 
     @classmethod
     def places(cls, robot: Robot) -> tuple[tuple[str, ...], ...]:
-        """Return all ordered pairs: reader and source."""
+        """Return all ordered pairs: the joint with the wrong reading, then that of the cause."""
         return tuple(permutations(robot.joints, 2))
 
     def parameters(self, robot: Robot) -> tuple[ParameterName, ...]:

@@ -85,7 +85,7 @@ class TorqueDrift(TorqueReading):
     Torque readings that drift while sensor or electronics warm up, d (1 - exp(-t / T)).
 
     Time counts from the beginning of the recording. The drift does not depend on the motion,
-    unlike thermal_friction. Equal periods differ by it. Confounded with torque_offset if the
+    unlike thermal_friction. It makes equal periods differ. Confounded with torque_offset if the
     recording begins with a warm sensor and, in one short recording, with a payload that slips.
 
     """
@@ -96,7 +96,7 @@ class TorqueDrift(TorqueReading):
     shapes = (Shape('drift_time', 's', 0.1, 1e5, 600.0, (10.0, 60.0, 300.0, 1000.0, 3000.0)),)
 
     def shape_starts(self, unexplained: Unexplained, arm: Arm) -> tuple[FloatArray, ...]:
-        """Return distinguishable times; above three recording lengths, a drift is a line."""
+        """Return distinguishable time constants; above three recording lengths drift is a line."""
         # time constants of a drift in a search, over the length of a recording; a faster drift is
         # an offset
         times = np.maximum(

@@ -150,7 +150,7 @@ def tied_effect(
     robot : Robot
         The arm.
     joints : sequence of str, optional
-        Joints with a tie.
+        Joints to tie; by default all joints that have a tie.
 
     Raises
     ------

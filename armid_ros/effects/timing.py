@@ -66,7 +66,7 @@ class TimeDelay(LateReading):
 
     The torque is cubic between samples, with the slopes of `rate_of_change` (Hermite's spline).
     By default, the whole arm has one delay, as of a late clock or bus; named joints have one
-    delay each. To first order, the reading changes by -dtau/dt per delay. At low frequency it
+    delay each. To first order, the reading changes by -dtau/dt times delay. At low frequency it
     looks like viscous friction of a loaded joint, at high frequency like negative viscous
     friction. Confounded with torque_lag, which attenuates as well, with joint_elasticity and with
     clocks that differ. Two frequencies, or the slope of the phase, distinguish them.
@@ -187,7 +187,7 @@ def low_pass(t: FloatArray, x: FloatArray, lag: float) -> FloatArray:
 
     The filter is computed as y = x - T v, where v is the filtered rate of x, and the rate is
     linear between samples. It is of second order in the step for any ratio of lag and step. A
-    negative lag leads.
+    negative lag advances the signal.
 
     """
     rate = rate_of_change(t, x)

@@ -46,7 +46,7 @@ class JointElasticity(Displacing):
     instantaneous = False
 
     def displacements(self, motion: Motion, arm: Arm) -> Displacement:
-        """Return minus the torque that twists the transmission, and derivatives of the torque."""
+        """Return the negative torque that twists the transmission, and its time derivatives."""
         load = within_band(motion, arm.load(motion))
         (retardation,) = self.shape_over_joints(arm.robot)
         for joint in np.flatnonzero(retardation):
@@ -91,7 +91,7 @@ class Backlash(Displacing):
     instantaneous = False
 
     def displacements(self, motion: Motion, arm: Arm) -> Displacement:
-        """Return minus the motor position in the gap, as a share, and its derivatives."""
+        """Return the negative motor position in the gap, as a share, and its time derivatives."""
         (width,) = self.shape_over_joints(arm.robot)
         load = arm.load(motion)
         inertia = np.diagonal(arm.load_derivatives(motion)[2], axis1=1, axis2=2)
@@ -137,7 +137,7 @@ def place_in_gap(t: FloatArray, pull: FloatArray, width: float) -> FloatArray:
 
 
 def _twist(effect: Displacing, motion: Motion, twist: FloatArray) -> Displacement:
-    """Return columns of the twists between motors and links, (N, n), with derivatives."""
+    """Return link displacements by twists, (N, n), with their time derivatives, by parameter."""
     speed = rate_of_change(motion.t, twist)
     parts = (-twist, -speed, -rate_of_change(motion.t, speed))
     return Displacement(*(joint_columns(effect, motion, part) for part in parts))

@@ -53,7 +53,7 @@ class Design:
         Information of the whole run on the base parameters, with all periods recorded; prior
         information included.
     described : ndarray, shape (r,)
-        Values of these parameters in the prior model.
+        Values of the base parameters in the prior model.
     noise : ndarray, shape (n,)
         Assumed standard deviation of the torque noise [N m or N].
     cost : float
@@ -84,7 +84,7 @@ class Design:
 
     def limits_used(self, arm: ArmModel) -> dict[str, FloatArray]:
         """
-        Return the used share of every limit; the transfers are not included.
+        Return the used share of each limit; motions to and from the trajectory do not count.
 
         Parameters
         ----------

@@ -82,7 +82,7 @@ class MotionGate:
         self, phase: float, duration: float, measured: FloatArray, velocity: FloatArray
     ) -> Motion:
         """
-        Return a stop along the path of the run, which was checked as a whole.
+        Return a stop along the path of the run; the whole path was checked before.
 
         Parameters
         ----------
@@ -180,7 +180,7 @@ class MotionGate:
         )
 
     def _time_of(self, step: FloatArray, speed: FloatArray) -> float:
-        """Return the time of a small step with an initial speed, within the limits [s]."""
+        """Return the duration of a small step within the limits from an initial speed [s]."""
         velocity = np.where(np.isfinite(self.limits.velocity), self.limits.velocity, SLOW_VELOCITY)
         stopping = speed / self.limits.acceleration
         slowest = stopping + np.sqrt(stopping**2 + step / self.limits.acceleration)

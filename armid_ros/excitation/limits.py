@@ -344,7 +344,7 @@ def _with_file(robot: Robot, path: Path) -> Robot:
         document = load_yaml(text)
         entries = document.get('joint_limits') if isinstance(document, dict) else None
         if not isinstance(entries, dict):
-            raise TrajectoryError('no mapping joint_limits as in MoveIt')
+            raise TrajectoryError('the key joint_limits of MoveIt is missing, or has no mapping')
         if not entries.keys() & set(robot.joints):
             raise TrajectoryError(f'no limits for any of {", ".join(robot.joints)}')
         for j, joint in enumerate(robot.joints):

@@ -207,7 +207,7 @@ class DesignProblem:
         Raises
         ------
         TrajectoryError
-            If the arm has no such parameter, or no motion can distinguish the arm from the rival.
+            If the arm has no parameter in the target, or no motion separates arm and rival.
 
         """
         limits = Limits.of(arm.robot, speed=settings.speed)
@@ -268,7 +268,7 @@ class DesignProblem:
 
     def recorded(self, trajectory: FourierTrajectory, n_periods: int) -> Information:
         """Return the information of a recording of some periods on the base parameters."""
-        # number of samples per sample of the search, for the information
+        # factor between the samples for the information and the samples of the search
         count, margin = 6 * self.settings.samples, MARGIN * trajectory.n_joints
         columns = self.columns(trajectory.with_margins(count))[margin:-margin]
         weight = self.settings.rate * trajectory.period * n_periods / count
@@ -312,7 +312,7 @@ def torque_noise(arm: ArmModel, settings: DesignSettings) -> FloatArray:
     Raises
     ------
     TrajectoryError
-        If the settings have other than one positive number a joint.
+        If the settings do not have one positive number for each joint.
 
     """
     n = arm.robot.n_joints

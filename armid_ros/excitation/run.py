@@ -107,7 +107,7 @@ class Run:
 
         """
         motion = self.motion()
-        # the distance is largest in the middle, but zero there for a harmonic of the rate
+        # deviations are largest in the middle, but zero there for a harmonic at the sampling rate
         between = motion.t[:-1] + 0.4 / self.rate
         away = np.abs(Reference.of(motion).sample(between).q - self.at(between).q).max(axis=0)
         j = int(np.argmax(away))

@@ -244,7 +244,7 @@ class Fitness:
 
 def fitness(motion: Motion, scene: CollisionScene) -> Fitness:
     """
-    Return the results for a run that keeps its limits and its clearance.
+    Return the results of the checks of a run that was found to keep limits and clearance.
 
     Parameters
     ----------

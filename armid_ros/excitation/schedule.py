@@ -57,7 +57,7 @@ class Excitation:
         if int(self.n_periods) != self.n_periods or self.n_periods < 1:
             raise TrajectoryError(f'excitation: {self.n_periods} periods; at least one is needed')
         if not (np.isfinite(self.run_in) and self.run_in > 0.0):
-            raise TrajectoryError(f'excitation: a run-in of {self.run_in} s')
+            raise TrajectoryError(f'excitation: run-in {self.run_in} s; it has to be positive')
         if not self.duration <= MAX_DURATION:
             raise TrajectoryError(
                 f'excitation: {self.n_periods} periods of {self.trajectory.period:g} s, run-ins '

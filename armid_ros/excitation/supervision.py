@@ -174,7 +174,7 @@ def slowed(path: Path, phase: float, duration: float, rate: float) -> Motion:
     Returns
     -------
     Motion
-        From the handover on; the speed along the path falls from 1 to 0 as half a cosine.
+        The stop from its first sample on; the speed along the path falls to 0 as half a cosine.
 
     """
     count = int(np.ceil(duration * rate)) + 1

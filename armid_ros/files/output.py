@@ -32,7 +32,7 @@ from armid_ros.files.documents import load_yaml, reading
 from armid_ros.files.regular import open_regular, read_text
 from armid_ros.version import GENERATOR
 
-#: Model file that may be in a folder without a document; schemas of results that replace it.
+#: Model file that may be in a folder without a document, and results that may replace it.
 _MODEL = 'model.yaml'
 _SCHEMAS_WITH_MODEL = ('armid/identification/1', 'armid/diagnosis/1')
 #: Files and folders of each kind of result, by schema; the JSON document comes first.
@@ -337,7 +337,7 @@ def refuse_replacing(folder: Path, names: Collection[str]) -> None:
 
 
 def _foreign(folder: Path, names: Sequence[str]) -> Iterator[str]:
-    """Return foreign files; those that cannot have a mark count only if there are no others."""
+    """Return foreign files; files that cannot have a mark count only if no others exist."""
     known = [name for name in names if name.endswith(_MARKED_SUFFIXES)]
     return (name for name in known or names if not is_own(folder / name))
 

@@ -137,7 +137,7 @@ def find_bags(patterns: Sequence[str], arm_pattern: str | None = None) -> list[B
 def _bags(
     filesystem: Any, listed: Mapping[str, Mapping[str, Any]]
 ) -> Iterator[tuple[str, int, str]]:
-    """Yield path, size and version of all bags; files of a bag directory are parts of the bag."""
+    """Yield path, size and version of all bags; files in a bag directory are not bags."""
 
     def version(info: Mapping[str, Any]) -> str:
         found = [str(info[name]) for name in _VERSIONS if info.get(name)][:1]

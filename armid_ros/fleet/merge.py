@@ -201,7 +201,7 @@ class BagSummary:
     day : str
         Day of the path, or of the first timestamp, such as 2026-01-31.
     start_ns : int
-        First timestamp [ns]; shifted to `day` if more than a day from it.
+        First timestamp [ns]; shifted to `day` if it is more than a day away from that day.
     seconds : float
         Time from the first sample to the last [s].
     normal : NormalEquations

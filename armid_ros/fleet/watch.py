@@ -185,7 +185,7 @@ def watch_fleet(store: Store, alpha: float = 0.05) -> Watch:
     own: dict[str, list[ParameterHistory]] = {}
     worn: dict[str, list[dict[str, Any]]] = {}
     for group in by_kind.values():
-        # deviations that arms of one kind share on a day are removed
+        # remove the deviations that all arms of one kind share on a day
         without = without_days(group)
         spread = spreads(without)
         kinds.append((without, spread))

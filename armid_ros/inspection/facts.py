@@ -102,11 +102,11 @@ class JointFacts:
     speed : float
         99th percentile of the speed, from the positions.
     moving : float
-        Share of the time in which it moves.
+        Share of the time in which the joint moves.
     step : float
-        Smallest change of the position from sample to sample that is not zero.
+        Smallest nonzero change of the position from one sample to the next.
     repeated : float
-        Share of the samples that repeat the position of the one before while it moves.
+        Share of the samples that repeat the previous position while the joint moves.
     velocity_ratio : float or None
         Recorded velocity divided by the derivative of position, 1 in equal units; None without
         velocity or motion.

@@ -129,7 +129,7 @@ def group_columns(
         Names of the P columns. Earlier columns are kept in preference to later ones; within a
         link, inertia is kept first and mass last.
     tolerance : float
-        Share of its length beyond the kept columns, below which a column is grouped.
+        Share of its length outside the span of the kept columns, below which a column is grouped.
 
     Returns
     -------

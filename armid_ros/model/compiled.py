@@ -79,7 +79,7 @@ class BodyOfKernel(Structure):
         quantity : str
             'torques', (N, n), or 'regressors', (N, n, 10 n).
         out : ndarray
-            The result; zero before.
+            Array for the result; it has to be zero before the call.
 
         """
         arrays = [np.ascontiguousarray(x) for x in (motion.q, motion.dq, motion.ddq)]
@@ -120,7 +120,7 @@ def kernel_body(
     Returns
     -------
     BodyOfKernel or None
-        None if the kernel was not compiled or has no room for as many joints.
+        None if the kernel was not compiled, or does not support so many joints.
 
     """
     library, n = kernel(), robot.n_joints

@@ -18,7 +18,7 @@ import pinocchio as pin
 
 #: File types of meshes that MuJoCo reads.
 _MESHES = ('.stl', '.obj', '.msh')
-#: Dry friction as stiff as the default time step of 2 ms allows. With the softer default of
+#: Stiffness of dry friction: as stiff as the time step of 2 ms allows. With the softer default of
 #: MuJoCo, a slow joint of an arm has a tenth of its friction.
 _FRICTION_SOLVER = {'solreffriction': '0.004 1', 'solimpfriction': '0.9999 0.9999 0.001 0.5 2'}
 #: Contact attributes: visuals have no contacts; collision shapes have contacts with the

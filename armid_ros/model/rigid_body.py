@@ -148,7 +148,7 @@ def inverse_dynamics_derivatives(
 
 
 def _projected(jacobian: FloatArray, torques: FloatArray) -> FloatArray:
-    """Return J^T times torques of moving joints, (N, m, ...), or columns of them."""
+    """Return J^T times the torques of moving joints, or times their columns, (N, m, ...)."""
     return np.asarray(np.einsum('kmn,km...->kn...', jacobian, torques))
 
 

@@ -53,7 +53,7 @@ class TieGeometry(NamedTuple):
     Attributes
     ----------
     way : ndarray, shape (N, S, 3)
-        Vector D from the point of the other machine to that of the machine [m].
+        Vector D from the point of the other machine to that of this machine [m].
     position, other_position : ndarray, shape (N, S, 3)
         Positions of the two ends [m].
     jacobian : ndarray, shape (N, S, 3, n)

@@ -151,7 +151,7 @@ def _without_inertials(urdf: str, links: Sequence[str]) -> str:
 
 
 def _share(body: FloatArray, others: FloatArray) -> float:
-    """Return the share of the other links' inertia that keeps the own link consistent, 0 to 1."""
+    """Return the share of the other links' inertia with which the own link stays consistent."""
     if not np.any(others):
         return 1.0
     if not Consistency.of('', others).eigenvalues[0] > -1e-12:

@@ -99,7 +99,7 @@ class BagPlayerNode(ArmidNode):
     A JointTrajectory is sent only if no joint of the arm on joint_states would jump.
 
     If the bag also has joint_states, its trajectories are sent only if no other node publishes
-    them. With use_sim_time, the time since the first /clock message is the played bag time.
+    joint_states. With use_sim_time, the time since the first /clock message is the played time.
 
     Attributes
     ----------

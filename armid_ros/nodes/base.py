@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Base class of the nodes: parameters, complaints, and diagnostics once a second."""
+"""Base class of the nodes: parameters, log of rejected inputs, diagnostics once a second."""
 
 from __future__ import annotations
 
@@ -101,7 +101,7 @@ class ArmidNode(Node):
         return super().create_timer(timer_period_sec, guarded, *args, **more)
 
     def surviving(self, callback: Callable[..., Any], what: str) -> Callable[..., Any]:
-        """Return a callback that logs exceptions as complaints about their source, a topic."""
+        """Return a callback whose exceptions are logged as complaints about a source, a topic."""
 
         @wraps(callback)
         def survive(*args: Any) -> Any:
@@ -140,7 +140,7 @@ class ArmidNode(Node):
         return ''
 
     def look_for_trouble(self) -> None:
-        """Log once that simulated time is missing, or the problem that /diagnostics has."""
+        """Log once the problem in the state of the node, or that simulated time is missing."""
         missing = self.missing_clock
         if missing and not self._clock_missed:  # the topic of /diagnostics
             self.get_logger().warning(f'{missing}; until then the node waits')

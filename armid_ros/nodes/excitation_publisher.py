@@ -141,7 +141,7 @@ class ExcitationPublisherNode(ArmidNode):
         return elapsed if on_the_way else None
 
     def look(self) -> None:
-        """Start when controller and joint states are available; stop the arm if one is lost."""
+        """Start the run when controller and joint states are there; stop it if either is lost."""
         self._controller.look()
         now, patience = self._arm.now(), self.value('state_timeout')
         if self.elapsed is not None:

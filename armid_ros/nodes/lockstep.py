@@ -110,7 +110,7 @@ def run_lockstep(
     Returns
     -------
     Progress
-        At the end.
+        Progress at the end of the run.
 
     Raises
     ------

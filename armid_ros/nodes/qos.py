@@ -14,13 +14,13 @@ from rclpy.subscription import Subscription
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 from rosbags.interfaces import Qos, QosDurability, QosReliability
 
-#: Commands, /clock and diagnostics.
+#: Profile of commands, /clock and diagnostics.
 STREAM = QoSProfile(depth=10)
-#: Latest value, also for late subscribers: descriptions, models, estimates.
+#: Profile that keeps the latest value for late subscribers: descriptions, models, estimates.
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 #: Number of messages that a subscription holds while its node is busy: 1 s at 1 kHz.
 DEPTH = 1000
-#: Joint states, without losses. While a subscriber is not scheduled, shared memory
+#: Profile of joint states, without losses. While a subscriber is not scheduled, shared memory
 #: holds 512 messages, half a second at 1 kHz. Later messages are sent again from the history of
 #: the publisher, of this depth.
 SAMPLES = QoSProfile(depth=DEPTH)

@@ -54,7 +54,7 @@ class PositionFit:
     reasons : tuple of str
         Why a value is not determined; empty if it is.
     gain_ratio, gain_ratio_std : ndarray, shape (n,)
-        kp that the data demand over the given kp, with its standard error; 1 and 0 if fitted.
+        Ratio of the kp that fits the data to the given one, and standard error; 1, 0 if fitted.
     tracking, residual : ndarray, shape (n,)
         Rms of command minus position, and of simulated minus measured position [rad or m].
     noise : ndarray, shape (n,)
@@ -164,7 +164,7 @@ def start_values(
     speed, rate, effort, error = (
         np.sqrt(np.mean(x**2, axis=0)) + 1e-6 for x in (dq, ddq, effort, behind)
     )
-    # a joint that sticks moves only by the noise of its encoder, which is no scale
+    # a joint that sticks moves only by the noise of its encoder, which gives no scale
     speed, rate = (np.maximum(x, 0.01 * x.max()) for x in (speed, rate))
     if gains is None:  # the described load of a light last link gives no scale
         more = np.maximum(0.03 * effort.max() / effort, 1.0)

@@ -34,7 +34,7 @@ _TABLES = 'armid_ros.recording.tables'
 
 
 def is_table(path: Path) -> bool:
-    """Return whether a path is a table; without the package `tables`, any file but a bag is."""
+    """Return whether a path is a table; without the package `tables`, all but bags are tables."""
     if find_spec(_TABLES) is None:
         return path.is_file() and not is_bag_file(path)
     from armid_ros.recording import tables

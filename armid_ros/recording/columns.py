@@ -61,7 +61,7 @@ class ColumnSettings:
         Gear ratios, motor turns per joint turn, one or one per joint. With gears, positions,
         velocities and efforts are those of the motors. Empty for none.
     coupling : tuple of (str, str, float)
-        Motor, joint, and turns of that motor for one of that other joint, for wrists.
+        Motor, other joint, and turns of the motor per turn of that joint, for coupled wrists.
     rename : tuple of (str, str)
         Pairs of joint names, or beginnings of them, in the file and their replacements.
     episode : int or None
@@ -113,7 +113,7 @@ def name_in_file(name: str, rules: Rules) -> str:
 
 
 def renaming(joints: Sequence[str], names: Sequence[str]) -> str:
-    """Return the rule OLD:NEW that makes names of a file those of all joints; '' without one."""
+    """Return the rule OLD:NEW that turns names of a file into those of all joints; '' if none."""
     ends = [(name[:end], name[end:]) for name in names for end in range(len(name))]
     # whole words of a name first
     for old, rest in sorted(ends, key=lambda end: not end[0].endswith(('_', '/'))):
@@ -201,7 +201,7 @@ def in_si(
     settings : ColumnSettings
         Scales, degrees, gears and zeros.
     slides : collection of bool, optional
-        Whether each joint is prismatic, which has no degrees.
+        Whether each joint is prismatic; a prismatic joint is never in degrees.
 
     """
     if not any(getattr(settings, name) for name in _UNIT_SETTINGS):

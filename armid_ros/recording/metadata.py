@@ -53,7 +53,7 @@ class BagMetadata:
     files : tuple of Path
         The files of the bag, in order.
     compression_mode : {'', 'file', 'message', 'storage'}
-        Unit that rosbag2 compressed; empty if none.
+        What rosbag2 compressed: whole files, or single messages; empty if nothing.
     counts : mapping of str to int
         Number of messages of each topic, as stated by the writer.
 

@@ -413,7 +413,7 @@ def given_twice(fitted: Sequence[Recording], held_out: Sequence[Recording] = ())
     """
     Return a message on recordings that are given twice; empty if there are none.
 
-    A recording that is given twice has twice the weight, and a fitted recording cannot be held
+    A recording given twice would have twice the weight, and a fitted recording cannot be held
     out. Recordings are equal if positions and torques agree; two simulated runs may have equal
     positions.
 

@@ -26,9 +26,9 @@ import numpy.typing as npt
 from scipy.ndimage import median_filter
 
 # A larger backward step of the clock is a restart (a simulation reset, a bag played in a loop),
-# and no late message.
+# not a late message.
 RESTART_NS = 10**9
-# A torque with less variation is uninitialised memory and no measurement [N m].
+# A torque that varies less than this is uninitialised memory, not a measurement [N m].
 NOTHING = 1e-9
 #: Largest accepted share of samples that are not finite.
 MAX_NOT_FINITE = 0.2

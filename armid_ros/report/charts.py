@@ -67,7 +67,7 @@ class Chart(Templated):
     series : sequence of Series
         Curves, the first one at the bottom.
     xlabel, ylabel : str
-        Axes with units; no xlabel where the chart below has it.
+        Labels of the axes with units; xlabel is empty if the chart below has it.
     height : int
         [CSS pixel].
     link : str
@@ -77,7 +77,7 @@ class Chart(Templated):
     marks : sequence of (float, str, bool)
         Vertical lines: abscissa, text at the foot, and whether it is on the left.
     logarithmic : bool
-        Whether the abscissa is; it has to be positive.
+        Whether the abscissa is logarithmic; its values then have to be positive.
     symmetric : bool
         Whether zero is in the middle of the ordinate.
     legend : bool
@@ -148,7 +148,7 @@ def thinned(*series: npt.ArrayLike, most: int = 3000) -> npt.NDArray[np.intp]:
     -------
     ndarray of int
         Samples in order: all, or those where one of the curves is lowest or highest within each
-        of many equal stretches. Samples with NaN are kept, for they are breaks.
+        of many equal stretches. Samples with NaN are kept, because they mark breaks.
 
     """
     curves = [np.asarray(values, dtype=float) for values in series]

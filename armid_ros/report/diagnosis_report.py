@@ -412,7 +412,7 @@ def whole_overlays(diagnosis: Diagnosis, recordings: Sequence[Recording]) -> Gap
     Parameters
     ----------
     diagnosis : Diagnosis
-        The diagnosis; outside of its spans the model after is that before.
+        The diagnosis; outside of its spans, the patched model is replaced by the given model.
     recordings : sequence of Recording
         All recordings.
 

@@ -39,13 +39,13 @@ def plotter_layouts(
     Parameters
     ----------
     robot : str
-        Name of the robot, as /diagnostics has it.
+        Name of the robot, as in /diagnostics.
     joints : sequence of str
         Driven joints, in the order in which joint_states has them.
     namespace : str
-        Of the nodes; empty for none.
+        Namespace of the nodes; empty for none.
     base : str
-        Base link, in whose frame the arm and what is drawn on it are shown.
+        Base link; the arm and all markers are drawn in its frame.
 
     """
     at = topic_prefix(namespace)

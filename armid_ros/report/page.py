@@ -37,14 +37,14 @@ _names: ContextVar[Sequence[str]] = ContextVar('_names', default=())
 
 class Templated:
     """
-    A block with a template, in which it is `block`.
+    A block of a page with a template; the template refers to the block as `block`.
 
     Attributes
     ----------
     template : str
         Name of the file in templates/.
     package : str
-        Where templates/ is: a plug-in brings its own.
+        Package with the folder templates/; a plug-in has its own templates.
     short_names : bool
         Whether names of joints and links in it are without their common prefix.
 

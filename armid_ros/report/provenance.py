@@ -53,7 +53,7 @@ class ResultOrigin:
     robot : str
         Name of the robot in documents; by default its shipped name or its path.
     source : str
-        Reference to the description in model.yaml; by default the same.
+        Reference to the description in model.yaml; by default the same as `robot`.
     provenance : Provenance
         Files, versions and settings that the report names.
     step : str

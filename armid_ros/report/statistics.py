@@ -129,7 +129,7 @@ def residual_section(robot: Robot, fits: Sequence[Fit], role: str) -> ContentSec
     robot : Robot
         Gives joints and units.
     fits : sequence of Fit
-        Held-out data where there are any.
+        Fits of the held-out data; without such data, those of the training data.
     role : str
         'held-out' or 'training'.
 

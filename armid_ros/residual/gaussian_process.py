@@ -56,7 +56,7 @@ def learn_map(rows: JointRows, rng: np.random.Generator) -> tuple[TorqueMap, Flo
 
     everywhere = np.ones(len(rows), dtype=bool)
     best: tuple[float, _Scales, _Cells] | None = None
-    # shares of the largest velocity
+    # candidate knees, as shares of the largest velocity
     for share in (0.02, 1.0):
         knee = max(share * float(np.abs(rows.inputs[:, 1]).max()), 1e-9)
         # inducing points, with at least two rows for each

@@ -97,7 +97,7 @@ def _library(
             for name, function in (('sin', np.sin), ('cos', np.cos)):
                 terms.append((f'{name}({angle})', force, function(k * q)))
                 terms.append((f'{name}({angle}) sign(dq)', force, function(k * q) * sign))
-    # shares of the range where a one-sided force may begin
+    # candidate positions, as shares of the range, at which a one-sided force begins
     for place in low + np.array((0.2, 0.35, 0.5, 0.65, 0.8)) * (high - low):
         terms.append((f'max(q - {place:.3g}, 0)', f'{force}/{x}', np.maximum(q - place, 0.0)))
         terms.append((f'max({place:.3g} - q, 0)', f'{force}/{x}', np.maximum(place - q, 0.0)))

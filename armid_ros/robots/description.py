@@ -143,7 +143,7 @@ def parse_xml(text: str) -> ElementTree.Element:
 
     """
     if len(text) > TEXT_LIMIT:
-        raise RobotError(f'{len(text)} characters, which no description has')
+        raise RobotError(f'its {len(text)} characters are too many for a description')
     builder, parser = ElementTree.TreeBuilder(), expat.ParserCreate()
     parser.StartElementHandler, parser.EndElementHandler = builder.start, builder.end
     parser.CharacterDataHandler = builder.data

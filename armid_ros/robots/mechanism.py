@@ -140,7 +140,7 @@ class Mechanism:
         """
         Return the moving joints with closed loops, and J, in one state of the driven joints.
 
-        The third result, (m, 3 L), are the changes of the moving joints that close a unit gap.
+        The third result, (m, 3 L), is the change of the moving joints that closes a gap of 1 m.
 
         """
         work, inside = _SCRATCH.of(self), np.clip(u, self.lower, self.upper)
@@ -185,7 +185,7 @@ class Mechanism:
         return np.asarray(-closing @ np.concatenate(apart))
 
     def _gap(self, data: pin.Data, q: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return the vectors between the points of the loops, (3 L,) [m], and their slope."""
+        """Return the vectors between the points of the loops, (3 L,) [m], and their Jacobians."""
         pin.computeJointJacobians(self.model, data, q)
         pin.updateFramePlacements(self.model, data)
         world, gaps, slopes = pin.LOCAL_WORLD_ALIGNED, [], []

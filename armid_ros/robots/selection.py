@@ -47,7 +47,7 @@ def driven_joints(description: Description, names: Sequence[str] | None) -> tupl
 
     A joint that mimics others, or that a loop moves, is never driven. By default, a joint of a
     gripper is not driven either: this is a joint with a single mimic joint, or with finger,
-    gripper or jaw in its name. Neither it nor its followers carry a joint of the arm.
+    gripper or jaw in its name, unless it or a joint that follows it carries a joint of the arm.
 
     Raises
     ------

@@ -254,7 +254,7 @@ def run(
         The same plant and controller in compiled form, used for the steps that it supports.
     fine : Plant, optional
         The same arm without drives, whose step is a whole part of the step of the plant. It
-        integrates the other steps, in which friction sticks or slips from some time on.
+        integrates the other steps, in which friction begins to stick or to slip.
 
     """
     drive, last = plant.action.drive, len(rows)

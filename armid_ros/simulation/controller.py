@@ -39,7 +39,7 @@ class LinearFeedback:
     added_inertia : ndarray, shape (n, n)
         Inertia added to the inertia matrix of the robot [kg m^2].
     bandwidth : float
-        w, of the feedback on the acceleration [rad/s].
+        w, the bandwidth of the feedback on the acceleration [rad/s].
     follows : bool
         Whether ID contains velocity and reference acceleration: s is 1 if so, otherwise 0.
     weighs : bool

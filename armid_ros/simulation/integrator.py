@@ -155,7 +155,7 @@ def spring_substep(
     if springs.loose:
         pull, offset = springs.meshing(twist)
         force = force + springs.to_twists.T.dot(offset)
-    # accelerations per twist and velocity, due to the torques, and per dry friction torque
+    # accelerations: per twist and velocity, by the other torques, and per dry friction torque
     right = np.concatenate([pull.T, force[np.newaxis], springs.friction]).T
     rates = np.asarray(dgesv(inertia, right, 0, 1)[2])
     after = _propagated(springs, rates, x)

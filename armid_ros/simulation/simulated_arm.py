@@ -66,7 +66,7 @@ class Sample:
         Position [rad or m], velocity and torque [N m or N] as measured. With elastic joints, these
         are readings of the motors, and the torque is that of the next step.
     link : LinkSample, or None
-        Readings link side of the springs; None if all joints are rigid.
+        Readings on the link side of the springs; None if all joints are rigid.
 
     """
 

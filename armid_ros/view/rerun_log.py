@@ -181,7 +181,7 @@ def poses(recording: Recording) -> tuple[FloatArray, FloatArray]:
 
 
 def _log_bodies(stream: Any, robot: Robot, marked: Sequence[str]) -> list[str]:
-    """Log the shapes of links: <visual>, or else <collision>, or else bars."""
+    """Log the shapes of links: visual ones; without these, collision ones; or else bars."""
     rr, drawn = rerun(), 0
     notes: list[str] = []
     absent: list[str] = []

@@ -212,13 +212,13 @@ def _predicted(
 
 
 def _approached(rests: Sequence[Motion]) -> npt.NDArray[np.bool_]:
-    """Mark readings after an approach; in others, dry friction is known only to its bounds."""
+    """Return a mask of readings after an approach; other readings only bound dry friction."""
     return np.concatenate([one.dq for one in rests]).astype(bool)
 
 
 class _Solution(NamedTuple):
     """
-    Change x of all parameters (P,), and numbers of the F free ones.
+    Change x of all parameters (P,), and indices of the F free ones.
 
     Covariances (F, F) from the variances of joints and from the scatter of the rests,
     information (F, F) without the prior, used readings (K, n), and the smallest number of

@@ -63,7 +63,7 @@ def plan_zero(
     trajectory = _tour(careful, inside, chosen, hold)
     faults = trajectory_faults(arm, limits, trajectory, planner.clearance)
     if faults:
-        raise TrajectoryError(f'the tour through the poses: {faults}; take another --seed')
+        raise TrajectoryError(f'the tour is not allowed: {faults}; try another --seed')
     settings = replace(settings, period=trajectory.period, harmonics=trajectory.harmonics)
     core = evaluate(DesignProblem.of(model, settings, rng), trajectory)
     return ExcitationResult(core, arm, scene, seed=seed)
@@ -144,7 +144,7 @@ def _tour(
     q = np.roll(np.concatenate(parts), count // 2, axis=0)  # begins and ends in a rest
     q = np.concatenate([q, np.tile(q[-1], (-len(q) % int(rate), 1))])  # whole seconds
     period = len(q) / rate
-    # to 0.7 Hz, which the filter reduces to a tenth of its amplitude
+    # up to 0.7 Hz, which the filter reduces to a tenth of its amplitude
     w = 2.0 * np.pi / period * np.arange(1, round(0.7 * period) + 1)
     waves = np.fft.rfft(q, axis=0)[: len(w) + 1].T / len(q)
     series = 2.0 * w * waves[:, 1:] * np.exp(-0.5 * (smoothing * w) ** 2)

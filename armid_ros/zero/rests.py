@@ -20,7 +20,7 @@ def reading_noise(recording: Recording) -> FloatArray:
     """Return the noise of the mean torque of the shortest rest, if it is white, shape (n,)."""
     assert recording.tau is not None
     count = max(_MIN_REST / max(recording.period, 1e-6), 1.0)
-    # the median leaves out steps of friction; 0.954 of a standard deviation for differences
+    # the median leaves out steps of friction; for white noise it is 0.954 standard deviations
     steps = np.median(np.abs(np.diff(recording.tau, axis=0)), axis=0)
     return np.asarray(steps / 0.954 / np.sqrt(count))
 

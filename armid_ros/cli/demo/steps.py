@@ -67,7 +67,7 @@ def hidden_change(robot: Robot, rng: np.random.Generator, hide: str = '') -> Hid
     Raises
     ------
     ModelError
-        If no shipped change begins so, and there are no values.
+        If no shipped change begins with the text, and the text has no values of an effect.
 
     """
     if ':' in hide:
@@ -196,7 +196,7 @@ def diagnose_hidden(
 
 
 def show_hidden(hidden: HiddenChange, found: DiagnosisResult) -> None:
-    """Print the diagnosis, its gain on the held-out run, and the hidden effect."""
+    """Print the diagnosis, the held-out error before and after, and the hidden effect."""
     say('Then a change was hidden in the arm, and three runs were recorded. Diagnosis of two:')
     say(pretty(f'{found.verdict.replace("_", " ").upper()}: {found.core.summary}'))
     gap = found.core.gap

@@ -18,7 +18,7 @@ import numpy.typing as npt
 
 #: Tables of the torque law by MJCF attribute; an offset has no attribute.
 _TABLES = {'damping': 'VISCOUS', 'frictionloss': 'COULOMB', 'armature': 'ROTOR', '': 'OFFSET'}
-#: Template of the torque law, brackets of a table, and comment prefix.
+#: Template, brackets of a table and prefix of a comment, for each language.
 _LANGUAGES = {'cpp': ('torque.hpp', '{}', '//'), 'python': ('torque.py.txt', '[]', '#')}
 #: Largest speed without Coulomb friction [rad/s or m/s]: the noise of a velocity at rest.
 DEAD_BAND = 1e-3
@@ -91,7 +91,7 @@ def torque_code(arm: ArmModel, language: str, source: str) -> tuple[str, tuple[s
 
 
 def _nested(values: Any, brackets: str, apart: str = ' ') -> str:
-    """Write nested lists with the brackets of a programming language, and outer separators."""
+    """Write nested lists in the brackets of a language; `apart` separates the outer elements."""
     if not isinstance(values, list):
         return repr(values)
     apart = apart if isinstance(values[0], list) else ' '

@@ -154,7 +154,7 @@ def franka(load: CarriedLoad) -> str:
     Mass [kg], translation from the flange to the centre of mass [m], and the inertia matrix
     [kg m^2] about the centre of mass, column-major.
     Source: libfranka, franka::Robot::setLoad(load_mass, F_x_Cload, load_inertia);
-    franka::Model::mass for the point of the inertia.
+    franka::Model::mass for the reference point of the inertia.
 
     """
     body = load.body
@@ -211,7 +211,7 @@ def load_text(load: CarriedLoad, maker: str, source: str) -> tuple[str, tuple[st
     Return the load data file of a manufacturer, a key of `MAKERS`, and its notes.
 
     A physically impossible inertia is written as zero, as of a point mass. The source of the load
-    is for the comment.
+    is named in the comment.
 
     """
     write, comment = MAKERS[maker]

@@ -290,7 +290,7 @@ class ClearanceModel:
     def _measure(
         self, q: FloatArray, sample: IntArray, pair: IntArray
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return distances, normals to the second body and points of the first body of pairs."""
+        """Return distances, normals to the second body, and nearest points of the first body."""
         model, geometry = self.collision.robot.model, self.collision.geometry
         data, placed = model.createData(), geometry.createData()
         q, distance = self.collision.robot.positions(q), np.empty(len(sample))

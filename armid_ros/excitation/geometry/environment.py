@@ -114,7 +114,7 @@ class Obstacle:
         return mesh.convex
 
 
-#: Suffix of the sphere that represents a link without a body, after the name of the link.
+#: Suffix of the name of the sphere that stands for a link without a body.
 _ORIGIN = '_frame'
 
 
@@ -123,7 +123,7 @@ def with_obstacles(collision: CollisionModel, obstacles: Sequence[Obstacle]) -> 
     Return the collision bodies of a robot together with the obstacles around it.
 
     Every moving body is checked against every obstacle, except the links that the obstacle
-    ignores. A small sphere at the frame of its joint represents a link without a body. The size of
+    ignores. A link without a body gets a small sphere at the frame of its joint. The size of
     such a link is unknown, but the link must not pass through the floor.
 
     Raises

@@ -52,7 +52,7 @@ def lowest_point(
     """
     Return the lowest point of the moving links in the samples of a motion.
 
-    The frame of its joint represents a link without a collision body.
+    A link without a collision body is represented by the frame of its joint.
 
     Parameters
     ----------

@@ -95,7 +95,7 @@ class Objective:
             by_w = 2.0 * weight * (w @ by_matrix)
             weights[:, :, order] = by_w.reshape(*motion.q.shape, -1) * inverse_noise
             by_state = self._state_gradient(motion, _weighted(state, weights), weights)
-            # differentiate sum(weights * columns) by the coefficients, for columns of the past
+            # differentiate sum(weights * columns) by the coefficients, where columns need the past
             total = np.zeros_like(x)
             if past:
                 weights = weights[:, :, -sum(block.shape[2] for block in past) :]
@@ -144,7 +144,7 @@ class Objective:
 
 
 def _weighted(blocks: Sequence[FloatArray], weights: FloatArray) -> FloatArray:
-    """Return sum(weights * columns) of each sample, blocks of (k N, n, P) to (k, N)."""
+    """Return sum(weights * columns) of each sample for k copies, from (k N, n, P) to (k, N)."""
     total, start = 0.0, 0
     for block in blocks:
         stop = start + block.shape[2]

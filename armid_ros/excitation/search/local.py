@@ -233,7 +233,7 @@ class _Branch:
             self.sharpness = _SHARPNESS[-1]
 
     def _solve(self, constraints: Constraints, iterations: int) -> tuple[FloatArray, int]:
-        """Return the solution of SLSQP, (n, 1 + 2 H) in units of the scale, and its steps."""
+        """Return the solution of SLSQP, (n, 1 + 2 H) in units of the scale, and its step count."""
         count, scale = 0, self.scale
         x = self.trajectory.coefficients / scale
 

@@ -88,7 +88,7 @@ class Worker:
         self._last: tuple[DiagnosisRequest, Diagnosis] | None = None
 
     def run(self, job: Job) -> Result:
-        """Run a job; an error of the data or the disk is a result without success."""
+        """Run a job; an error of the data or the disk gives a result without success."""
         try:
             if isinstance(job, DiagnosisRequest):
                 found, diagnosis = answer(job)
@@ -136,7 +136,7 @@ class Assistant:
         """
         Send a job, which runs after the pending jobs; start a new process if the old one ended.
 
-        A request of a diagnosis is larger than the buffer of the pipe. It would wait for the
+        A diagnosis request is larger than the buffer of the pipe, and would have to wait for the
         pending jobs; send it when none is pending.
 
         Raises

@@ -30,11 +30,11 @@ class LiveSettings:
     Attributes
     ----------
     window : float
-        Longest motion that is diagnosed [s].
+        Longest duration of motion that is diagnosed [s].
     shortest : float
-        Shortest motion that is diagnosed [s].
+        Shortest duration of motion that is diagnosed [s].
     every : float
-        Motion between two requests [s].
+        Duration of motion between two requests [s].
     rate : float
         Rate of the kept samples [Hz].
     confirmations : int
@@ -86,7 +86,7 @@ class DiagnosisRequest:
     end : float
         Time of the last sample of the window, on the time base of the node [s].
     healthy : tuple of ArmModel and Recording, or None
-        Motion of the healthy arm and its model then, from which the misfit is computed if no
+        Motion of the healthy arm, and the model at that time; they give the misfit if no
         baseline is given.
     of_one_arm : bool
         Whether the whole window lies after the last change of the arm. The residual of a wrong

@@ -122,7 +122,7 @@ class LiveDiagnosis:
         held = len(self.window)
         kept = self.window.add(t, q, dq, tau)
         if kept and held and len(self.window) == 1:
-            # after a gap a new stretch of motion begins
+            # after a gap, a new motion begins
             self._asked_at, self.window.moved = 0.0, 0.0
             self._begin, self._changed = -np.inf, False
             self._outdate()
@@ -135,7 +135,7 @@ class LiveDiagnosis:
         return kept
 
     def _holds(self, seconds: float) -> bool:
-        """Return whether the window contains motion of a given time [s]."""
+        """Return whether the window contains motion of a given duration [s]."""
         return self.window.moved >= seconds <= self.window.end - self.window.begin
 
     def request(self) -> DiagnosisRequest:

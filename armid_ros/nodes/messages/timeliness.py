@@ -73,7 +73,7 @@ class StampDifference:
         self._recent.append(self._late)
 
     def side(self, late: float) -> str:
-        """Return whether stamps with a delay [s] are ahead of the clock or behind."""
+        """Return 'ahead of' or 'behind' and the name of the clock, for stamps with a delay [s]."""
         clock = '/clock' if self._clock.ros_time_is_active else "this computer's clock"
         return f'{"behind" if late > 0.0 else "ahead of"} {clock}'
 

@@ -95,7 +95,7 @@ def make_arm(
     with reading("parameter 'start'", RobotError):
         start = numbers(value('start'))
         if start and len(start) != n:
-            raise RobotError(f'{len(start)} numbers, for {n} joints')
+            raise RobotError(f'it has {len(start)} numbers, but there are {n} joints')
     return make_simulated_arm(
         arm,
         rng=np.random.default_rng(value('seed')),

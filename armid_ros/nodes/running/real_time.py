@@ -54,7 +54,7 @@ class RealTime:
         """
         now = self._clock()
         due = self._anchor[1] + (now - self._anchor[0]) * factor
-        # services are answered after 5 ms of work
+        # return after 5 ms of work, so that services are answered
         while self._elapsed() + period <= due and self._clock() - now < 0.005:
             before = self._elapsed()
             self._step()

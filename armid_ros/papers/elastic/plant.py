@@ -46,9 +46,9 @@ class ElasticSensors:
     Attributes
     ----------
     motor_velocity, link_velocity : float or ndarray, shape (n,)
-        [rad/s], the motors' at the joints.
+        Of velocity readings [rad/s]; those of the motors are at the joints.
     link_acceleration : float or ndarray, shape (n,)
-        [rad/s^2].
+        Of the accelerometers on the links [rad/s^2].
     position : float or ndarray, shape (n,)
         Of all encoders [rad].
 

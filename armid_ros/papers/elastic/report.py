@@ -218,7 +218,7 @@ def response_error(result: TwoInertiaIdentification, joint: int) -> float:
 def _joint(
     result: TwoInertiaIdentification, k: int
 ) -> Iterator[tuple[str, str, Sequence[Templated]]]:
-    """Yield panels of one joint: decoupled, and from motor torque alone."""
+    """Yield panels of one joint: decoupled response, and response to motor torque alone."""
     measured, joint, parameters = result.measured[k], result.joints[k], result.parameters
     seen = (measured.frequency >= _SHOWN_BAND[0]) & (measured.frequency <= _SHOWN_BAND[1])
     own = measured.frequency[seen]

@@ -54,7 +54,7 @@ def record(
 
 
 def walk(pair: TiedPair, gait: Gait, stiffness: float | None, tick: Tick) -> SimulatedWalk:
-    """Simulate the walking pair, and its torque-driven joints."""
+    """Simulate the walking exoskeleton and wearer, and single joints driven by torque."""
     tick(0.6, 'walking a whole cycle')
     walkers = walking_pair(stiffness)
     cycle, rate = gait_cycle(walkers, gait), read_assumptions()['torque_rate'].value

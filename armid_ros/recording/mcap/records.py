@@ -4,7 +4,7 @@
 Find the records of an MCAP file without its index.
 
 An MCAP file is a sequence of records, each with opcode, length and content. Messages are usually
-inside chunks, and the offsets of its messages follow each chunk. A walk from the start
+inside chunks; each chunk is followed by the offsets of its messages. A walk from the start
 finds all records, even if the writer was killed before it wrote the summary. Checksums and
 counts of the file are checked if possible. Specification: https://mcap.dev/spec
 

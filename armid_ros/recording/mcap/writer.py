@@ -75,7 +75,7 @@ class McapWriter:
     Attributes
     ----------
     committed : Committed
-        What is in the file.
+        Committed content of the file.
 
     """
 

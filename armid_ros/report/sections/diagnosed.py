@@ -92,7 +92,7 @@ def named_rows(
     findings : sequence of Finding
         The effects.
     certain : bool
-        Whether values whose interval includes zero are left out, where an effect has others.
+        Whether values whose interval includes zero are left out, if the effect has others.
 
     """
     rows = []

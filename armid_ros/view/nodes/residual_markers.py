@@ -74,7 +74,7 @@ class ResidualMarkersNode(ListeningNode):
         self.look_every(1.0 / self.value('rate'), self.draw)
 
     def condition(self) -> tuple[str, Mapping[str, object]]:
-        """Return the missing inputs, and the residual share that colours each joint."""
+        """Return the missing inputs, and the ratio of residual to torque that sets each colour."""
         if self.robot is None:
             return self.awaited, {}
         if not np.isfinite(self._q).all():

@@ -128,8 +128,8 @@ def decouple(
     Returns
     -------
     tuple of StateSpace
-        Of each joint, from the motor's torque less Coulomb friction, and from the interaction
-        torque, to the velocities of motor and link, all at the joint.
+        System of each joint. Inputs: torque of the motor less Coulomb friction, and interaction
+        torque. Outputs: velocities of motor and link. All are at the joint.
 
     Raises
     ------

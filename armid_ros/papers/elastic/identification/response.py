@@ -6,8 +6,8 @@ Closed-loop velocity responses of the two-link arm, with exact derivatives by it
 All runs are integrated together, as arrays. Derivatives are computed by the complex step, f(x +
 ih) = f + ih f', through the whole integration with friction. The real part decides which joints
 slip or stick. The integration is that of the plant: the Pade approximation (2, 2) of the
-exponential for motors, springs and links, and the middle of the step for nonlinear torques. Squire
-and Trapp 1998 for the complex step. The thirteen tuned parameters are a vector with names.
+exponential for motors, springs and links, and the middle of the step for nonlinear torques. For
+the complex step: Squire and Trapp 1998. The thirteen tuned parameters are a vector with names.
 
 """
 
@@ -145,8 +145,8 @@ def ringing(steps: Steps, parameters: TwoLinkParameters) -> FloatArray:
     Returns
     -------
     ndarray, shape (N, E, 4, 4)
-        Of velocities of motors and links, by the twist of both springs [rad] and the velocities of
-        both links [rad/s] at first.
+        Derivatives of the velocities of motors and links by initial twists of the springs [rad]
+        and the initial velocities of both links [rad/s].
 
     """
     values = np.tile(_point(parameters).astype(complex), (4, 1))

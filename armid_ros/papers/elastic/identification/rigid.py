@@ -5,7 +5,7 @@ Step 1: the arm with rigid joints, at frequencies far below its resonances.
 
 tau = (M + diag(mm gear^2)) q'' + h + (dl + dm gear^2) q' + fm gear sgn(q'). The identifiable
 parameters are alpha + mm1 gear^2, beta, gamma, mm2 gear^2, the sums of friction and the Coulomb
-torques. Only sums are identifiable of motor and link friction, and of the inertias of joint 1.
+torques. Motor and link friction, and inertias of joint 1, are identifiable only as sums.
 
 """
 

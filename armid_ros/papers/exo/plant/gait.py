@@ -41,7 +41,7 @@ class Assumption:
     unit : str
         Its unit.
     reason : str
-        Why.
+        Reason for the value.
 
     """
 

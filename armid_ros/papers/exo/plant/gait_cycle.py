@@ -233,9 +233,9 @@ def walking_torques(
     Parameters
     ----------
     pair : TiedPair
-        Free to walk.
+        Pair that is free to walk.
     motions : PairMotion
-        Of both.
+        Motions of both machines.
     ground, other_ground : ndarray, shape (N, 4, 2)
         Forces on heels and toes, forward and up [N].
 

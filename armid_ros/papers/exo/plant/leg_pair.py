@@ -93,12 +93,12 @@ class TiedPair(TiedMachines):
         Parameters
         ----------
         way : ndarray, shape (..., S, 3)
-            From the other machine's ends to the machine's own [m].
+            Vectors from the ends of the springs on the other machine to those on the machine [m].
 
         Returns
         -------
         ndarray, shape (..., S, 3)
-            [N].
+            Forces [N].
 
         """
         assert self.slack is not None
@@ -191,7 +191,7 @@ def assumed_stiffness(stiffness: npt.ArrayLike | None) -> FloatArray:
 
 def walking(pair: TiedPair, gait: Gait, t: FloatArray) -> PairMotion:
     """
-    Return the motion of the walking pair: the wearer follows the gait, the machine nearly does.
+    Return the motion of the walking pair: the wearer follows the gait, the machine nearly so.
 
     At t = 0 single support begins.
 

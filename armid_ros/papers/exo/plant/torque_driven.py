@@ -99,14 +99,14 @@ def drive_by_torque(
     driven : sequence of str
         Joints of the machine that follow torques.
     torque : callable
-        Their torques.
+        Function that returns their torques.
     on_ground : bool
         Whether the pair is free to walk, with ground under its feet.
 
     Returns
     -------
     Motion
-        Of the machine at every other sample: one Runge-Kutta step of order 4 spans two.
+        Motion of the machine at every other sample; a Runge-Kutta step of order 4 spans two.
 
     Raises
     ------

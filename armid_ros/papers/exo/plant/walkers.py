@@ -48,7 +48,7 @@ class LegLength:
     Attributes
     ----------
     thigh, shank, foot : float
-        Of the segments, the foot from heel to toe.
+        Lengths of the segments; that of the foot is from heel to toe.
 
     """
 
