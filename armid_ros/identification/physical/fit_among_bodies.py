@@ -37,6 +37,9 @@ import scipy.linalg
 #: Relative size of a pseudo-inertia in any direction, up to which it is at the limit of physical
 #: consistency; relative distance to a wall of a box, up to which it is at the wall.
 _ACTIVE_SHARE = 1e-3
+#: Thickness of a link over its length, below which a described inertia is doubtful: an arm link of
+#: 0.5 m is thicker than 25 mm.
+THINNEST = 0.05
 
 
 @dataclass(frozen=True)
@@ -374,9 +377,9 @@ def bodily_prior(arm: ArmModel) -> tuple[FloatArray, tuple[str, ...]]:
     """
     Return standard parameters of the description, with physical values for impossible links.
 
-    A link without mass becomes a ball with the mean mass of the other links. If a link is a
-    point or has impossible moments, the prior has the smallest possible second moments for its
-    mass.
+    A link without mass becomes a ball with the mean mass of the other links. If a link is a point,
+    is thinner than a twentieth of its length or has impossible moments, the prior has the second
+    moments of a housing of 0.1 m in diameter at least.
 
     Returns
     -------
@@ -406,10 +409,11 @@ def bodily_prior(arm: ArmModel) -> tuple[FloatArray, tuple[str, ...]]:
         center = matrix[:3, 3] / mass
         second = matrix[:3, :3] - mass * np.outer(center, center)
         values, axes = np.linalg.eigh(second)
-        # smallest radius of gyration [m], for descriptions with point masses as links
-        floor = mass * 0.005**2
-        if values[0] < 1e-3 * floor or values[0] < 1e-4 * values[2]:
-            least = max(floor, 1e-2 * values[2])
+        # A nearly singular prior forbids any load on the link, and other links get its mass.
+        # Doubtful: a radius of gyration below 0.16 mm, or thin compared with the length.
+        if values[0] < mass * 0.00016**2 or values[0] < THINNEST**2 * values[2]:
+            # 0.03 m: a housing of 0.1 m in diameter, between solid (25 mm) and hollow (35 mm)
+            least = max(mass * 0.03**2, 1e-2 * values[2])
             second = (axes * np.maximum(values, least)) @ axes.T
             matrix[:3, :3] = second + mass * np.outer(center, center)
             theta[part] = link_parameters(matrix)

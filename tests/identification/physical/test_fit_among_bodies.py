@@ -159,6 +159,16 @@ def test_a_description_without_masses_gets_a_prior(arm, recording):
     assert Score.of(result.training).relative_error_percent < 1.0
 
 
+def test_a_nearly_singular_described_inertia_is_no_narrow_prior(arm):
+    body = arm.robot.rigid_parameters.copy()
+    body[50:54] = 0.63, 0.0, 0.0, 0.0  # principal moments of the last link of a vendor's file
+    body[54:] = 5.6e-7, 0.0, 2.2e-4, 0.0, 0.0, 2.2e-4
+    theta, notes = bodily_prior(ArmModel(arm.robot.with_inertias(body), arm.effects))
+    second = np.linalg.eigvalsh(pseudo_inertia(theta[50:60])[:3, :3])
+    assert second.min() == pytest.approx(0.63 * 0.03**2)
+    assert len(notes) == 1
+
+
 @pytest.mark.parametrize(
     ('settings', 'said'),
     [
