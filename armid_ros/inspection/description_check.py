@@ -18,6 +18,7 @@ from itertools import product
 
 from armid_ros.arm import ArmModel
 from armid_ros.identification import Identification, Score
+from armid_ros.identification.physical.fit_among_bodies import THINNEST
 from armid_ros.inspection.inspect import notes_on, Remark, worst_first
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.robots import NO_MASS, Robot
@@ -103,10 +104,28 @@ def description_remarks(robot: Robot) -> tuple[Remark, ...]:
 
     """
     found = [Remark('bad', text) for text in robot.description.inertia_doubts()]
+    found += _thin_inertias(robot)
     found += [*_of_joints(robot), *_of_sizes(robot), *_of_shapes(robot)]
     known = {remark.text for remark in found}
     others = [note for note in notes_on(robot) if note not in known]
     return worst_first([*found, *(Remark('note', note) for note in others)])
+
+
+def _thin_inertias(robot: Robot) -> Iterator[Remark]:
+    """Find inertias of bodies that are thinner than `THINNEST` of their length."""
+    for link, inertial in robot.description.links.items():
+        if inertial is None or inertial.doubt():
+            continue
+        xx, xy, xz, yy, yz, zz = inertial.inertia
+        moments = np.linalg.eigvalsh([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+        least, _, largest = 0.5 * moments.sum() - moments[::-1]  # second moments of the mass
+        if least < THINNEST**2 * largest:
+            values = ', '.join(f'{moment:.2g}' for moment in moments)
+            yield Remark(
+                'doubt',
+                f"link '{link}': principal moments {values} kg m^2 are those of a body thinner "
+                f'than {THINNEST:g} of its length; correct its inertia',
+            )
 
 
 def _of_joints(robot: Robot) -> Iterator[Remark]:
@@ -204,6 +223,8 @@ def _of_shapes(robot: Robot) -> Iterator[Remark]:
         # plausible densities are those of foam to steel
         if mass > 8000.0 * volume[link]:
             yield Remark('bad', f'{density}; steel has 7850')
+        elif inertial is None and link not in robot.links:
+            continue  # fixed to another link, whose mass includes it
         elif mass < 30.0 * volume[link] and link != robot.base:
             yield Remark('doubt', f'{density}; foam has 30')
     yield from (Remark('note', text) for text in all_in_one([*missing.values()]))

@@ -71,6 +71,16 @@ def test_an_impossible_value_is_found(text, weight, fact):
     assert found.remarks[0].weight == 'note' or found.remarks[0].text[1:12] in found.finding
 
 
+def test_a_thin_inertia_is_doubtful_and_a_fixed_link_without_mass_is_not():
+    shape = '<collision><geometry><box size="0.2 0.2 0.2"/></geometry></collision>'
+    fixed = '<joint name="cover" type="fixed"><parent link="forearm"/><child link="hull"/></joint>'
+    text = URDF.replace('</robot>', f'<link name="hull">{shape}</link>{fixed}</robot>')
+    thin = re.sub('<inertia .*?/>', '<inertia ixx="2.2e-4" iyy="2.2e-4" izz="5.6e-7"/>', text)
+    assert not [one for one in ar.check(ar.load_robot(text)).remarks if one.weight != 'note']
+    doubts = [one.text for one in ar.check(ar.load_robot(thin)).remarks if one.weight == 'doubt']
+    assert doubts and all('5.6e-07, 0.00022, 0.00022 kg m^2' in text for text in doubts)
+
+
 def run(effects, seed=0):
     return recorded(ar.ArmModel.of(ARM, effects=effects), seed)
 
