@@ -218,12 +218,18 @@ def other_gravity(robot: Robot, vector: FloatArray) -> Hypothesis | None:
     if off[option] < 0.3:
         nearest = known[option]
     else:
-        option = ','.join(f'{part:.3g}' for part in vector + 0.0)
-    along = nearest / max(float(np.linalg.norm(nearest)), 1e-9)
-    direction = ', '.join(f'{part + 0.0:.3g}' for part in along)
+        # wrong masses change the length of the fitted vector, but not its direction
+        if not _beyond_masses(weighs):
+            nearest = vector * (size / length)
+        option = ','.join(f'{part:.4g}' for part in nearest + 0.0)
+    strength = max(float(np.linalg.norm(nearest)), 1e-9)
+    direction = ', '.join(f'{part + 0.0:.3g}' for part in nearest / strength)
+    # 5 %: more than the fit is off if all masses are right
+    wrong = abs(length / strength - 1.0) > 0.05
+    masses = f' (fitted: {length:.3g}, so masses may be wrong too)' if wrong else ''
     return Hypothesis(
         'gravity',
-        f'gravity seems to act along ({direction}) of the base with {length:.3g} m/s^2: '
+        f'gravity seems to act along ({direction}) of the base with {strength:.3g} m/s^2{masses}: '
         f'--gravity {option}',
         body=lambda robot: robot.with_gravity(vector),
         values=3,

@@ -159,6 +159,12 @@ def test_weight_half_as_much_again_is_of_masses_and_not_of_gravity(robot, vector
     assert found is None or f'--gravity {option}' in found.text
 
 
+def test_a_turned_gravity_keeps_the_described_size_unless_no_mass_explains_it(robot):
+    found = other_gravity(robot, 0.87 * np.array([4.905, 0.0, -8.496]))
+    assert '--gravity 4.905,0,-8.496' in found.text and 'masses' in found.text
+    assert 'masses' not in other_gravity(robot, np.array([4.9, -0.04, -8.4])).text
+
+
 @pytest.mark.parametrize(('pair', 'what'), [((0, 1), 'position and torque'), ((0, 3), 'position')])
 def test_exchanged_joints(robot, sound, pair, what):
     tau = exchanged(sound.tau, *pair) if 'torque' in what else sound.tau
