@@ -306,19 +306,7 @@ def with_joint_limits(
 def require_narrower(
     robot: Robot, quantity: str, given: FloatArray, described: FloatArray
 ) -> None:
-    """
-    Raise a TrajectoryError if a limit that a user gives exceeds the existing limit.
-
-    Parameters
-    ----------
-    robot : Robot
-        The arm.
-    quantity : str
-        'velocity' or 'acceleration', for the message.
-    given, described : ndarray, shape (n,)
-        Limits of the user, and existing limits [rad or m, per s or s^2]; may be infinite.
-
-    """
+    """Raise a TrajectoryError if a given limit, of shape (n,), exceeds the described one."""
     for joint, value, limit, slides in zip(
         robot.joints, given, described, robot.prismatic, strict=True
     ):
