@@ -276,12 +276,17 @@ def check_links(found: Identification, described: ArmModel, grade: str, fault: s
     difference = found.estimate.values - found.base.values(described.theta)
     factor = np.linalg.cholesky(found.estimate.covariance)
     rows = np.linalg.solve(factor, np.column_stack([found.base.grouping, difference]))
+    # change of the effects' parameters that explains most of the difference without the links
+    change = np.linalg.lstsq(rows[:, rigid:-1], rows[:, -1])[0]
     nuisance, _ = np.linalg.qr(rows[:, rigid:-1])
     rows = np.delete(rows, np.s_[rigid:-1], axis=1)
     rows -= nuisance @ (nuisance.T @ rows)
     spread = robot.described_spread.ravel()
     total = float(rows[:, -1] @ rows[:, -1])
-    error, fitted_error = _errors(found, described)
+    theta = np.concatenate([described.theta[:rigid], found.arm.theta[rigid:]])
+    if total <= _MAX_CHI_SQUARED * len(rows):  # effects such as rotors, grouped with links
+        theta[rigid:] = described.theta[rigid:] + change
+    error, fitted_error = _errors(found, described.with_theta(theta))
     wrong = [] if error - fitted_error < _MIN_IMPROVEMENT else _selected(rows, spread, total)
     changes, covariance, rest = _fit(rows, spread, wrong)
     freedom = max(1, len(rows) - nuisance.shape[1] - size * len(wrong))
@@ -324,11 +329,8 @@ def check_links(found: Identification, described: ArmModel, grade: str, fault: s
     )
 
 
-def _errors(found: Identification, described: ArmModel) -> tuple[float, float]:
+def _errors(found: Identification, before: ArmModel) -> tuple[float, float]:
     """Return the torque errors with the described links and with the fitted ones [%]."""
-    rigid = len(described.robot.rigid_parameters)
-    theta = np.concatenate([described.theta[:rigid], found.arm.theta[rigid:]])
-    before = described.with_theta(theta)
     fits = [
         replace(
             fit,

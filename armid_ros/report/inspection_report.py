@@ -93,9 +93,10 @@ def inspection_word(found: Inspection) -> str:
 def check_word(remarks: Sequence[Remark], found: LinkCheck | None) -> str:
     """Return the verdict on a description: clean, look or wrong."""
     weights = {remark.weight for remark in remarks}
-    if 'bad' in weights or (found is not None and found.wrong):
+    # with a smaller share explained, an effect may be missing instead
+    if 'bad' in weights or (found is not None and found.wrong and found.explained >= 0.9):
         return 'wrong'
-    return 'look' if 'doubt' in weights else 'clean'
+    return 'look' if 'doubt' in weights or (found is not None and found.wrong) else 'clean'
 
 
 def headline(remarks: Sequence[Remark], found: LinkCheck | None) -> tuple[str, ...]:
@@ -114,7 +115,10 @@ def headline(remarks: Sequence[Remark], found: LinkCheck | None) -> tuple[str, .
     elif found.agrees:
         first = 'The links of the URDF agree with the recording.'
     elif found.explained < 0.9:  # with a smaller share, links are not the cause
-        first = 'The URDF differs from the recording in more than three links.'
+        first = (
+            'The URDF differs from the recording in more than three links, or an effect is '
+            'missing, such as rotor_inertia: --effects.'
+        )
     else:
         known = [text for k in found.wrong if (text := _wrong_mass(found, k))]
         others = [found.joints[k] for k in found.wrong if not _wrong_mass(found, k)]

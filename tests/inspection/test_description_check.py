@@ -5,6 +5,7 @@
 import re
 
 import armid_ros as ar
+from armid_ros.api.arguments import USUAL
 import numpy as np
 import pytest
 
@@ -98,3 +99,9 @@ def test_a_mass_that_the_description_lacks_is_recovered_with_its_interval():
 def test_a_description_that_is_right_agrees():
     found = ar.check(ARM, run(FRICTION))
     assert found.links.agrees and found.links.wrong == () and not found.wrong
+
+
+def test_a_rotor_that_is_grouped_with_a_link_is_no_wrong_link():
+    rotors = 'rotor_inertia:rotor_inertia=0.1'
+    found = ar.check(ARM, run((*FRICTION, rotors)), effects=f'{USUAL},rotor_inertia')
+    assert not found.links.wrong and found.links.agrees and not found.wrong
