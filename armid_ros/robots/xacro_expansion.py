@@ -114,11 +114,26 @@ def package_folders(
     ------
     Path
         The given folder, if any. Otherwise, in this order: folders whose package.xml has the name,
-        which enclose the file or are next to an enclosing folder; such folders in
-        ROS_PACKAGE_PATH; the folder in AMENT_PREFIX_PATH; folders of that name without a
-        package.xml, which enclose the file or are next to an enclosing folder.
+        which enclose the file or are next to an enclosing folder; such folders in ROS_PACKAGE_PATH;
+        the folder in AMENT_PREFIX_PATH; folders of that name without a package.xml, which enclose
+        the file or are next to an enclosing folder. A copy of such a folder around the file, which
+        has all its subfolders and the file at the same path, comes before it.
 
     """
+    for folder in _folders(name, file, given):
+        for root in () if file is None or (given and name in given) else file.resolve().parents:
+            with suppress(OSError):
+                inside = [one.name for one in os.scandir(folder) if one.is_dir()]
+                whole = (folder / file.resolve().relative_to(root)).is_file()
+                if whole and inside and all((root / one).is_dir() for one in inside):
+                    yield root
+        yield folder
+
+
+def _folders(
+    name: str, file: Path | None, given: Mapping[str, str | Path] | None
+) -> Iterator[Path]:
+    """Yield the folders of `package_folders` without copies around the file."""
     if given and name in given:
         yield Path(given[name])
         return
