@@ -138,16 +138,14 @@ class ExcitationResult(Shown):
         if self.given_start is not None:
             return ''
         robot, nearest = self.arm.robot, self.planner.zero_pose
-        outside = [
+        ranges = ', '.join(
             f'{robot.joints[j]} ({robot.lower[j]:.4g} to {robot.upper[j]:.4g} '
             f'{robot.position_units[j]})'
             for j in np.flatnonzero(nearest)
-        ]
-        fault, reasons = self.planner.fault(nearest), []
-        if outside:
-            ranges = ', '.join(outside)
-            reasons = [f'not inside the position limits, 2 % at each end unused: {ranges}']
-        reasons += [f'not free: {fault}'] if fault else []
+        )
+        limits = f'not inside the position limits, 2 % at each end unused: {ranges}'
+        fault = self.planner.fault(nearest)
+        reasons = [limits] * bool(ranges) + [f'not free: {fault}'] * bool(fault)
         return f'zero is no start: {"; ".join(reasons)}' if reasons else ''
 
     @cached_property

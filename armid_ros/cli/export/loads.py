@@ -114,16 +114,11 @@ def _flange(arm: ArmModel, joint: str, links: Collection[str]) -> str:
     """Return the only link that can be the flange; otherwise raise a ModelError."""
     # ROS-Industrial calls the frame of a flange tool0 or flange
     usual = [name for name in ('tool0', 'flange') if name in links]
-    root = parse_xml(arm.robot.urdf)
-    last = arm.robot.tree.links[arm.robot.tree.index(joint)]
-    children: dict[str | None, list[str]] = {}
-    for one in root.iter('joint'):
-        parent, child = one.find('parent'), one.find('child')
-        if parent is not None and child is not None:
-            children.setdefault(parent.get('link'), []).append(str(child.get('link')))
+    last, tree = arm.robot.tree.links[arm.robot.tree.index(joint)], arm.robot.description.joints
     # links without mass, shape and children, fixed to the link that the joint moves
-    bare = {one.get('name') for one in root.iter('link') if not len(one)} - children.keys()
-    ends = [name for name in children.get(last, []) if name in links and name in bare]
+    bare = {one.get('name') for one in parse_xml(arm.robot.urdf).iter('link') if not len(one)}
+    bare = (bare & set(links)) - {one.parent for one in tree}
+    ends = [one.child for one in tree if one.parent == last and one.child in bare]
     ends = usual[:1] or (list(links) if len(links) == 1 else ends)
     if len(ends) != 1:
         raise ModelError(
