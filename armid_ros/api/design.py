@@ -182,10 +182,14 @@ def _searched(
 ) -> ExcitationResult:
     """Search for the trajectory, after a check that the start pose is free of collisions."""
     planner = TransferPlanner.of(model, scene, settings.speed)
+    start = None if start is None else np.asarray(start, dtype=float)
     if start is None:
         planner.free_start()  # raises an error before the search if no pose is free
+    elif start.shape != (model.robot.n_joints,):
+        raise TrajectoryError(f'start: shape {start.shape}, expected ({model.robot.n_joints},)')
     elif fault := planner.fault(start):
-        raise TrajectoryError(f'--start: {fault}')
+        degrees = '; are these degrees?' if not planner.fault(np.radians(start)) else ''
+        raise TrajectoryError(f'start: {fault}{degrees}')
     prior = None
     if earlier:  # information matrix of existing recordings
         used = conditioning(earlier, SignalSettings())

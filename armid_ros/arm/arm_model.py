@@ -124,7 +124,9 @@ class ArmModel:
         arm = cls(robot)
         if isinstance(effects, str):
             effects = [effects] if ':' in effects else [e for e in parted(effects) if e.strip()]
-        for effect in effects:
+        for k, effect in enumerate(effects):
+            if effect in effects[:k]:
+                raise ModelError(f"the effect '{effect}' is given twice")
             if isinstance(effect, Effect):
                 arm = arm.with_effect(effect)
             else:

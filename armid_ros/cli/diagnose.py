@@ -155,6 +155,7 @@ def diagnose(
     """Find which effect a model lacks, and add it."""
     if baseline and no_baseline:
         raise click.UsageError('give --baseline or --no-baseline, not both')
+    model = model / 'model.yaml' if model is not None and model.is_dir() else model
     if against and (model or baseline):
         raise click.UsageError('give --against without --model and --baseline')
     from armid_ros.api.diagnosis import diagnose as run

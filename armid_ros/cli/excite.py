@@ -130,8 +130,7 @@ class Speed(click.ParamType[str | float]):
 @click.option(
     '--start',
     metavar='Q,...',
-    help='Pose in which the trajectory starts and ends [rad or m]; by default the free pose '
-    'nearest to zero.',
+    help='Pose at the start and end [rad or m]; by default the free pose nearest to zero.',
 )
 @click.option(
     '--acceleration',

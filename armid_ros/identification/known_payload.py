@@ -137,8 +137,8 @@ def parse_payload(text: str) -> tuple[str, str, pin.Inertia]:
         mass, center = np.nan, []
     if len(center) != 3 or not bag or not link or not 0.0 < mass < np.inf:
         raise IdentificationError(
-            f"--payload '{text}' has to be BAG=KG@LINK, or BAG=KG@LINK:X,Y,Z with its centre "
-            'of mass in the frame of the link [m]'
+            f"--payload '{text}' has to be BAG=KG@LINK, with a positive mass, or "
+            'BAG=KG@LINK:X,Y,Z with its centre of mass in the frame of the link [m]'
         )
     return bag, link, pin.Inertia(mass, np.array(center), np.zeros((3, 3)))
 

@@ -216,15 +216,14 @@ def _of_shapes(robot: Robot) -> Iterator[Remark]:
     for link, inertial in robot.description.links.items():
         if inertial is not None and link not in missing:
             yield from _of_centre(link, np.array(inertial.xyz), corners[link])
-        if volume[link] <= 0.0 or link in missing:
+        fixed = inertial is None and link not in robot.links  # the link that carries it has mass
+        if volume[link] <= 0.0 or link in missing or fixed:
             continue
         mass = 0.0 if inertial is None else inertial.mass
         density = f"link '{link}': {mass:g} kg, {mass / volume[link]:.3g} kg/m^3"
         # plausible densities are those of foam to steel
         if mass > 8000.0 * volume[link]:
             yield Remark('bad', f'{density}; steel has 7850')
-        elif inertial is None and link not in robot.links:
-            continue  # fixed to another link, whose mass includes it
         elif mass < 30.0 * volume[link] and link != robot.base:
             yield Remark('doubt', f'{density}; foam has 30')
     yield from (Remark('note', text) for text in all_in_one([*missing.values()]))

@@ -136,7 +136,8 @@ def load_robot(
     shipped = isinstance(source, str) and source in shipped_robots()
     path = shipped_path(str(source)) if shipped else Path(source).expanduser()
     if not os.path.lexists(path):
-        guess = meant(str(source), shipped_robots())
+        guess = '; write arguments as NAME:=VALUE' if '.xacro ' in str(source) else ''
+        guess = guess or meant(str(source), shipped_robots())
         raise RobotError(
             f'{source}: neither a file nor a shipped robot{guess}; shipped are '
             f'{", ".join(shipped_robots())}'

@@ -120,11 +120,12 @@ def package_folders(
         has all its subfolders and the file at the same path, comes before it.
 
     """
+    path = (file or Path()).resolve()
     for folder in _folders(name, file, given):
-        for root in () if file is None or (given and name in given) else file.resolve().parents:
+        for root in () if file is None or (given and name in given) else path.parents:
             with suppress(OSError):
                 inside = [one.name for one in os.scandir(folder) if one.is_dir()]
-                whole = (folder / file.resolve().relative_to(root)).is_file()
+                whole = (folder / path.relative_to(root)).is_file()
                 if whole and inside and all((root / one).is_dir() for one in inside):
                     yield root
         yield folder

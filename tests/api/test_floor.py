@@ -5,7 +5,7 @@
 from dataclasses import replace
 
 import armid_ros as ar
-from armid_ros.errors import TrajectoryError
+from armid_ros.errors import ModelError, RobotError, TrajectoryError
 import numpy as np
 import pytest
 
@@ -49,3 +49,24 @@ def test_wheels_are_not_driven_by_a_script(tmp_path):
     path.write_text(text.replace('</robot>', wheel))
     with pytest.raises(TrajectoryError, match=r'wheel.*joints=\['):
         ar.design_excitation(path, **QUICK)
+
+
+@pytest.mark.parametrize(
+    ('start', 'answer'), [([0.0], r'shape \(1,\)'), ([0, 0, 0, 90, 0, 0], 'are these degrees')]
+)
+def test_a_start_of_wrong_length_or_in_degrees_is_an_error(start, answer):
+    with pytest.raises(TrajectoryError, match=f'start.*{answer}'):
+        ar.design_excitation('humanoid_arm', start=start, **QUICK)
+
+
+def test_a_start_is_a_list_of_numbers():
+    plan = ar.design_excitation('humanoid_arm', start=6 * [0.0], **QUICK)
+    np.testing.assert_array_equal(plan.start, 0.0)
+
+
+def test_an_effect_is_given_once():
+    effect = 'payload@wrist_pitch:payload_m=0.9'
+    with pytest.raises(ModelError, match='twice'):
+        ar.ArmModel.of('humanoid_arm', effects=(effect, effect))
+    with pytest.raises(RobotError, match='NAME:=VALUE'):
+        ar.load_robot('arm.xacro hand=false')

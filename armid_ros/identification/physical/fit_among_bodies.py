@@ -410,7 +410,6 @@ def bodily_prior(arm: ArmModel) -> tuple[FloatArray, tuple[str, ...]]:
         second = matrix[:3, :3] - mass * np.outer(center, center)
         values, axes = np.linalg.eigh(second)
         # A nearly singular prior forbids any load on the link, and other links get its mass.
-        # Doubtful: a radius of gyration below 0.16 mm, or thin compared with the length.
         if values[0] < mass * 0.00016**2 or values[0] < THINNEST**2 * values[2]:
             # 0.03 m: a housing of 0.1 m in diameter, between solid (25 mm) and hollow (35 mm)
             least = max(mass * 0.03**2, 1e-2 * values[2])
