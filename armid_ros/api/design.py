@@ -27,6 +27,7 @@ from armid_ros.identification import SignalSettings
 from armid_ros.identification.rows.signals import conditioning, segments
 from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording
+from armid_ros.robots import Robot
 import numpy as np
 
 
@@ -131,15 +132,7 @@ def design_excitation(
 
     """
     model = drivable(arm)
-    robot = model.robot
-    if isinstance(joint_limits, Mapping):
-        robot = with_joint_limits(robot, None, [f'{j}:={v}' for j, v in joint_limits.items()])
-    elif joint_limits is not None:
-        robot = with_joint_limits(robot, joint_limits)
-    if acceleration is not None:
-        given = np.nan_to_num(acceleration, nan=np.inf)
-        require_narrower(robot, 'acceleration', given, robot.acceleration_limit)
-        robot = replace(robot, acceleration_limit=np.minimum(given, robot.acceleration_limit))
+    robot = _with_limits(model.robot, joint_limits, acceleration)
     model = replace(model, robot=robot)
     # one search for an arm of many joints, as each step takes seconds
     searches, seconds = (1, 25.0) if robot.n_joints > 20 else (4, 120.0)
@@ -168,6 +161,23 @@ def design_excitation(
 
 
 excite = design_excitation  # name of the command
+
+
+def _with_limits(
+    robot: Robot,
+    joint_limits: str | Path | Mapping[str, float] | None,
+    acceleration: FloatArray | None,
+) -> Robot:
+    """Return a robot with given limits, which may only narrow its own."""
+    if isinstance(joint_limits, Mapping):
+        robot = with_joint_limits(robot, None, [f'{j}:={v}' for j, v in joint_limits.items()])
+    elif joint_limits is not None:
+        robot = with_joint_limits(robot, joint_limits)
+    if acceleration is None:
+        return robot
+    given = np.nan_to_num(acceleration, nan=np.inf)
+    require_narrower(robot, 'acceleration', given, robot.acceleration_limit)
+    return replace(robot, acceleration_limit=np.minimum(given, robot.acceleration_limit))
 
 
 def _searched(
