@@ -116,8 +116,9 @@ def package_folders(
         The given folder, if any. Otherwise, in this order: folders whose package.xml has the name,
         which enclose the file or are next to an enclosing folder; such folders in
         ROS_PACKAGE_PATH; the folder in AMENT_PREFIX_PATH; folders of that name without a
-        package.xml, which enclose the file or are next to an enclosing folder. A copy of such a folder around the file, which
-        has all its subfolders and the file at the same path, comes before it.
+        package.xml, which enclose the file or are next to an enclosing folder. A copy of such a
+        folder around the file, which has all its subfolders and the file at the same path, comes
+        before it.
 
     """
     path = (file or Path()).resolve()
