@@ -274,7 +274,7 @@ class IdentificationResult(ShownModel):
         bodies = []
         if core.bodies_cost is not None:
             grows = f'(torque error {100.0 * max(core.bodies_cost, 0.0):.2g} % larger)'
-            bodies = [f'no physically consistent links near the described fit as well {grows}']
+            bodies = [f'no consistent links near the described fit as well {grows}: --physical']
             if self.exports:
                 bodies = [f'links are physically consistent {grows}; {", ".join(self.exports)}']
                 bodies += far_from_described(
