@@ -213,8 +213,15 @@ class CauseComparison:
         if not able or max(one.odds for one in able) < levels.alarm:
             return None
         first = able[0]
-        # the same law on some of the joints, unless the lead of all is more than laws are inexact
-        parts = [one for one in able if one is first or one.is_part_of(first)]
+        # the same law on some of the joints, unless the lead of all is more than laws are inexact;
+        # or the same law by a more usual name
+        parts = [
+            one
+            for one in able
+            if one is first
+            or one.is_part_of(first)
+            or (one.cause.prior > first.cause.prior and one.is_same_law(first, levels.inexact))
+        ]
         winner = min(parts, key=lambda one: first.ahead(one, levels))
         others = [one for one in able if one is not winner]
         # The log odds of a rival are the larger ones of those with and without a small lead.

@@ -129,17 +129,29 @@ class Ranked:
         Return the log odds over another cause; positive if this one is likelier.
 
         As torque laws are inexact, differences below the share `inexact` of the explained part, or
-        below the share `same_fit` - 1 of the smaller residual, are ignored. If the difference is
-        ignored, the number of values and the prior odds decide.
+        below the share `same_fit` - 1 of the smaller residual, are ignored. So is the difference
+        of two laws with the same column, such as Coulomb friction and presliding over a very short
+        distance: only their misfit differs. If the difference is ignored, the number of values and
+        the prior odds decide.
 
         """
         lead = self.fit.explained - other.fit.explained
+        if self.is_same_law(other, levels.inexact):
+            lead = 0.0
         slack = min(
             levels.inexact * max(self.fit.explained, other.fit.explained),
             (levels.same_fit - 1.0) * max(min(self.left, other.left), 0.0),
         )
         seen = float(np.sign(lead)) * max(abs(lead) - slack, 0.0)
         return seen + (self.worth - self.fit.explained) - (other.worth - other.fit.explained)
+
+    def is_same_law(self, other: Ranked, inexact: float) -> bool:
+        """Return whether two causes with one value have the same columns, but for a share."""
+        one, two = self.cause, other.cause
+        if one.joints != two.joints or max(len(one.unit), len(two.unit)) > 1:
+            return False
+        cross = sum(float(np.vdot(a, b)) for a, b in zip(one.columns, two.columns, strict=True))
+        return bool(cross**2 >= (1.0 - inexact) * one.own.sum() * two.own.sum() > 0.0)
 
     def is_part_of(self, other: Ranked) -> bool:
         """Return whether the other cause is the same law on these and more joints."""
