@@ -22,7 +22,7 @@ from armid_ros.excitation import (
     whole_period,
     with_joint_limits,
 )
-from armid_ros.excitation.limits import require_narrower
+from armid_ros.excitation.limits import with_acceleration_limit
 from armid_ros.identification import SignalSettings
 from armid_ros.identification.rows.signals import conditioning, segments
 from armid_ros.motion import FloatArray
@@ -173,11 +173,7 @@ def _with_limits(
         robot = with_joint_limits(robot, None, [f'{j}:={v}' for j, v in joint_limits.items()])
     elif joint_limits is not None:
         robot = with_joint_limits(robot, joint_limits)
-    if acceleration is None:
-        return robot
-    given = np.nan_to_num(acceleration, nan=np.inf)
-    require_narrower(robot, 'acceleration', given, robot.acceleration_limit)
-    return replace(robot, acceleration_limit=np.minimum(given, robot.acceleration_limit))
+    return robot if acceleration is None else with_acceleration_limit(robot, acceleration)
 
 
 def _searched(

@@ -299,11 +299,18 @@ def with_joint_limits(
             )
         with reading(f'joint {joint}', TrajectoryError):
             top[robot.joints.index(joint)] = _positive(number, 'velocity')
-    require_narrower(robot, 'velocity', top, described)
+    _require_narrower(robot, 'velocity', top, described)
     return replace(robot, velocity_limit=top)
 
 
-def require_narrower(
+def with_acceleration_limit(robot: Robot, limit: FloatArray) -> Robot:
+    """Return a robot with given limits, (n,) [rad/s^2 or m/s^2], which only narrow others."""
+    limit = np.nan_to_num(limit, nan=np.inf)
+    _require_narrower(robot, 'acceleration', limit, robot.acceleration_limit)
+    return replace(robot, acceleration_limit=np.minimum(limit, robot.acceleration_limit))
+
+
+def _require_narrower(
     robot: Robot, quantity: str, given: FloatArray, described: FloatArray
 ) -> None:
     """Raise a TrajectoryError if a given limit, of shape (n,), exceeds the described one."""

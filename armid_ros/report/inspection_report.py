@@ -115,10 +115,7 @@ def headline(remarks: Sequence[Remark], found: LinkCheck | None) -> tuple[str, .
     elif found.agrees:
         first = 'The links of the URDF agree with the recording.'
     elif found.explained < 0.9:  # with a smaller share, links are not the cause
-        first = (
-            'The URDF differs from the recording in more than three links, or an effect is '
-            'missing, such as rotor_inertia: --effects.'
-        )
+        first = 'The URDF differs in more than three links, or --effects lacks one, as of rotors.'
     else:
         known = [text for k in found.wrong if (text := _wrong_mass(found, k))]
         others = [found.joints[k] for k in found.wrong if not _wrong_mass(found, k)]

@@ -37,8 +37,7 @@ import scipy.linalg
 #: Relative size of a pseudo-inertia in any direction, up to which it is at the limit of physical
 #: consistency; relative distance to a wall of a box, up to which it is at the wall.
 _ACTIVE_SHARE = 1e-3
-#: Thickness of a link over its length, below which a described inertia is doubtful: an arm link of
-#: 0.5 m is thicker than 25 mm.
+#: Thickness of a link over its length, below which a described inertia is doubtful.
 THINNEST = 0.05
 
 
@@ -409,7 +408,6 @@ def bodily_prior(arm: ArmModel) -> tuple[FloatArray, tuple[str, ...]]:
         center = matrix[:3, 3] / mass
         second = matrix[:3, :3] - mass * np.outer(center, center)
         values, axes = np.linalg.eigh(second)
-        # A nearly singular prior forbids any load on the link, and other links get its mass.
         if values[0] < mass * 0.00016**2 or values[0] < THINNEST**2 * values[2]:
             # 0.03 m: a housing of 0.1 m in diameter, between solid (25 mm) and hollow (35 mm)
             least = max(mass * 0.03**2, 1e-2 * values[2])
