@@ -108,19 +108,22 @@ class InspectionResult(Shown):
         heads, found = joint_heads(self.core), self.core
         trial = found.trial
         good = trial is not None and not trial.refused and trial.grade != 'unusable'
-        fix = 'Correct these faults or record again, and inspect the new recording.'
+        fix = 'Correct the recording as stated, or record again; then inspect the new recording.'
         topics = [
             f'{one.name}: {one.count} x {one.type_name}'
             + ' (read)' * (one.name == found.recording.topic)
             for one in found.topics
         ]
+        fitness = f'{found.recording.source}: {found.verdict}'
+        faulty = any(remark.weight == 'bad' for remark in found.remarks)
+        first, *others = [*self.remarks, fitness] if faulty else [fitness, *self.remarks]
         return Summary(
-            f'{found.recording.source}: {found.verdict}',
+            first,
             inspection_word(found),
             heads=heads[:4] + heads[7:],
             rows=[row[:4] + row[7:] for row in joint_rows(found)],
             lines=(
-                *self.remarks,
+                *others,
                 *(f'{name}: {value}' for name, value in recording_facts(found)),
                 *topics,
             ),

@@ -94,7 +94,7 @@ def verdict(comparison: Comparison) -> tuple[str, str]:
 def next_step(comparison: Comparison) -> str:
     """Return the next step, which a command follows."""
     if comparison.anything or comparison.unusable:
-        return 'If you did not expect this, find its cause in the later recordings.'
+        return 'If you expected this, use the later model. If not, diagnose the later recordings.'
     return 'Identify from all recordings together, for smaller intervals.'
 
 
