@@ -345,7 +345,7 @@ def springs() -> Figure:
         model = ideal_response(found.parameters, k, frequency)[:, 0, 0]
         axes.plot(frequency, _decibel(own.decoupled[seen, 0]), '.', color=GREY, label='measured')
         axes.plot(frequency, _decibel(model), color=BLUE, label='motor, spring and link')
-        axes.set(xscale='log', title=joint.joint, xlabel='frequency [Hz]')
+        axes.set(xscale='log', title=joint, xlabel='frequency [Hz]')
         axes.set_xticks([10, 20, 40, 80], ['10', '20', '40', '80'])
         axes.minorticks_off()
     panels[0].set_ylabel('velocity over torque [dB]')
