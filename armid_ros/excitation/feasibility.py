@@ -162,7 +162,7 @@ def random_feasible(
     found = _shrunk(arm, limits, centred, clearance, 48)
     if found is None:
         raise TrajectoryError(
-            f'no motion centred this pose is feasible: {", ".join(f"{x:.2f}" for x in centre)}'
+            f'no motion around this pose is feasible: {", ".join(f"{x:.2f}" for x in centre)}'
             f': {trajectory_faults(arm, limits, centred.scaled(0.01), clearance)}'
         )
     return found

@@ -29,6 +29,9 @@ SLOW_VELOCITY = 0.5
 #: Largest share of the velocity and acceleration limits in a run of each speed class.
 SPEED_CLASSES = {'slow': 0.15, 'medium': 0.4, 'fast': 0.9}
 
+#: Relative tolerance of the comparison of numbers with limits.
+_ROUNDING = 1e-9
+
 
 @dataclass(frozen=True)
 class Limits:
@@ -220,8 +223,7 @@ def check_limits(
             f'the motion has joints {", ".join(motion.joints)}, '
             f'but the limits are for {", ".join(limits.joints)}'
         )
-    tolerance = 1e-9  # relative, for rounding
-    slack = tolerance * np.where(np.isfinite(limits.upper), np.abs(limits.upper) + 1.0, 1.0)
+    slack = _ROUNDING * np.where(np.isfinite(limits.upper), np.abs(limits.upper) + 1.0, 1.0)
     checks = [
         ('lower position', motion.q, limits.lower, limits.lower - slack - motion.q),
         ('upper position', motion.q, limits.upper, motion.q - limits.upper - slack),
@@ -230,7 +232,7 @@ def check_limits(
     for name, values in (('velocity', motion.dq), ('acceleration', motion.ddq), ('torque', tau)):
         if values is not None:
             bound = getattr(limits, name)
-            checks.append((name, values, bound, np.abs(values) - (1.0 + tolerance) * bound))
+            checks.append((name, values, bound, np.abs(values) - (1.0 + _ROUNDING) * bound))
     found = []
     for name, values, bound, excess in checks:
         for j in np.flatnonzero((excess > 0.0).any(axis=0)):
@@ -317,7 +319,7 @@ def _require_narrower(
     for joint, value, limit, slides in zip(
         robot.joints, given, described, robot.prismatic, strict=True
     ):
-        if math.isfinite(value) and value > limit * (1.0 + 1e-9):  # 1e-9: rounding
+        if math.isfinite(value) and value > limit * (1.0 + _ROUNDING):
             unit = ('m' if slides else 'rad') + ('/s' if quantity == 'velocity' else '/s^2')
             hint = ''
             # degrees give a usual share of the limit; 1 % for rounded numbers

@@ -144,8 +144,12 @@ class TransferPlanner:
     @property
     def zero_pose(self) -> FloatArray:
         """Return the pose nearest to zero inside the position limits with reserve, (n,)."""
-        inside = Limits.of(self.arm.robot)
-        return np.clip(np.zeros(len(inside.joints)), inside.lower, inside.upper)
+        return self._as_start(self.arm.robot.zero_pose)
+
+    def _as_start(self, q: FloatArray) -> FloatArray:
+        """Return poses, (..., n), moved inside the position limits with reserve."""
+        limits = Limits.of(self.arm.robot)
+        return np.clip(q, limits.lower, limits.upper)
 
     def free_start(self) -> FloatArray:
         """
@@ -161,11 +165,11 @@ class TransferPlanner:
         reason = self.fault(zero)
         if not reason:
             return zero
-        rng, inside = np.random.default_rng(0), Limits.of(self.arm.robot)
+        rng = np.random.default_rng(0)
         # 200 random poses around zero at each of these distances
         for distance in (0.1, 0.2, 0.4, 0.8, 1.6, 3.2):
             about = zero + distance * rng.uniform(-1.0, 1.0, (200, len(zero)))
-            about = np.clip(about, inside.lower, inside.upper)
+            about = self._as_start(about)
             about = about[np.argsort(np.linalg.norm(about - zero, axis=1))]
             for q in about:
                 if not self.fault(q):
@@ -184,8 +188,7 @@ class TransferPlanner:
             if not self.fault(other):
                 q = other
         rounded = np.where(q == zero, zero, np.round(q, 2))  # few decimals, for the command line
-        inside = Limits.of(self.arm.robot)
-        rounded = np.clip(rounded, inside.lower, inside.upper)
+        rounded = self._as_start(rounded)
         return q if self.fault(rounded) else rounded
 
     def _overload(self, q: FloatArray) -> str:
