@@ -120,7 +120,7 @@ def kernel_body(
     Returns
     -------
     BodyOfKernel or None
-        None if the kernel was not compiled, or does not support so many joints.
+        None without a compiled kernel, or for more joints than it supports.
 
     """
     library, n = kernel(), robot.n_joints

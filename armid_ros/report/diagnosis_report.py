@@ -204,8 +204,8 @@ def _verdict(
             f'before in {", ".join(worse)}; see Forward validation.'
         )
     first, stop, more = pretty(with_names(diagnosis.summary, names)).partition('. ')
-    badge, bars = diagnosis.verdict.replace('_', ' '), None
-    badge = 'cause named' if badge == 'named' else badge
+    badge = {'named': 'cause named'}.get(diagnosis.verdict, diagnosis.verdict.replace('_', ' '))
+    bars = None
     if diagnosis.gap is not None and diagnosis.verdict != 'bad_data':
         bars = share_bars(diagnosis) if diagnosis.findings else gap_bars(diagnosis, diagnosis.gap)
     sentences = [first + stop.rstrip(), *filter(None, [more])]

@@ -61,7 +61,7 @@ POWER = Shape('power', '', 0.3, 4.0, 2.0, (1.0, 2.0))
 
 
 @pytest.mark.parametrize(
-    ('shape', 'value', 'half', 'told'),
+    ('shape', 'value', 'half', 'expected'),
     [
         (TIME, 206.0, 40.0, True),
         (TIME, 206.0, 25000.0, False),
@@ -72,5 +72,7 @@ POWER = Shape('power', '', 0.3, 4.0, 2.0, (1.0, 2.0))
         (POWER, 2.0, 3.0, False),
     ],
 )
-def test_a_shape_is_determined_where_its_interval_leaves_something_out(shape, value, half, told):
-    assert shape.determined(value, half) is told
+def test_a_shape_is_determined_where_its_interval_leaves_something_out(
+    shape, value, half, expected
+):
+    assert shape.determined(value, half) is expected

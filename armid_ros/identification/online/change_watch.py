@@ -116,7 +116,7 @@ class NuisanceRows:
         # friction per unit of each quantity; every quantity acts on its own joint only
         torques = np.empty((len(rows), motion.n_joints, len(self._effects)))
         for k, effect in enumerate(self._effects):
-            if k % 2 == 0:  # effects in one piece of work
+            if k % 2 == 0:  # two effects in one piece of work
                 yield
             torques[:, :, k] = np.diagonal(effect.columns(motion, self._arm), axis1=1, axis2=2)
         columns = np.zeros((*torques.shape, motion.n_joints))
