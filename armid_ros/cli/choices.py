@@ -19,7 +19,7 @@ ESTIMATORS = ('ols', 'wls', 'irls', 'iv')
 TIME_UNITS = ('s', 'ms', 'us', 'ns')
 #: `armid_ros.excitation.SPEED_CLASSES`.
 SPEED_CLASSES = ('slow', 'medium', 'fast')
-#: `armid_ros.diagnosis.search.priors.HOW_OFTEN`.
+#: `armid_ros.diagnosis.settings.HOW_OFTEN`.
 HOW_OFTEN = ('often', 'usual', 'seldom', 'never')
 #: The longest run [s]; `armid_ros.excitation.schedule.MAX_DURATION`.
 MAX_DURATION = 86400.0

@@ -16,9 +16,8 @@ from dataclasses import replace
 from armid_ros.arm import ArmModel, Misfit
 from armid_ros.arm.memoized_arm import memoized_arm, plain_arm
 from armid_ros.diagnosis.data.baseline import Baseline
-from armid_ros.diagnosis.data.evidence import Evidence, noise_floor
+from armid_ros.diagnosis.data.evidence import Evidence, noise_floor, not_repeating
 from armid_ros.diagnosis.data.trajectory import trajectories, Trajectory
-from armid_ros.diagnosis.doubt import doubt_of, doubted
 from armid_ros.diagnosis.prepare import choose_filters, mended, prepare, with_friction
 from armid_ros.diagnosis.search.explainer import Explainer
 from armid_ros.diagnosis.search.explanation import Explanation, NOISE
@@ -27,11 +26,10 @@ from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.diagnosis.ties import diagnose_ties
 from armid_ros.diagnosis.verdict.attribution import Attribution, headline
 from armid_ros.diagnosis.verdict.bodies import as_placed_bodies
-from armid_ros.diagnosis.verdict.data_remarks import data_remarks
-from armid_ros.diagnosis.verdict.finding import Diagnosis, Finding
-from armid_ros.diagnosis.verdict.gap import measure_gap, not_repeating
+from armid_ros.diagnosis.verdict.finding import Diagnosis, Finding, Gap
 from armid_ros.diagnosis.verdict.naming import findings, small_print
 from armid_ros.diagnosis.verdict.remaining_misfit import locate_blocked_joints, RemainingMisfit
+from armid_ros.diagnosis.verdict.remarks import data_remarks, doubt_of, doubted
 from armid_ros.diagnosis.verdict.where import locate_gap, locate_remaining_gap
 from armid_ros.diagnosis.verdict.words import decide
 from armid_ros.errors import IdentificationError
@@ -247,7 +245,7 @@ def _as_diagnosis(
     resting, laws = excess.at_rest(), excess.of_laws()
     different = not_repeating(floors, settings.thresholds, settings.material * evidence.torque_rms)
     explanation = explanation if found else replace(explanation, reference=explanation.fitted)
-    gap = measure_gap(explanation, unseen)
+    gap = Gap.of(explanation, unseen)
     word = decide(
         found,
         [arm.robot.joints[k] for k in different] if explanation.measured else (),

@@ -22,8 +22,7 @@ from armid_ros.diagnosis.search.cause import NamedEffect
 from armid_ros.diagnosis.search.comparison import settings_alone
 from armid_ros.diagnosis.search.explainer import Explainer
 from armid_ros.diagnosis.search.explanation import at_floor, explain, Explanation, survey
-from armid_ros.diagnosis.search.patch import places
-from armid_ros.diagnosis.search.posterior import Fitted, JointFit
+from armid_ros.diagnosis.search.posterior import Fitted, JointFit, places
 from armid_ros.diagnosis.search.trial import Trial
 from armid_ros.effects.tied import Partner, Tied, TiedInteraction, TiedSlack
 from armid_ros.errors import IdentificationError

@@ -14,7 +14,7 @@ import armid_ros as ar
 from armid_ros.cli import choices
 from armid_ros.cli.commands import main
 from armid_ros.cli.terminal import progress_line, say
-from armid_ros.diagnosis.search.priors import HOW_OFTEN
+from armid_ros.diagnosis.settings import HOW_OFTEN
 from armid_ros.effects import CATALOGUE, USUAL_EFFECTS
 from armid_ros.effects.catalogue import EXAMPLES
 from armid_ros.excitation import CRITERIA, SPEED_CLASSES, TARGETS

@@ -6,8 +6,8 @@ from dataclasses import replace
 
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis import diagnose, known_misfit
-from armid_ros.diagnosis.doubt import doubt_of_names
 from armid_ros.diagnosis.verdict.finding import Finding
+from armid_ros.diagnosis.verdict.remarks import doubt_of_names
 from armid_ros.effects import make_effect
 from armid_ros.identification import identify
 from armid_ros.model import inverse_dynamics

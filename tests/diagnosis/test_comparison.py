@@ -16,9 +16,8 @@ from armid_ros.diagnosis.search.odds import (
     odds,
     without,
 )
-from armid_ros.diagnosis.search.priors import SIZES, THERE
 from armid_ros.diagnosis.search.setting import Setting
-from armid_ros.diagnosis.settings import Thresholds
+from armid_ros.diagnosis.settings import DiagnosisSettings, SIZES, THERE
 from armid_ros.effects import CATALOGUE
 from armid_ros.identification.rows.signals import Conditioning
 import numpy as np
@@ -168,7 +167,7 @@ def test_earlier_causes_without_significance_are_dropped(nuisance):
         both = nuisance
         for cause in order:
             both = both.and_cause(cause, 1.0)
-        comparison = CauseComparison(both, None, Thresholds(), (setting,))
+        comparison = CauseComparison(both, None, DiagnosisSettings(), (setting,))
         accepted, left = comparison._pruned(list(order), both)
         assert accepted == [order[1]] and len(left.accepted) == 1
 

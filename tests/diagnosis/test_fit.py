@@ -4,8 +4,7 @@
 
 from armid_ros.diagnosis.data.evidence import Evidence, noise_floor
 from armid_ros.diagnosis.search.cause import NamedEffect
-from armid_ros.diagnosis.search.patch import patch_columns
-from armid_ros.diagnosis.search.posterior import JointFit
+from armid_ros.diagnosis.search.posterior import JointFit, patch_columns
 from armid_ros.effects import CATALOGUE
 import numpy as np
 import pytest

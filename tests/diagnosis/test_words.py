@@ -4,10 +4,9 @@
 
 from dataclasses import replace
 
-from armid_ros.diagnosis.data.evidence import NoiseFloor
+from armid_ros.diagnosis.data.evidence import NoiseFloor, not_repeating
 from armid_ros.diagnosis.settings import Thresholds
 from armid_ros.diagnosis.verdict.finding import Finding, Rival
-from armid_ros.diagnosis.verdict.gap import not_repeating
 from armid_ros.diagnosis.verdict.where import Excess
 from armid_ros.diagnosis.verdict.words import (
     decide,

@@ -18,7 +18,7 @@ from functools import cached_property
 
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.data.trajectory import block_rows, row_weights, Trajectory
-from armid_ros.diagnosis.settings import DiagnosisSettings
+from armid_ros.diagnosis.settings import DiagnosisSettings, Thresholds
 from armid_ros.identification.rows.signals import TORQUE_RESOLUTION
 from armid_ros.motion import FloatArray
 import numpy as np
@@ -223,6 +223,36 @@ def noise_floor(trajectory: Trajectory, arm: ArmModel) -> NoiseFloor:
     sigma = np.maximum(sigma, least)
     period = lag * float(motion.t[1] - motion.t[0])
     return NoiseFloor(sigma, period, structure, slow, rough)
+
+
+def not_repeating(
+    floors: Sequence[NoiseFloor], thresholds: Thresholds, least: FloatArray
+) -> list[int]:
+    """
+    Return the joints whose equal periods differ slowly and by a material amount.
+
+    Parameters
+    ----------
+    floors : sequence of NoiseFloor
+        Noise of the recordings.
+    thresholds : Thresholds
+        Power ratios (low over high frequency) above which periods do not repeat.
+    least : ndarray, shape (n,)
+        Smallest material torque of each joint [N m].
+
+    """
+    known = [
+        np.where(floor.slow > least, floor.structure, 1.0)
+        for floor in floors
+        if floor.period is not None
+    ]
+    if not known:
+        return []
+    often = np.sum(np.array(known) >= thresholds.one_period, axis=0) >= max(1, len(known) / 2)
+    if len(known) >= 3:
+        mean = np.exp(np.mean(np.log(known), axis=0))
+        often |= mean > thresholds.one_period_on_average
+    return np.flatnonzero(often).tolist()
 
 
 def _difference(

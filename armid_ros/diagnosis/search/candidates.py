@@ -24,8 +24,8 @@ from armid_ros.diagnosis.data.trajectory import Trajectory
 from armid_ros.diagnosis.search.cause import Cause
 from armid_ros.diagnosis.search.nuisance import Nuisance
 from armid_ros.diagnosis.search.odds import CauseInformation, odds
-from armid_ros.diagnosis.search.priors import HOW_OFTEN, log_prior
 from armid_ros.diagnosis.search.setting import Marginal
+from armid_ros.diagnosis.settings import HOW_OFTEN, log_prior
 from armid_ros.effects import Effect, Shape
 from armid_ros.effects.base import Unexplained
 from armid_ros.effects.gravity import with_exact_vector
@@ -79,7 +79,7 @@ class Causes:
     def causes(self, nuisance: Nuisance, under: Marginal) -> list[Cause]:
         """Return the causes that are not accepted yet, one for each starting shape."""
         arm, result, families = nuisance.arm, list[Cause](), list[Cause]()
-        there = [term.cause.effect for term in nuisance.accepted]
+        there = [one.effect for one in nuisance.accepted]
         taken = {(one.name, place) for one in there for place in (one.joints, *zip(one.joints))}
         bodies = {one.adds_to(arm.robot) for one in there} - {()}
         unexplained = _unexplained(nuisance, under)

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""A candidate cause: an effect with a shape on certain joints, and its columns."""
+"""A candidate cause: an effect with a shape on certain joints, its columns and its bounds."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
+from armid_ros.arm import ArmModel
 from armid_ros.effects import Effect
 from armid_ros.motion import FloatArray
 from armid_ros.robots import Robot
@@ -41,6 +42,13 @@ class Cause:
         Root mean square torque per unit of each value on the diagnosed day [N m].
     shapes : int
         Number of shapes that were tried.
+    size : float
+        Standard deviation of the prior of its values, over their unit, once it is accepted.
+    always : bool
+        Whether it acts on both days, once it is accepted.
+    known : (ndarray, shape (p,), float, float), optional
+        Direction among its values along which their sum is known, the sum, and its standard
+        deviation.
 
     """
 
@@ -55,6 +63,9 @@ class Cause:
     aim: FloatArray
     torque: FloatArray
     shapes: int = 1
+    size: float = 1.0
+    always: bool = False
+    known: tuple[FloatArray, float, float] | None = None
 
     @property
     def key(self) -> tuple[str, tuple[str, ...], tuple[int, ...]]:
@@ -63,7 +74,17 @@ class Cause:
 
     def acts(self, today: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
         """Return whether the cause acts in each recording or group: today, or on both days."""
-        return np.ones_like(today) if self.effect.lasting else today
+        return np.ones_like(today) if self.always or self.effect.lasting else today
+
+    @cached_property
+    def density(self) -> tuple[FloatArray, FloatArray, float]:
+        """Return the prior precision (p, p), its product with the mean, and half of its loss."""
+        precision = np.diag((self.size * self.unit) ** -2.0)
+        if self.known is None:
+            return precision, np.zeros(len(precision)), 0.0
+        direction, total, std = self.known
+        aim = direction * total / std**2
+        return precision + np.outer(direction, direction) / std**2, aim, 0.5 * (total / std) ** 2
 
     def at(self, values: FloatArray, robot: Robot) -> NamedEffect:
         """Return the effect with its fitted values; its other parameters are zero."""
@@ -106,41 +127,6 @@ class Cause:
 
 
 @dataclass(frozen=True)
-class CauseTerm:
-    """
-    A cause among the nuisance columns.
-
-    Attributes
-    ----------
-    cause : Cause
-        The cause.
-    size : float
-        Standard deviation of the prior of its values, over their unit.
-    acts : ndarray of bool, shape (K,)
-        Whether it acts in each recording.
-    known : (ndarray, shape (p,), float, float), optional
-        Direction among its values along which their sum is known, the sum, and its standard
-        deviation.
-
-    """
-
-    cause: Cause
-    size: float
-    acts: npt.NDArray[np.bool_]
-    known: tuple[FloatArray, float, float] | None = None
-
-    @cached_property
-    def prior(self) -> tuple[FloatArray, FloatArray, float]:
-        """Return the prior precision (p, p), its product with the mean, and half of its loss."""
-        precision = np.diag((self.size * self.cause.unit) ** -2.0)
-        if self.known is None:
-            return precision, np.zeros(len(precision)), 0.0
-        direction, total, std = self.known
-        aim = direction * total / std**2
-        return precision + np.outer(direction, direction) / std**2, aim, 0.5 * (total / std) ** 2
-
-
-@dataclass(frozen=True)
 class NamedEffect:
     """
     A named effect with its values.
@@ -159,3 +145,16 @@ class NamedEffect:
     effect: Effect
     kept: tuple[int, ...]
     values: FloatArray
+
+
+def room(effect: Effect, arm: ArmModel) -> tuple[FloatArray, FloatArray]:
+    """Return the bounds of values that are added to those of the arm, each (P,)."""
+    lower, upper = effect.bounds()
+    there = {
+        name: value
+        for own, values in zip(arm.effects, arm.values, strict=True)
+        if isinstance(effect, type(own)) and not own.shapes and not own.points
+        for name, value in zip(own.parameters(arm.robot), values.tolist(), strict=True)
+    }
+    values = np.array([there.get(name, 0.0) for name in effect.parameters(arm.robot)])
+    return lower - values, upper - values

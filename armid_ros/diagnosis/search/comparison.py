@@ -27,10 +27,9 @@ from armid_ros.diagnosis.search.odds import (
     unbounded_odds,
     usual_spread,
 )
-from armid_ros.diagnosis.search.priors import UNLISTED
 from armid_ros.diagnosis.search.setting import LASTING, Marginal, Setting
-from armid_ros.diagnosis.search.trial import Look, Ranked
-from armid_ros.diagnosis.settings import Thresholds
+from armid_ros.diagnosis.search.trial import Look, Ranked, Trial
+from armid_ros.diagnosis.settings import DiagnosisSettings, UNLISTED
 from armid_ros.effects import Effect
 from armid_ros.motion import FloatArray
 import numpy as np
@@ -53,37 +52,16 @@ _SAMPLED = 8
 
 
 @dataclass(frozen=True)
-class Accepted:
-    """
-    An accepted cause with its rivals.
-
-    Attributes
-    ----------
-    best : Ranked
-        The cause.
-    tied : tuple of Ranked
-        Rivals: causes within the odds of a tie, the likeliest first.
-    look : Look
-        The comparison of all causes in which it was found.
-
-    """
-
-    best: Ranked
-    tied: tuple[Ranked, ...]
-    look: Look
-
-
-@dataclass(frozen=True)
 class Result:
     """
     Result of a comparison.
 
     Attributes
     ----------
-    accepted : tuple of Accepted
-        The causes, in the order in which they were found.
+    accepted : tuple of Trial
+        The accepted causes with their rivals, in the order in which they were found.
     nuisance : Nuisance
-        Nuisance parameters, and the accepted causes among them.
+        Nuisance parameters, and the accepted causes among them, in the same order.
     under : Marginal
         Fit of the nuisance parameters under the likeliest setting.
     first : Look
@@ -93,7 +71,7 @@ class Result:
 
     """
 
-    accepted: tuple[Accepted, ...]
+    accepted: tuple[Trial, ...]
     nuisance: Nuisance
     under: Marginal
     first: Look
@@ -111,8 +89,8 @@ class CauseComparison:
         The data and the nuisance columns.
     catalogue : Causes
         The causes.
-    thresholds : Thresholds
-        Odds that decide.
+    settings : DiagnosisSettings
+        Odds that decide, and the share of a torque that is material.
     grid : tuple of Setting
         Amplitudes of discrepancy and noise; see `settings_of_baseline`.
 
@@ -120,7 +98,7 @@ class CauseComparison:
 
     nuisance: Nuisance
     catalogue: Causes
-    thresholds: Thresholds
+    settings: DiagnosisSettings
     grid: tuple[Setting, ...]
     _marginals: dict[int, tuple[Nuisance, list[Marginal]]] = field(
         default_factory=dict, compare=False
@@ -141,13 +119,13 @@ class CauseComparison:
 
     def begun(self, before: Result) -> Result:
         """Return the refitted causes of another comparison that act on the whole arm."""
-        accepted = [one for one in before.accepted if not one.best.cause.effect.joints]
+        accepted = tuple(trial for trial in before.accepted if not trial.effect.joints)
         nuisance = self.nuisance
-        for one in accepted:
-            cause = self.catalogue.renewed(one.best.cause)
-            nuisance = nuisance.and_cause(cause, one.best.fit.size)
+        for one in before.nuisance.accepted:
+            if not one.effect.joints:
+                nuisance = nuisance.and_cause(self.catalogue.renewed(one), one.size)
         under = self._likeliest(nuisance)
-        return replace(before, accepted=tuple(accepted), nuisance=nuisance, under=under)
+        return replace(before, accepted=accepted, nuisance=nuisance, under=under)
 
     def found(self, begun: Result | None = None) -> Result:
         """
@@ -166,43 +144,48 @@ class CauseComparison:
         under = self._likeliest(nuisance)
         return replace(result, accepted=tuple(accepted), nuisance=nuisance, under=under)
 
-    def _extended(self, accepted: list[Accepted], look: Look) -> tuple[list[Accepted], Nuisance]:
+    def _extended(self, accepted: list[Trial], look: Look) -> tuple[list[Trial], Nuisance]:
         """Accept the best cause until none is significant."""
         nuisance = look.nuisance
         while len(accepted) < _MOST:
-            explained = sum(max(one.best.data, 0.0) for one in accepted)
-            best = self.best(look, explained)
+            best = self.best(look, accepted)
             if best is None:
                 break
-            nuisance = nuisance.and_cause(best.best.cause, best.best.fit.size)
-            accepted, nuisance = self._pruned([*accepted, best], nuisance)
+            winner, trial = best
+            nuisance = nuisance.and_cause(winner.cause, winner.fit.size)
+            accepted, nuisance = self._pruned([*accepted, trial], nuisance)
             look = self.look(nuisance)
         return accepted, nuisance
 
     def _exchanged(
-        self, accepted: list[Accepted], nuisance: Nuisance
-    ) -> tuple[list[Accepted], Nuisance]:
+        self, accepted: list[Trial], nuisance: Nuisance
+    ) -> tuple[list[Trial], Nuisance]:
         """Replace a cause that resembles several others if these explain more without it."""
         # the last cause was selected with all others in the model
         for k, one in enumerate(accepted[:-1]):
             look = self.look(nuisance.without(k))
             others = [*accepted[:k], *accepted[k + 1 :]]
-            best = self.best(look, sum(max(other.best.data, 0.0) for other in others))
-            if best is None or best.best.cause.key == one.best.cause.key:
+            best = self.best(look, others)
+            if best is None or best[1].key == one.key:
                 continue
             found = self._extended(others, look)
-            if self._worth(*found) > self._worth(accepted, nuisance) + self.thresholds.tie:
+            if self._worth(found[1]) > self._worth(nuisance) + self.settings.thresholds.tie:
                 return self._exchanged(*found)
         return accepted, nuisance
 
-    def _worth(self, accepted: Sequence[Accepted], nuisance: Nuisance) -> float:
+    def _worth(self, nuisance: Nuisance) -> float:
         """Return the log posterior probability of the accepted causes, up to a constant."""
-        prior = sum(one.best.cause.prior for one in accepted)
+        prior = sum(one.prior for one in nuisance.accepted)
         return self._likeliest(nuisance).evidence + prior
 
-    def best(self, look: Look, explained: float) -> Accepted | None:
-        """Return the best cause of a comparison with its rivals; None if none is significant."""
-        levels = self.thresholds
+    def best(self, look: Look, accepted: Sequence[Trial]) -> tuple[Ranked, Trial] | None:
+        """
+        Return the best cause of a comparison, also as a trial with its rivals.
+
+        None if no cause is significant beside the accepted ones.
+
+        """
+        levels, explained = self.settings.thresholds, sum(max(x.gain, 0.0) for x in accepted) / 2.0
         telling = [
             one
             for one in look.ranking
@@ -234,11 +217,15 @@ class CauseComparison:
         )
         total = np.logaddexp.reduce(np.append(behind, 0.0)) + np.logaddexp(0.0, -winner.odds)
         total -= np.log1p(-UNLISTED)
-        rated = [replace(winner, probability=float(np.exp(-total)))]
-        for one, odds_to_winner in zip(others, behind, strict=True):
-            if odds_to_winner > -levels.tie:
-                rated.append(replace(one, probability=float(np.exp(odds_to_winner - total))))
-        return Accepted(rated[0], tuple(rated[1:]), look)
+        material = self.settings.material
+        rivals = [
+            replace(look.trial(one, material), probability=float(np.exp(odds_to_winner - total)))
+            for one, odds_to_winner in zip(others, behind, strict=True)
+            if odds_to_winner > -levels.tie
+        ]
+        trial = look.trial(winner, material)
+        found = replace(trial, probability=float(np.exp(-total)), rivals=tuple(rivals))
+        return winner, found
 
     def _settings(self, nuisance: Nuisance) -> list[Marginal]:
         """Return the fit of the nuisance parameters under each setting."""
@@ -316,26 +303,21 @@ class CauseComparison:
             shape = line_search(gain, shape, k, kind)
         return max(best, key=lambda one: one[0])[1]
 
-    def _pruned(
-        self, accepted: list[Accepted], nuisance: Nuisance
-    ) -> tuple[list[Accepted], Nuisance]:
+    def _pruned(self, accepted: list[Trial], nuisance: Nuisance) -> tuple[list[Trial], Nuisance]:
         """Drop causes whose posterior includes zero, except the last one."""
         while len(accepted) > 1:
             values, covariance = nuisance.whole(self._likeliest(nuisance))
             worth = []
             for one, span in zip(nuisance.accepted, nuisance.spans, strict=True):
-                cause, size = one.cause, one.size
                 mean, own = values[span], covariance[span, span]
                 gain = float(mean @ np.linalg.solve(own, mean)) + np.linalg.slogdet(own)[1]
-                gain -= 2.0 * float(np.sum(np.log(size * cause.unit)))
-                worth.append(0.5 * gain + cause.prior)
+                gain -= 2.0 * float(np.sum(np.log(one.size * one.unit)))
+                worth.append(0.5 * gain + one.prior)
             least = int(np.argmin(worth[:-1]))
-            if worth[least] > self.thresholds.alarm:
+            if worth[least] > self.settings.thresholds.alarm:
                 break
-            accepted, nuisance = (
-                [*accepted[:least], *accepted[least + 1 :]],
-                nuisance.without(least),
-            )
+            accepted = [*accepted[:least], *accepted[least + 1 :]]
+            nuisance = nuisance.without(least)
         return accepted, nuisance
 
 
@@ -344,14 +326,10 @@ def settings_of_baseline(nuisance: Nuisance) -> tuple[Setting, ...]:
     before = np.flatnonzero(~nuisance.rows.today).tolist()
     lasting = 1.0
     for _ in range(2):
-        tried = list[Marginal]()
-        priors = [(x, *nuisance.prior(Setting(1.0, x, 0.0, 1.0, lasting))) for x in _SHARED]
-        for own, noise in product(_OWN, _NOISE):
-            setting = Setting(1.0, _SHARED[0], own, noise, lasting)
-            likelihood = nuisance.likelihood(setting, priors[0][1], before)
-            for shared, used, prior in priors:
-                one = replace(setting, shared=shared)
-                tried.append(Marginal.of(one, used, prior, *likelihood))
+        tried = [
+            nuisance.marginal(Setting(1.0, shared, own, noise, lasting), before)
+            for own, noise, shared in product(_OWN, _NOISE, _SHARED)
+        ]
         found = max(tried, key=lambda one: one.evidence)
         lasting = nuisance.lasting(found, before, LASTING)
     return (replace(found.setting, lasting=lasting),)

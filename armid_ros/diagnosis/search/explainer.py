@@ -132,7 +132,7 @@ class Explainer:
         magnitude, notes = self._magnitude(result)
         setting, constant = result.under.setting, list[int]()
         if setting.body:
-            accepted = [one.cause.effect for one in result.nuisance.accepted]
+            accepted = [one.effect for one in result.nuisance.accepted]
             changed = [p for effect in accepted for p in effect.parameters(self.arm.robot)]
             constant = [k for k, p in enumerate(self.arm.parameters) if p in changed]
         else:
@@ -155,8 +155,8 @@ class Explainer:
         nuisance, arm = result.nuisance, plain_arm(self.arm)
         means = nuisance.means(result.under)
         for one, span in zip(nuisance.accepted, nuisance.spans, strict=True):
-            if not one.cause.effect.joints:
-                named = one.cause.at(means[span], arm.robot)
+            if not one.effect.joints:
+                named = one.at(means[span], arm.robot)
                 arm = with_named(arm, named.effect, named.values)
         return arm.body.gravity
 
@@ -170,9 +170,9 @@ class Explainer:
         nuisance, gravity = result.nuisance, self._gravity(result)
         _, covariance = nuisance.whole(result.under)
         for one, span in zip(nuisance.accepted, nuisance.spans, strict=True):
-            if isinstance(one.cause.effect, GravityVector):
+            if isinstance(one.effect, GravityVector):
                 size = float(np.linalg.norm(gravity))
-                along = gravity[list(one.cause.kept)] / size
+                along = gravity[list(one.kept)] / size
                 std = float(np.sqrt(along @ covariance[span, span] @ along))
                 sizes = {float(np.linalg.norm(g)): name for name, g in GRAVITIES.items()}
                 known = min(sizes, key=lambda other: abs(other - size))
@@ -300,7 +300,7 @@ class Explainer:
         named = frozenset(fitted)
         catalogue = Causes(tuple(kinds), nuisance, changed, named, settings.prior, reference or {})
         used = settings_of_baseline(nuisance) if grid is None else tuple(grid)
-        return CauseComparison(nuisance, catalogue, settings.thresholds, used)
+        return CauseComparison(nuisance, catalogue, settings, used)
 
     def _reference(self) -> dict[str, float] | None:
         """Return the reference temperatures; None if temperatures were not measured throughout."""

@@ -164,12 +164,8 @@ def explain(
     named = list(fitted.named) if fitted else []
     steps, small = list(steps), list[Trial]()
     means = result.nuisance.means(result.under)
-    for one, span in zip(result.accepted, result.nuisance.spans, strict=True):
-        trial = replace(
-            one.look.trial(one.best, material),
-            rivals=tuple(one.look.trial(other, material) for other in one.tied),
-        )
-        cause = one.best.cause
+    causes = zip(result.accepted, result.nuisance.accepted, result.nuisance.spans, strict=True)
+    for trial, cause, span in causes:
         torque = np.max(np.abs(means[span]) * cause.torque, axis=1)
         if not np.any(torque >= material * result.nuisance.rows.torque):
             small.append(trial)

@@ -24,8 +24,8 @@ from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.data.baseline import described_precision, excited
 from armid_ros.diagnosis.data.days import Rows
 from armid_ros.diagnosis.data.discrepancy import discrepancy_columns
-from armid_ros.diagnosis.search.cause import Cause, CauseTerm
-from armid_ros.diagnosis.search.setting import LogDensity, Marginal, MotionDiscrepancy, Setting
+from armid_ros.diagnosis.search.cause import Cause
+from armid_ros.diagnosis.search.setting import Marginal, MotionDiscrepancy, Setting
 from armid_ros.model import BaseParameters
 from armid_ros.motion import FloatArray
 import numpy as np
@@ -64,7 +64,7 @@ class Nuisance:
         Weighted residual of the model.
     column_products : (ndarray, shape (K, q, q), ndarray, shape (K, q))
         Products of these columns with each other and with the residual, in each recording.
-    accepted : tuple of CauseTerm
+    accepted : tuple of Cause
         Accepted causes.
 
     """
@@ -78,7 +78,7 @@ class Nuisance:
     columns: tuple[FloatArray, ...]
     residual: tuple[FloatArray, ...]
     column_products: tuple[FloatArray, FloatArray]
-    accepted: tuple[CauseTerm, ...] = ()
+    accepted: tuple[Cause, ...] = ()
 
     @classmethod
     def of(
@@ -177,10 +177,9 @@ class Nuisance:
         """Products of all columns of each recording, (K, q + a, q + a); causes are last."""
         if not self.accepted:
             return self.column_products[0]
-        acts = [one.acts[:, np.newaxis, np.newaxis].astype(float) for one in self.accepted]
-        pairs = list(zip(acts, (one.cause for one in self.accepted), strict=True))
-        border = np.concatenate([act * cause.products for act, cause in pairs], axis=2)
-        within = np.concatenate([act * self._among_accepted(x) for act, x in pairs], axis=2)
+        border = np.concatenate([self._acting(x) * x.products for x in self.accepted], axis=2)
+        pairs = [self._acting(x) * self._among_accepted(x) for x in self.accepted]
+        within = np.concatenate(pairs, axis=2)
         below = np.concatenate([border.swapaxes(1, 2), within], axis=2)
         return np.concatenate(
             [np.concatenate([self.column_products[0], border], axis=2), below], axis=1
@@ -189,7 +188,7 @@ class Nuisance:
     @cached_property
     def cross(self) -> FloatArray:
         """Products of all columns of each recording with its residual, (K, q + a)."""
-        aims = [one.cause.aim * one.acts[:, np.newaxis] for one in self.accepted]
+        aims = [one.aim * self._acting(one)[:, :, 0] for one in self.accepted]
         return np.concatenate([self.column_products[1], *aims], axis=1)
 
     @cached_property
@@ -199,8 +198,12 @@ class Nuisance:
 
     def _among_accepted(self, cause: Cause) -> FloatArray:
         """Return the cross products of accepted causes with a cause, (K, a, p)."""
-        pairs = [(one.acts[:, np.newaxis, np.newaxis], one.cause) for one in self.accepted]
-        return np.concatenate([act * one.products_with(cause) for act, one in pairs], axis=1)
+        parts = [self._acting(one) * one.products_with(cause) for one in self.accepted]
+        return np.concatenate(parts, axis=1)
+
+    def _acting(self, cause: Cause) -> FloatArray:
+        """Return one for each recording in which an accepted cause acts, else zero, (K, 1, 1)."""
+        return cause.acts(self.rows.today).astype(float)[:, np.newaxis, np.newaxis]
 
     def products(self, cause: Cause) -> FloatArray:
         """Return the cross products of all columns with a cause, (K, q + a, p)."""
@@ -208,17 +211,9 @@ class Nuisance:
             return cause.products
         return np.concatenate([cause.products, self._among_accepted(cause)], axis=1)
 
-    def and_cause(
-        self,
-        cause: Cause,
-        size: float,
-        acts: npt.NDArray[np.bool_] | None = None,
-        known: tuple[FloatArray, float, float] | None = None,
-    ) -> Nuisance:
-        """Return the nuisance with one more cause; by default, it acts where it may act."""
-        acts = cause.acts(self.rows.today) if acts is None else acts
-        term = CauseTerm(cause, size, acts, known)
-        return replace(self, accepted=(*self.accepted, term))
+    def and_cause(self, cause: Cause, size: float = 1.0) -> Nuisance:
+        """Return the nuisance with one more cause, with a standard deviation over its unit."""
+        return replace(self, accepted=(*self.accepted, replace(cause, size=size)))
 
     def without(self, name: int) -> Nuisance:
         """Return the nuisance without one of the accepted causes."""
@@ -228,7 +223,7 @@ class Nuisance:
         """Return the nuisance with another weighted residual, (n, M) of each recording."""
         pairs = zip(self.columns, residual, strict=True)
         aims = np.array([x.reshape(-1, x.shape[2]).T @ y.ravel() for x, y in pairs])
-        accepted = tuple(replace(one, cause=one.cause.aimed_at(residual)) for one in self.accepted)
+        accepted = tuple(one.aimed_at(residual) for one in self.accepted)
         return replace(
             self,
             residual=tuple(residual),
@@ -240,7 +235,7 @@ class Nuisance:
     def spans(self) -> list[slice]:
         """Return the indices of the values of each accepted cause among all parameters."""
         size = self.columns[0].shape[2]
-        counts = [len(one.cause.unit) for one in self.accepted]
+        counts = [len(one.unit) for one in self.accepted]
         stops = size + np.cumsum(counts, dtype=int)
         return [slice(s - count, s) for count, s in zip(counts, stops.tolist(), strict=True)]
 
@@ -265,8 +260,15 @@ class Nuisance:
             more = np.sqrt(np.where(now > 0.0, now / then, 1.0))
         return np.asarray(np.clip(more, 1.0, most[:, np.newaxis]))
 
-    def prior(self, setting: Setting) -> tuple[npt.NDArray[np.intp], LogDensity]:
-        """Return the indices of the fitted parameters, and their prior."""
+    def prior(
+        self, setting: Setting
+    ) -> tuple[npt.NDArray[np.intp], FloatArray, FloatArray, float]:
+        """
+        Return the indices of the fitted parameters, and their prior.
+
+        The prior is its precision, precision times mean, and log density at zero.
+
+        """
         unit = self.rows.amplitude[0]
         rigid = self.base.independent < len(self.arm.robot.rigid_parameters)
         scale = np.where(rigid, setting.body or 1.0, 1.0)
@@ -274,7 +276,7 @@ class Nuisance:
         body += _MIN_PRECISION * np.eye(self.rank)
         size = max(setting.shared, _MIN_PRECISION) * unit[:, np.newaxis] * self.reach
         shared = size.ravel() ** -2.0
-        more = [one.prior[0] for one in self.accepted]
+        more = [one.density[0] for one in self.accepted]
         whole = linalg.block_diag(body, np.diag(shared), *more)
         fitted = np.ones(len(whole), dtype=bool)
         fitted[: self.rank] = (setting.body > 0.0) | self.unset
@@ -283,19 +285,19 @@ class Nuisance:
         matrix = whole[np.ix_(used, used)]
         means = np.zeros(len(whole))
         for one, span in zip(self.accepted, self.spans, strict=True):
-            means[span] = one.prior[1]
-        normaliser = 0.5 * float(np.linalg.slogdet(matrix)[1]) + setting.prior
-        loss = sum(one.prior[2] for one in self.accepted)
-        return used, LogDensity(matrix, means[used], normaliser, loss)
+            means[span] = one.density[1]
+        density = 0.5 * float(np.linalg.slogdet(matrix)[1]) + setting.prior
+        density -= sum(one.density[2] for one in self.accepted)
+        return used, matrix, means[used], density
 
     def rows_of(self, k: int) -> FloatArray:
         """Return the weighted columns of all parameters in a recording, (M, n, q + a)."""
         joints, rows, _ = self.columns[k].shape
         blocks = [self.columns[k]]
         for one in self.accepted:
-            own = np.zeros((joints, rows, len(one.cause.unit)))
-            if one.acts[k]:
-                own[list(one.cause.joints)] = one.cause.columns[k]
+            own = np.zeros((joints, rows, len(one.unit)))
+            if one.acts(self.rows.today)[k]:
+                own[list(one.joints)] = one.columns[k]
             blocks.append(own)
         return np.concatenate(blocks, axis=2).swapaxes(0, 1)
 
@@ -318,49 +320,40 @@ class Nuisance:
             A recording, with columns and residual of those of its rows that are left out.
 
         """
-        used, prior = self.prior(setting)
-        return Marginal.of(setting, used, prior, *self.likelihood(setting, used, among, less))
-
-    def likelihood(
-        self,
-        setting: Setting,
-        used: npt.NDArray[np.intp],
-        among: Sequence[int] | None = None,
-        less: tuple[int, FloatArray, FloatArray] | None = None,
-    ) -> tuple[LogDensity, MotionDiscrepancy | None]:
-        """Return the likelihood of the parameters `used`; see `marginal`."""
         fitted = list(range(len(self.columns)) if among is None else among)
-        square, cross, count = (
-            self.square[fitted],
-            self.cross[fitted],
-            int(self.count[fitted].sum()),
-        )
+        square, cross, count = self.square[fitted], self.cross[fitted], self.count[fitted].sum()
         scale, power = setting.precision, float(self.power[fitted].sum())
         if less is not None:
             k, x, y = less
             square[fitted.index(k)] -= x.T @ x
             cross[fitted.index(k)] -= x.T @ y
             count, power = count - len(y), power - float(y @ y)
-        matrix = square.sum(axis=0)[np.ix_(used, used)] * scale
-        vector = cross.sum(axis=0)[used] * scale
-        normaliser, loss = -count / setting.lasting * np.log(setting.noise), 0.5 * power * scale
-        if not setting.own:
-            return LogDensity(matrix, vector, normaliser, loss), None
-        place, functions = self.discrepancy, self.discrepancy.shape[1]
-        size = setting.own * np.array(self.rows.amplitude)[fitted]
-        precision = square[:, place[:, :, np.newaxis], place[:, np.newaxis, :]] * scale
-        precision += np.eye(functions) * size[:, :, np.newaxis, np.newaxis] ** -2.0
-        covariance = np.asarray(np.linalg.inv(precision))
-        border = square[:, place.ravel()][:, :, used] * scale
-        regressed = (covariance @ border.reshape(*precision.shape[:3], -1)).reshape(border.shape)
-        aim = cross[:, place] * scale
-        matrix -= border.reshape(-1, len(used)).T @ regressed.reshape(-1, len(used))
-        vector -= aim.ravel() @ regressed.reshape(-1, len(used))
-        loss -= 0.5 * float(np.einsum('kjf,kjfg,kjg->', aim, covariance, aim))
-        normaliser -= 0.5 * float(np.linalg.slogdet(precision)[1].sum())
-        normaliser -= functions * float(np.log(size).sum())
-        motion = MotionDiscrepancy(covariance, aim, regressed)
-        return LogDensity(matrix, vector, normaliser, loss), motion
+        used, matrix, vector, evidence = self.prior(setting)
+        matrix += square.sum(axis=0)[np.ix_(used, used)] * scale
+        vector += cross.sum(axis=0)[used] * scale
+        loss, motion = 0.5 * power * scale, None
+        if setting.own:
+            place, functions = self.discrepancy, self.discrepancy.shape[1]
+            size = setting.own * np.array(self.rows.amplitude)[fitted]
+            precision = square[:, place[:, :, np.newaxis], place[:, np.newaxis, :]] * scale
+            precision += np.eye(functions) * size[:, :, np.newaxis, np.newaxis] ** -2.0
+            covariance = np.asarray(np.linalg.inv(precision))
+            border = square[:, place.ravel()][:, :, used] * scale
+            regressed = covariance @ border.reshape(*precision.shape[:3], -1)
+            regressed = regressed.reshape(border.shape)
+            aim = cross[:, place] * scale
+            matrix -= border.reshape(-1, len(used)).T @ regressed.reshape(-1, len(used))
+            vector -= aim.ravel() @ regressed.reshape(-1, len(used))
+            loss -= 0.5 * float(np.einsum('kjf,kjfg,kjg->', aim, covariance, aim))
+            evidence -= 0.5 * float(np.linalg.slogdet(precision)[1].sum())
+            evidence -= functions * float(np.log(size).sum())
+            motion = MotionDiscrepancy(covariance, aim, regressed)
+        lower = np.asarray(np.linalg.cholesky(matrix))
+        values = linalg.cho_solve((lower, True), vector)
+        loss -= 0.5 * float(vector @ values)
+        evidence -= loss + float(count) / setting.lasting * np.log(setting.noise)
+        evidence -= float(np.sum(np.log(np.diag(lower))))
+        return Marginal(setting, used, lower, values, evidence, loss, motion)
 
     def whole(self, under: Marginal) -> tuple[FloatArray, FloatArray]:
         """Return the means of all parameters and their covariance; zero where not fitted."""
@@ -380,8 +373,8 @@ class Nuisance:
         columns = self.columns[k]
         residual = self.residual[k] - columns @ values[: columns.shape[2]]
         for one, span in zip(self.accepted, self.spans, strict=True):
-            if one.acts[k]:
-                residual[list(one.cause.joints)] -= one.cause.columns[k] @ values[span]
+            if one.acts(self.rows.today)[k]:
+                residual[list(one.joints)] -= one.columns[k] @ values[span]
         return residual
 
     def squares_of_today(self, under: Marginal) -> float:

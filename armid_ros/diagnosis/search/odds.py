@@ -15,11 +15,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from armid_ros.diagnosis.search.cause import Cause
+from armid_ros.diagnosis.search.cause import Cause, room
 from armid_ros.diagnosis.search.nuisance import Nuisance
-from armid_ros.diagnosis.search.patch import room
-from armid_ros.diagnosis.search.priors import SIZES, THERE
 from armid_ros.diagnosis.search.setting import Marginal
+from armid_ros.diagnosis.settings import SIZES, THERE
 from armid_ros.motion import FloatArray
 import numpy as np
 import numpy.typing as npt

@@ -72,30 +72,6 @@ class MotionDiscrepancy:
 
 
 @dataclass(frozen=True)
-class LogDensity:
-    """
-    Logarithm of a Gaussian density of the fitted parameters: a prior, or a likelihood.
-
-    Attributes
-    ----------
-    matrix : ndarray, shape (u, u)
-        Precision.
-    vector : ndarray, shape (u,)
-        Precision times mean.
-    normaliser : float
-        Logarithm of the density, without its exponent.
-    loss : float
-        Negative exponent where all parameters are zero.
-
-    """
-
-    matrix: FloatArray
-    vector: FloatArray
-    normaliser: float
-    loss: float
-
-
-@dataclass(frozen=True)
 class Marginal:
     """
     Posterior of the nuisance parameters under one setting.
@@ -126,24 +102,6 @@ class Marginal:
     evidence: float
     loss: float
     motion: MotionDiscrepancy | None
-
-    @classmethod
-    def of(
-        cls,
-        setting: Setting,
-        used: npt.NDArray[np.intp],
-        prior: LogDensity,
-        likelihood: LogDensity,
-        motion: MotionDiscrepancy | None,
-    ) -> Marginal:
-        """Multiply prior and likelihood of the fitted parameters."""
-        vector = prior.vector + likelihood.vector
-        lower = np.asarray(np.linalg.cholesky(prior.matrix + likelihood.matrix))
-        values = linalg.cho_solve((lower, True), vector)
-        loss = prior.loss + likelihood.loss - 0.5 * float(vector @ values)
-        evidence = prior.normaliser + likelihood.normaliser - loss
-        evidence -= float(np.sum(np.log(np.diag(lower))))
-        return cls(setting, used, lower, values, evidence, loss, motion)
 
     @cached_property
     def root(self) -> FloatArray:

@@ -102,8 +102,6 @@ class Ranked:
         Log odds that the cause is present, or has changed.
     under : Marginal
         Nuisance parameters under the likeliest setting with this cause.
-    probability : float
-        Probability among all explanations.
 
     """
 
@@ -112,7 +110,6 @@ class Ranked:
     data: float
     odds: float
     under: Marginal
-    probability: float = 0.0
 
     @property
     def worth(self) -> float:
@@ -192,7 +189,7 @@ class Look:
         Parameters
         ----------
         one : Ranked or Cause
-            The cause; one that was ranked keeps its odds and its probability.
+            The cause; one that was ranked keeps its odds.
         material : float
             Share of the torque of a joint that matters.
 
@@ -212,10 +209,10 @@ class Look:
         explained = float(sum(fit.values @ cause.own[k] @ fit.values for k in today))
         torque = cause.torque * known.visible / nuisance.rows.torque[:, np.newaxis]
         if isinstance(one, Ranked):
-            factor, log_odds, probability = one.data, one.odds, one.probability
+            factor, log_odds = one.data, one.odds
         else:
             places = max(len(cause.effect.places(nuisance.arm.robot)), 1)
-            factor, probability = fit.factor, 0.0
+            factor = fit.factor
             log_odds = factor - float(np.log(cause.shapes * places))
         return Trial(
             cause.effect,
@@ -229,7 +226,6 @@ class Look:
             log_odds,
             min(explained / self.residual_squares, 1.0),
             int(np.sum(np.array(gains) > 0.0)),
-            probability,
         )
 
     @cached_property

@@ -13,6 +13,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from armid_ros.arm import ArmModel
+from armid_ros.diagnosis.data.evidence import Evidence
 from armid_ros.diagnosis.data.trajectory import not_shown, Trajectory
 from armid_ros.diagnosis.search.explanation import Explanation
 from armid_ros.diagnosis.search.spans import Span
@@ -211,6 +212,45 @@ class Gap:
     closed: float
     predicted: bool
     overlays: tuple[Overlay, ...]
+
+    @classmethod
+    def of(cls, explanation: Explanation, unseen: Evidence | None) -> Gap:
+        """
+        Measure the gap on held-out data, or on the fitted data if there are none.
+
+        Parameters
+        ----------
+        explanation : Explanation
+            The fitted causes.
+        unseen : Evidence or None
+            Held-out data, in the unit of the gap.
+
+        """
+        before, after = explanation.reference.arm, explanation.fitted.arm
+        evidence = explanation.evidence if unseen is None else unseen
+        residuals = [evidence.residuals(arm) for arm in (before, after)]
+        overlays = []
+        for part, sigma, given, patched in zip(
+            evidence.data, evidence.sigma, *residuals, strict=True
+        ):
+            torque = part.torque
+            overlays.append(
+                Overlay(part.source, part, torque, torque - given, torque - patched, sigma)
+            )
+        power = [evidence.power(rows) for rows in residuals]
+        floor = evidence.power([np.broadcast_to(o.sigma, o.measured.shape) for o in overlays])
+        excess = [np.maximum(own - floor, 0.0) / np.maximum(floor, 1e-24) for own in power]
+        gap = excess[0] > 0.2  # in other joints, squares beyond the floor are random
+        closed = 1.0 - excess[1][gap].sum() / excess[0][gap].sum() if gap.any() else 0.0
+        return cls(
+            np.sqrt(power[0]),
+            np.sqrt(power[1]),
+            np.sqrt(floor),
+            evidence.chi2_per_row(residuals[0]),
+            float(np.clip(closed, 0.0, 1.0)),
+            unseen is not None,
+            tuple(overlays),
+        )
 
     @property
     def data(self) -> str:

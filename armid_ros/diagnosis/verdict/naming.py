@@ -8,9 +8,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from armid_ros.arm import ArmModel
-from armid_ros.diagnosis.search.cause import NamedEffect
+from armid_ros.diagnosis.search.cause import NamedEffect, room
 from armid_ros.diagnosis.search.explanation import Explanation
-from armid_ros.diagnosis.search.patch import places, room
+from armid_ros.diagnosis.search.posterior import places
 from armid_ros.diagnosis.search.trial import Trial
 from armid_ros.diagnosis.verdict.attribution import Attribution
 from armid_ros.diagnosis.verdict.bodies import is_same_body

@@ -23,8 +23,7 @@ from armid_ros.diagnosis.search.cause import Cause
 from armid_ros.diagnosis.search.explanation import Explanation
 from armid_ros.diagnosis.search.nuisance import Nuisance
 from armid_ros.diagnosis.search.posterior import JointFit
-from armid_ros.diagnosis.search.priors import UNLISTED
-from armid_ros.diagnosis.settings import DiagnosisSettings, Thresholds
+from armid_ros.diagnosis.settings import DiagnosisSettings, Thresholds, UNLISTED
 from armid_ros.diagnosis.verdict.where import Excess
 from armid_ros.effects import Effect, Quantity
 from armid_ros.effects.base import Arm
@@ -107,13 +106,13 @@ def _instead(problem: JointFit, linear: Nuisance, law: Cause, levels: Thresholds
     """
     named = linear.marginal(problem.setting, problem.recordings)
     pairs = zip(linear.accepted, linear.spans, strict=True)
-    own = [(one, span) for one, span in pairs if one.cause.joints == law.joints]
+    own = [(one, span) for one, span in pairs if one.joints == law.joints]
     if not own:
         return 0.0
-    others = [one for one in linear.accepted if one.cause.joints != law.joints]
+    others = [one for one in linear.accepted if one.joints != law.joints]
     bare = replace(linear, accepted=tuple(others))
     means = linear.means(named)
-    made = [np.concatenate(one.cause.columns, axis=1)[0] @ means[span] for one, span in own]
+    made = [np.concatenate(one.columns, axis=1)[0] @ means[span] for one, span in own]
     size = 1.0 + float(np.sqrt(np.mean(np.sum(made, axis=0) ** 2)))
     fits = [
         bare.and_cause(law, new * size).marginal(problem.setting, problem.recordings)

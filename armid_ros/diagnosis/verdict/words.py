@@ -5,8 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, NamedTuple
 
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.search.explanation import ESTIMATED, NOISE
@@ -27,19 +26,8 @@ DIFFERENCE = 'the difference between model and measurement'
 _MAX_JOINTS = 3
 
 
-@dataclass(frozen=True)
-class Verdict:
-    """
-    The verdict of a diagnosis.
-
-    Attributes
-    ----------
-    word : str
-        One of ``Word``.
-    summary : str
-        The verdict in a sentence or two.
-
-    """
+class Verdict(NamedTuple):
+    """The verdict of a diagnosis, and its sentences."""
 
     word: Word
     summary: str

@@ -9,7 +9,7 @@ import math
 
 from armid_ros.diagnosis import Diagnosis, Finding
 from armid_ros.diagnosis.next_run.isolability import DISTINCT, Isolability
-from armid_ros.diagnosis.search.patch import room
+from armid_ros.diagnosis.search.cause import room
 from armid_ros.diagnosis.search.trial import Trial
 from armid_ros.diagnosis.verdict.document import Detectable
 from armid_ros.diagnosis.verdict.finding import Gap
