@@ -77,11 +77,12 @@ def bic_selection(
         squares = nuisance.squares_of_today(under)
         best, cause = 0.0, None
         for candidate in catalogue.causes(nuisance, under):
-            known = CauseInformation.of(candidate, nuisance, under, by_day=True)
-            if known.visible < _LEAST_VISIBLE:
+            known = CauseInformation.of([candidate], nuisance, under, by_day=True)
+            if known.visible[0] < _LEAST_VISIBLE:
                 continue
-            fitted = scipy.linalg.lstsq(known.matrix, known.vector, cond=_DEPENDENT)[0]
-            after = max(squares - float(fitted @ known.vector), 1e-300)
+            matrix, vector = known.matrix[0], known.vector[0]
+            fitted = scipy.linalg.lstsq(matrix, vector, cond=_DEPENDENT)[0]
+            after = max(squares - float(fitted @ vector), 1e-300)
             change = count * np.log(after / squares) + known.size * np.log(count)
             if change < best:
                 best, cause = change, candidate

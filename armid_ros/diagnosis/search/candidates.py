@@ -23,7 +23,7 @@ from armid_ros.diagnosis.data.days import Rows
 from armid_ros.diagnosis.data.trajectory import Trajectory
 from armid_ros.diagnosis.search.cause import Cause
 from armid_ros.diagnosis.search.nuisance import Nuisance
-from armid_ros.diagnosis.search.odds import CauseInformation, odds
+from armid_ros.diagnosis.search.odds import CauseInformation, posteriors
 from armid_ros.diagnosis.search.setting import Marginal
 from armid_ros.diagnosis.settings import HOW_OFTEN, log_prior
 from armid_ros.effects import Effect, Shape
@@ -114,13 +114,13 @@ class Causes:
         size = len(first.quantities)
         whole = replace(first, joints=tuple(one.effect.joints[0] for one in singles))
         (every,) = self._divided(whole, [whole])
-        known = CauseInformation.of(every, nuisance, under, by_day=True)
+        known = CauseInformation.of([every], nuisance, under, by_day=True)
 
         def among(members: tuple[int, ...]) -> tuple[float, Cause]:
             values = np.add.outer(size * np.array(members), np.arange(size)).ravel()
             effect = replace(first, joints=tuple(whole.joints[k] for k in members))
             cause = every.among(effect, values, comb(count, len(members)))
-            fit = odds(cause, nuisance, known.among(values))
+            (fit,) = posteriors([cause], nuisance, known.among(values))
             return fit.factor + cause.prior, cause
 
         chosen = tuple(range(count))

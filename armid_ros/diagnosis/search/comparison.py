@@ -20,11 +20,10 @@ from armid_ros.diagnosis.search.candidates import Causes, line_search
 from armid_ros.diagnosis.search.cause import Cause
 from armid_ros.diagnosis.search.nuisance import Nuisance
 from armid_ros.diagnosis.search.odds import (
-    allowed,
+    all_odds,
     IMPOSSIBLE,
     odds,
     OWN_SPREADS,
-    unbounded_odds,
     usual_spread,
 )
 from armid_ros.diagnosis.search.setting import LASTING, Marginal, Setting
@@ -248,20 +247,12 @@ class CauseComparison:
         settings, likeliest = self._settings(nuisance), self._likeliest(nuisance)
         tried = settings if len(settings) == 1 else _leading_settings(settings)
         causes = self._causes_of(nuisance)
-        each = [
-            (fit, cause, one)
-            for one in tried
-            for cause, fit in unbounded_odds(causes, nuisance, one)
-        ]
-        each.sort(key=lambda one: -(one[0].factor + one[2].evidence + one[1].prior))
         first: dict[object, tuple[float, Cause, Marginal]] = {}
-        for fit, cause, one in each:
-            least = first.get(cause.key, (-np.inf,))[0]
-            worth = fit.factor + one.evidence + cause.prior
-            if worth > least:
-                worth += allowed(cause, fit, nuisance)
-            if worth > least:
-                first[cause.key] = worth, cause, one
+        for one in tried:
+            for cause, fit in all_odds(causes, nuisance, one):
+                worth = fit.factor + one.evidence + cause.prior
+                if cause.key not in first or worth > first[cause.key][0]:
+                    first[cause.key] = worth, cause, one
         best = sorted(first.values(), key=lambda one: -one[0])
         result = []
         for n, (_, cause, under) in enumerate(best[:_COMPARED]):

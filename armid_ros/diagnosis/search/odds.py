@@ -91,16 +91,6 @@ class CauseInformation:
 
     @classmethod
     def of(
-        cls, cause: Cause, nuisance: Nuisance, under: Marginal, by_day: bool = False
-    ) -> CauseInformation:
-        """Return the information per recording or day; nuisance parameters are integrated out."""
-        found = cls.of_all([cause], nuisance, under, by_day)
-        return replace(
-            found, matrix=found.matrix[0], vector=found.vector[0], visible=found.visible[0]
-        )
-
-    @classmethod
-    def of_all(
         cls, causes: Sequence[Cause], nuisance: Nuisance, under: Marginal, by_day: bool = False
     ) -> CauseInformation:
         """Return the information on C causes with the same number of values."""
@@ -190,47 +180,25 @@ def _block_diagonal(blocks: FloatArray) -> FloatArray:
 def odds(
     cause: Cause,
     nuisance: Nuisance,
-    under: Marginal | CauseInformation,
+    under: Marginal,
     usual: float = 0.0,
     spreads: FloatArray = EQUAL,
 ) -> CauseFit:
-    """
-    Return the log Bayes factor of a cause and its posterior values.
-
-    Physically impossible values count against the cause; see `allowed`.
-
-    Parameters
-    ----------
-    cause : Cause
-        The cause.
-    nuisance : Nuisance
-        Nuisance parameters of the comparison.
-    under : Marginal or CauseInformation
-        Fit of the nuisance parameters under one setting, or the information on the cause.
-    usual : float
-        The usual spread of values between recordings.
-    spreads : ndarray, shape (k,)
-        Spreads to average over.
-
-    """
-    known = under
-    if isinstance(known, Marginal):
-        known = CauseInformation.of(cause, nuisance, known, by_day=not spreads.any())
-    known = replace(known, matrix=known.matrix[np.newaxis], vector=known.vector[np.newaxis])
-    (fit,) = posteriors([cause], nuisance, known, usual, spreads)
-    return replace(fit, factor=fit.factor + allowed(cause, fit, nuisance))
+    """Return the log Bayes factor of a cause and its posterior values; see `posteriors`."""
+    known = CauseInformation.of([cause], nuisance, under, by_day=not spreads.any())
+    return posteriors([cause], nuisance, known, usual, spreads)[0]
 
 
-def unbounded_odds(
+def all_odds(
     causes: Sequence[Cause], nuisance: Nuisance, under: Marginal
 ) -> list[tuple[Cause, CauseFit]]:
-    """Return causes with their odds, in which physically impossible values do not count."""
+    """Return causes with their odds for equal values in all recordings."""
     alike: dict[tuple[int, bool], list[Cause]] = {}
     for one in causes:
         alike.setdefault((len(one.unit), one.effect.lasting), []).append(one)
     found = list[tuple[Cause, CauseFit]]()
     for group in alike.values():
-        known = CauseInformation.of_all(group, nuisance, under, by_day=True)
+        known = CauseInformation.of(group, nuisance, under, by_day=True)
         found += zip(group, posteriors(group, nuisance, known), strict=True)
     return found
 
@@ -243,9 +211,22 @@ def posteriors(
     spreads: FloatArray = EQUAL,
 ) -> list[CauseFit]:
     """
-    Return the posteriors of causes without the limits of their values; see `odds`.
+    Return the log Bayes factors of causes and their posterior values.
 
-    All causes have the same number of values and act on the same days.
+    Physically impossible values count against a cause; see `allowed`.
+
+    Parameters
+    ----------
+    causes : sequence of Cause
+        Causes with the same number of values, which act on the same days.
+    nuisance : Nuisance
+        Nuisance parameters of the comparison.
+    known : CauseInformation
+        Information on the causes.
+    usual : float
+        The usual spread of values between recordings.
+    spreads : ndarray, shape (k,)
+        Spreads to average over.
 
     """
     count, p, acts = len(causes), known.size, causes[0].acts(known.today)
@@ -289,7 +270,11 @@ def posteriors(
     explained = parts[best, rows, first]
     numbers = zip(factor.tolist(), explained.tolist(), size.tolist(), strict=True)
     arrays = zip(numbers, values, std, resolution, strict=True)
-    return [CauseFit(*three, *rest) for three, *rest in arrays]
+    fits = [CauseFit(*three, *rest) for three, *rest in arrays]
+    return [
+        replace(fit, factor=fit.factor + allowed(cause, fit, nuisance))
+        for cause, fit in zip(causes, fits, strict=True)
+    ]
 
 
 def _unseen(cause: Cause, nuisance: Nuisance) -> FloatArray:
@@ -328,13 +313,13 @@ def usual_spread(causes: Sequence[Cause], nuisance: Nuisance, under: Marginal) -
     for cause in causes:
         if cause.effect.traits.external:
             continue
-        known = CauseInformation.of(cause, nuisance, under).of_day(today=False)
+        known = CauseInformation.of([cause], nuisance, under).of_day(today=False)
         found = []
         for spread in _USUAL_SPREADS:
             square, aim, total = known.matrix, known.vector, 0.0
             for root in [*known.apart(spread), known.there()]:
                 square, aim, more = without(square, aim, root)
-                total += float(more)
+                total += float(more[0])
             found.append(total / known.size)
         logs.append(np.log(_USUAL_SPREADS[int(np.argmax(found))] + 1.0))
     return float(np.exp(np.mean(logs)) - 1.0) if logs else POPULATION_SPREAD

@@ -18,13 +18,7 @@ from pathlib import Path
 from typing import TypeAlias
 
 from armid_ros.diagnosis.search.cause import Cause
-from armid_ros.diagnosis.search.odds import (
-    allowed,
-    CauseInformation,
-    odds,
-    OWN_SPREADS,
-    posteriors,
-)
+from armid_ros.diagnosis.search.odds import CauseInformation, OWN_SPREADS, posteriors
 from armid_ros.diagnosis.search.trial import Look, Ranked
 from armid_ros.diagnosis.settings import Thresholds
 from armid_ros.motion import FloatArray
@@ -119,15 +113,10 @@ class _Timed:
                     choices[-1] += float(np.log(0.5 * count * (count - 1)))
             causes.append(replace(cause, products=products, own=own, aim=aim))
         # Earlier values act throughout, so that all spans are compared with the same null model.
-        known = CauseInformation.of_all(causes, nuisance, self.ranked.under, by_day=True)
+        known = CauseInformation.of(causes, nuisance, self.ranked.under, by_day=True)
         fits = posteriors(causes, nuisance, known.of_day(today=True))
         return [
-            replace(
-                self.ranked,
-                cause=timed,
-                fit=fit,
-                data=fit.factor + allowed(timed, fit, nuisance) - choice,
-            )
+            replace(self.ranked, cause=timed, fit=fit, data=fit.factor - choice)
             for timed, choice, fit in zip(causes, choices, fits, strict=True)
         ]
 
@@ -206,10 +195,10 @@ def acting_spans(look: Look, thresholds: Thresholds) -> tuple[Span, ...]:
     best, spans, own = max(found, key=lambda one: one[0].worth)
     throughout = max((one.throughout for one in timed), key=lambda one: one.worth)
     nuisance = look.nuisance
-    known = CauseInformation.of(best.cause, nuisance, best.under).of_day(today=True)
-    there = odds(best.cause, nuisance, known, look.usual, OWN_SPREADS).factor
+    known = CauseInformation.of([best.cause], nuisance, best.under).of_day(today=True)
+    (there,) = posteriors([best.cause], nuisance, known, look.usual, OWN_SPREADS)
     lead = best.ahead(throughout, thresholds)
-    if min(lead, there) <= thresholds.alarm:
+    if min(lead, there.factor) <= thresholds.alarm:
         return ()
     rows, result = nuisance.rows, []
     for number, (k, (a, b)) in enumerate(spans.items()):

@@ -15,7 +15,7 @@ from typing import TypeAlias
 
 from armid_ros.diagnosis.search.cause import Cause
 from armid_ros.diagnosis.search.nuisance import Nuisance
-from armid_ros.diagnosis.search.odds import CauseFit, CauseInformation, odds
+from armid_ros.diagnosis.search.odds import CauseFit, CauseInformation, posteriors
 from armid_ros.diagnosis.search.setting import Marginal
 from armid_ros.diagnosis.settings import Thresholds
 from armid_ros.effects import Effect
@@ -196,18 +196,19 @@ class Look:
         """
         nuisance, usual = self.nuisance, self.usual
         cause, under = (one.cause, one.under) if isinstance(one, Ranked) else (one, self.under)
-        known = CauseInformation.of(cause, nuisance, under)
-        fit = odds(cause, nuisance, known, usual, np.array([usual * (nuisance.rows.before > 0)]))
-        groups = len(known.today)
-        blocks = known.matrix.reshape(groups, known.size, groups, known.size)
+        known = CauseInformation.of([cause], nuisance, under)
+        spread = np.array([usual * (nuisance.rows.before > 0)])
+        (fit,) = posteriors([cause], nuisance, known, usual, spread)
+        groups, size, visible = len(known.today), known.size, float(known.visible[0])
+        blocks = known.matrix.reshape(groups, size, groups, size)
         x = fit.values / cause.unit
         gains = [
-            2.0 * x @ known.vector.reshape(groups, -1)[g] - x @ blocks[g, :, g] @ x
+            2.0 * x @ known.vector.reshape(groups, size)[g] - x @ blocks[g, :, g] @ x
             for g in np.flatnonzero(known.today)
         ]
         today = np.flatnonzero(nuisance.rows.today).tolist()
         explained = float(sum(fit.values @ cause.own[k] @ fit.values for k in today))
-        torque = cause.torque * known.visible / nuisance.rows.torque[:, np.newaxis]
+        torque = cause.torque * visible / nuisance.rows.torque[:, np.newaxis]
         if isinstance(one, Ranked):
             factor, log_odds = one.data, one.odds
         else:
@@ -221,7 +222,7 @@ class Look:
             fit.std,
             fit.resolution,
             np.asarray(material / np.maximum(torque.max(axis=0), 1e-300)),
-            float(known.visible),
+            visible,
             2.0 * factor,
             log_odds,
             min(explained / self.residual_squares, 1.0),
