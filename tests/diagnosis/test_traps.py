@@ -53,8 +53,9 @@ def significant(arm, data, sigma, names):
     causes = Causes(kinds, nuisance, False, frozenset()).causes(nuisance, under)
     p = {}
     for cause in causes:
-        known = CauseInformation.of(cause, nuisance, under, by_day=True)
-        gain = float(known.vector @ np.linalg.lstsq(known.matrix, known.vector, rcond=1e-6)[0])
+        known = CauseInformation.of([cause], nuisance, under, by_day=True)
+        matrix, vector = known.matrix[0], known.vector[0]
+        gain = float(vector @ np.linalg.lstsq(matrix, vector, rcond=1e-6)[0])
         name = cause.effect.name
         p[name] = min(p.get(name, 1.0), float(stats.chi2.sf(gain, known.size)))
     best = min(p, key=p.get)
