@@ -30,7 +30,7 @@ from armid_ros.diagnosis.verdict.finding import Diagnosis, Finding, Gap
 from armid_ros.diagnosis.verdict.naming import findings, small_print
 from armid_ros.diagnosis.verdict.remaining_misfit import locate_blocked_joints, RemainingMisfit
 from armid_ros.diagnosis.verdict.remarks import data_remarks, doubt_of, doubted
-from armid_ros.diagnosis.verdict.where import locate_gap, locate_remaining_gap
+from armid_ros.diagnosis.verdict.where import locate_explained, locate_remaining_gap
 from armid_ros.diagnosis.verdict.words import decide
 from armid_ros.errors import IdentificationError
 from armid_ros.estimate import name_in_words
@@ -261,7 +261,9 @@ def _as_diagnosis(
         zip(both, of_residual, strict=True), key=lambda one: float(one[1].ratio.max())
     )[0]
     new = np.max([np.zeros(arm.robot.n_joints), *(one.ratio for one in laws)], axis=0) > 1.0
-    places = locate_gap(explanation, (unseen or evidence) if found else worst_data, settings, new)
+    left = locate_remaining_gap(explanation, worst_data, settings, new)
+    explained = unseen or evidence
+    places = locate_explained(explanation, explained, settings) if found else left
     explainer.tell(1.0, word.word)
     least = settings.thresholds.headline
     small = [one for one in found if settings.everything and one.share < least]
@@ -272,7 +274,7 @@ def _as_diagnosis(
         findings=tuple(one for one in found if one not in small),
         minor=(*small, *minor),
         where=places or locate_blocked_joints(arm, resting),
-        left=locate_remaining_gap(explanation, patched, worst_data, settings, new),
+        left=left,
         gap=gap,
         explanation=explanation.forgetting(),
         arm=plain_arm(patched) if found and not worse else given,
@@ -313,7 +315,7 @@ def _with_shares(
     untested = explainer.baseline is not None and bool(explanation.untested)
     whole = shares.share(range(len(explanation.steps)))
     if untested and whole <= settings.thresholds.open_share:
-        nothing = explanation.with_nothing_named()
+        nothing = explanation.without(*range(len(explanation.steps)))
         explanation, shares = headline(nothing, unseen, least, settings)
     return explanation, shares, unseen
 

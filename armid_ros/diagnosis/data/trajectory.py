@@ -187,8 +187,7 @@ def trajectories(
         for whole in motions:
             motion, reduction = _thinned(whole, used)
             rows = np.array(decimated_samples(len(motion), reduction), dtype=np.intp)
-            share = _uncertain_share(motion, reduction, slowest)
-            unsure = np.where(_at_rest(motion), np.inf, share)[rows]
+            unsure = _uncertain_share(motion, reduction, slowest)[rows]
             limit = np.full(motion.n_joints, MAX_UNCERTAIN_SHARE) if allowed is None else allowed
             source = recording.source
             part = Trajectory(source, fold, motion, reduction, rows, unsure, limit, sensors)
@@ -232,27 +231,21 @@ def _thinned(motion: Motion, used: Conditioning) -> tuple[Motion, Conditioning]:
     return motion, Conditioning(used.rate_hz / thin, used.cutoff_hz, used.decimation // thin)
 
 
-def _at_rest(motion: Motion) -> npt.NDArray[np.bool_]:
-    """Return whether each joint is at rest in each sample, shape (N, n)."""
-    rest = np.zeros(motion.q.shape, dtype=bool)
-    shortest = REST_TIME / float(motion.t[1] - motion.t[0])
-    for joint in range(motion.n_joints):
-        speed = np.abs(motion.dq[:, joint])
-        slow = np.concatenate([[False], speed <= _REST_SPEED * speed.max(), [False]])
-        edges = np.flatnonzero(np.diff(slow.astype(int))).reshape(-1, 2)
-        for start, stop in edges[np.diff(edges, axis=1)[:, 0] >= shortest]:
-            rest[start:stop, joint] = True
-    return rest
-
-
 def _uncertain_share(motion: Motion, used: Conditioning, slowest: FloatArray) -> FloatArray:
-    """Return the share of each filtered sample with an uncertain sign of velocity, (N, n)."""
+    """Return the share of each sample with an uncertain sign of velocity, inf at rest, (N, n)."""
     speed = np.abs(motion.dq)
     slow = speed < np.maximum(_REVERSAL_SPEED * speed.max(axis=0), slowest)
     slow[1:] |= np.diff(np.sign(motion.dq), axis=0) != 0
     taps = np.abs(used.taps)
     share = signal.oaconvolve(slow.astype(float), taps[:, np.newaxis], mode='same', axes=0)
-    return np.asarray(np.maximum(share, 0.0))
+    share = np.asarray(np.maximum(share, 0.0))
+    shortest = REST_TIME / float(motion.t[1] - motion.t[0])
+    resting = np.pad(speed <= _REST_SPEED * speed.max(axis=0), ((1, 1), (0, 0)))
+    for joint, own in enumerate(resting.T):
+        edges = np.flatnonzero(np.diff(own.astype(int))).reshape(-1, 2)
+        for start, stop in edges[np.diff(edges, axis=1)[:, 0] >= shortest]:
+            share[start:stop, joint] = np.inf
+    return share
 
 
 def block_rows(

@@ -99,11 +99,6 @@ class Explanation:
         fitted = self.problem.fit([self.fitted.named[k] for k in keep])
         return replace(self, fitted=fitted, steps=tuple(self.steps[k] for k in keep))
 
-    def with_nothing_named(self) -> Explanation:
-        """Return the explanation with all of its causes as minor ones."""
-        minor = *self.steps, *self.minor
-        return replace(self, fitted=self.reference, steps=(), minor=minor)
-
     def forgetting(self) -> Explanation:
         """Return the explanation without the data and caches from its computation."""
         return replace(

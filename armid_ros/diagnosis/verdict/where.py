@@ -94,23 +94,13 @@ class Excess:
     more: str = ''
 
 
-def locate_gap(
-    explanation: Explanation,
-    evidence: Evidence,
-    settings: DiagnosisSettings,
-    new: npt.NDArray[np.bool_],
+def locate_explained(
+    explanation: Explanation, evidence: Evidence, settings: DiagnosisSettings
 ) -> tuple[Where, ...]:
-    """
-    Locate the gap in the held-out or fitted data.
-
-    If causes are named, their explained part of the gap is located: the misfit of the model may be
-    larger in other joints.
-
-    """
-    reference, fitted = explanation.reference.arm, explanation.fitted.arm
-    if not explanation.steps:
-        return locate_remaining_gap(explanation, reference, evidence, settings, new)
-    before, after = evidence.residuals(reference), evidence.residuals(fitted)
+    """Locate the part of the gap that the named causes explain."""
+    before, after = (
+        evidence.residuals(one.arm) for one in (explanation.reference, explanation.fitted)
+    )
     explained = evidence.chi2_per_row(before) - evidence.chi2_per_row(after)
     least = settings.thresholds.inexact * max(float(explained.sum()), 0.0)
     gap = np.where(explained > least, explained, 0.0)
@@ -119,14 +109,13 @@ def locate_gap(
 
 def locate_remaining_gap(
     explanation: Explanation,
-    arm: ArmModel,
     evidence: Evidence,
     settings: DiagnosisSettings,
     new: npt.NDArray[np.bool_],
 ) -> tuple[Where, ...]:
     """Locate the residual beyond the limits of the patched model, or of a new torque law."""
-    patched, residual = (evidence.residuals(one) for one in (explanation.fitted.arm, arm))
-    losses, limits = evidence.chi2_per_row(residual), evidence.limits(patched, settings)
+    residual = evidence.residuals(explanation.fitted.arm)
+    losses, limits = evidence.chi2_per_row(residual), evidence.limits(residual, settings)
     gap = np.where(new, losses, np.where(losses > limits, losses - 1.0, 0.0))
     return locate(explanation.given, evidence, residual, gap)
 
