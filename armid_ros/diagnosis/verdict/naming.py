@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.search.cause import NamedEffect, room
@@ -23,8 +23,7 @@ from armid_ros.motion import FloatArray
 import numpy as np
 
 
-@dataclass(frozen=True)
-class _Translation:
+class _Translation(NamedTuple):
     """Fitted cause of an explanation, converted to an effect of the catalogue."""
 
     effect: Effect
@@ -57,19 +56,19 @@ def findings(
         together = [other for other, where in merged.items() if set(own) & set(where)]
         indices = sorted({k for other in together for k in merged[other]})
         parts = [part for k in indices for part in translated[k] if part.effect.name == name]
-        steps = [explanation.steps[k] for k in own]
+        effect, steps = parts[0].effect, [explanation.steps[k] for k in own]
         joints = _joints([part.effect.joints for part in parts], arm)
-        order = [joint for joint in arm.robot.all_joints if joint in joints]
-        sums = _sums(parts)
-        ranks = {joint: k for k, joint in enumerate([*order, ''])}
-        names = sorted(sums, key=lambda parameter: ranks.get(parameter.joint, 0))
-        ties = {
-            tie.joint: tie
-            for part in parts
-            if isinstance(part.effect, Tied)
-            for tie in part.effect.ties
-        }
-        rivals = _rivals(steps, Rival(name, joints), set(merged) - {name}, arm)
+        order = [joint for joint in (*arm.robot.all_joints, '') if joint in (*joints, '')]
+        sums: dict[ParameterName, tuple[float, float]] = {}
+        for part in parts:
+            for parameter, value, std in zip(part.parameters, part.values, part.std, strict=True):
+                if np.isfinite(std):
+                    before, wide = sums.get(parameter, (0.0, 0.0))
+                    sums[parameter] = before + float(value), float(np.hypot(wide, std))
+        names = sorted(sums, key=lambda p: order.index(p.joint) if p.joint in order else 0)
+        tied = [part.effect for part in parts if isinstance(part.effect, Tied)]
+        ties = {tie.joint: tie for one in tied for tie in one.ties}
+        look_at = explanation.fitted.named[own[0]].effect.traits.look_at
         result.append(
             Finding(
                 name,
@@ -77,33 +76,20 @@ def findings(
                 tuple(names),
                 tuple(sums[parameter][0] for parameter in names),
                 tuple(sums[parameter][1] for parameter in names),
-                attribution.share(indices),
-                attribution.interval(indices, rng),
-                max(trial.p for trial in steps),
-                rivals,
-                parts[0].effect.traits.sign,
-                tuple(ties[joint] for joint in order if joint in ties),
-                parts[0].effect.traits.weighs,
-                tuple(other for other in together if other != name),
-                tuple(given.get((p.name, p.joint), 0.0) for p in names),
-                explanation.fitted.named[own[0]].effect.traits.look_at
-                if len(together) > 1
-                else '',
-                min(trial.probability for trial in steps),
+                share=attribution.share(indices),
+                share_interval=attribution.interval(indices, rng),
+                p=max(trial.p for trial in steps),
+                rivals=_rivals(steps, Rival(name, joints), set(merged) - {name}, arm),
+                sign=effect.traits.sign,
+                ties=tuple(ties[joint] for joint in order if joint in ties),
+                weighs=effect.traits.weighs,
+                together=tuple(other for other in together if other != name),
+                added_to=tuple(given.get((p.name, p.joint), 0.0) for p in names),
+                look_at=look_at if len(together) > 1 else '',
+                probability=min(trial.probability for trial in steps),
             )
         )
     return tuple(sorted(result, key=lambda one: -one.share))
-
-
-def _sums(parts: Sequence[_Translation]) -> dict[ParameterName, tuple[float, float]]:
-    """Return the sum of the values of each parameter, and its standard deviation."""
-    sums: dict[ParameterName, tuple[float, float]] = {}
-    for part in parts:
-        for parameter, value, std in zip(part.parameters, part.values, part.std, strict=True):
-            if np.isfinite(std):
-                before, wide = sums.get(parameter, (0.0, 0.0))
-                sums[parameter] = before + float(value), float(np.hypot(wide, std))
-    return sums
 
 
 def small_print(explanation: Explanation) -> tuple[Finding, ...]:
