@@ -43,10 +43,8 @@ class KnownFit:
         'good', 'poor' or 'unusable'; by the worst joint if the file has no grade.
     reason : str
         Reason of the grade.
-    rms : mapping of str to float
-        Root mean square residual of each joint [N m]; empty if unknown.
-    errors : mapping of str to float
-        Residual of each joint over its torque [%].
+    misfit : Misfit
+        Residual of each joint; empty if unknown.
     recordings : int
         Number of recordings with this residual, at least one.
     as_diagnosed : bool
@@ -56,8 +54,7 @@ class KnownFit:
 
     grade: str
     reason: str
-    rms: Mapping[str, float]
-    errors: Mapping[str, float]
+    misfit: Misfit
     recordings: int = 1
     as_diagnosed: bool = False
 
@@ -66,10 +63,11 @@ class KnownFit:
         """Whether the model does not describe the arm."""
         return self.grade == 'unusable'
 
-    def torque(self, joint: str) -> float:
-        """Return the rms torque of a joint, zero if unknown [N m]."""
-        error = self.errors.get(joint, 0.0)
-        return 100.0 * self.rms[joint] / error if error > 0.0 else 0.0
+    @property
+    def errors(self) -> dict[str, float]:
+        """Residual of each joint over its torque [%], where the torque is known."""
+        torque = self.misfit.torque_rms or {}
+        return {j: 100.0 * rms / torque[j] for j, rms in self.misfit.rms.items() if torque.get(j)}
 
 
 @dataclass(frozen=True)
@@ -371,6 +369,41 @@ def _matrix(rows: Sequence[Mapping[str, float]], keys: Sequence[str]) -> FloatAr
     return np.array([[row.get(key, 0.0) for key in keys] for row in rows])
 
 
+def known_fit(document: Mapping[str, Any]) -> KnownFit | None:
+    """
+    Read the fit from identification.json or model.yaml; None if absent.
+
+    Raises
+    ------
+    ModelError, KeyError, TypeError or ValueError
+        If a key or value is missing or wrong.
+
+    """
+    block, training = document.get('misfit'), document.get('training')
+    as_diagnosed = block is not None
+    if not as_diagnosed:
+        if not training:
+            return None
+        rms, shares = (
+            {joint: finite(value, f'{key} of {joint}') for joint, value in rows.items()}
+            for key in ('rms', 'joint_relative_error_percent')
+            for rows in [training.get(key) or {}]
+        )
+        torque = {j: 100.0 * left / shares[j] if shares.get(j) else 0.0 for j, left in rms.items()}
+        block = {**training, 'data': 'training', 'rms': rms, 'torque_rms': torque}
+    misfit = misfit_of_block(block)
+    recordings = 1 if as_diagnosed else max(len(training.get('bags', ())), 1)
+    known = KnownFit('', '', misfit, recordings, as_diagnosed)
+    worst = max(known.errors, key=known.errors.__getitem__, default='')
+    error = known.errors.get(worst, misfit.relative_error_percent)
+    where = f' (worst joint: {worst})' if len(known.errors) > 1 else ''
+    reasons = document.get('reasons') or [
+        f'Torque error on {misfit.data} data: {error:.3g} %{where}.'
+    ]
+    grade = document.get('grade', by_error(error))
+    return replace(known, grade=str(grade), reason=str(reasons[0]))
+
+
 def _covariance(rows: list[list[float]] | None, size: int) -> FloatArray | None:
     """Return the symmetric matrix of a lower triangle."""
     if rows is None:
@@ -388,53 +421,3 @@ def _covariance(rows: list[list[float]] | None, size: int) -> FloatArray | None:
     if (np.diag(matrix) < 0.0).any() or (np.abs(matrix) > largest * (1.0 + 1e-9)).any():
         raise ValueError('a covariance with a negative variance or a correlation beyond one')
     return matrix
-
-
-def known_fit(document: Mapping[str, Any]) -> KnownFit | None:
-    """
-    Read the fit from identification.json or model.yaml; None if absent.
-
-    Raises
-    ------
-    KeyError, TypeError or ValueError
-        If a key or value is missing or wrong.
-
-    """
-    if document.get('misfit') is not None:
-        known = misfit_of_block(document['misfit'])
-        torque = known.torque_rms or {}
-        errors = {
-            j: 100.0 * remainder / torque[j] for j, remainder in known.rms.items() if torque.get(j)
-        }
-        overall = known.relative_error_percent
-        reason = _worst(errors, overall, f'{known.data} data')
-        grade = by_error(max(errors.values(), default=overall))
-        return KnownFit(grade, reason, known.rms, errors, as_diagnosed=True)
-    training = document.get('training')
-    if not training:
-        return None
-    rms, errors = (_by_joint(training, key) for key in ('rms', 'joint_relative_error_percent'))
-    overall = finite(training['relative_error_percent'], 'an error')
-    reasons = document.get('reasons') or [_worst(errors, overall, 'data that it was fitted to')]
-    grade = document.get('grade', by_error(max(errors.values(), default=overall)))
-    count = max(len(training.get('bags', ())), 1)
-    return KnownFit(str(grade), str(reasons[0]), rms, errors, count)
-
-
-def _worst(errors: Mapping[str, float], overall: float, data: str) -> str:
-    """Return a sentence on the joint with the largest error."""
-    if not errors:
-        return f'Torque error on {data}: {overall:.3g} %.'
-    joint = max(errors, key=lambda one: errors[one])
-    where = f' (worst joint: {joint})' if len(errors) > 1 else ''
-    return f'Torque error on {data}: {errors[joint]:.3g} %{where}.'
-
-
-def _by_joint(score: Mapping[str, Any], key: str) -> dict[str, float]:
-    """Return the values of a score by joint; empty if absent."""
-    values = {}
-    for joint, value in (score.get(key) or {}).items():
-        values[str(joint)] = finite(value, f'{key} of {joint}')
-        if values[str(joint)] < 0.0:
-            raise ValueError(f'{key} of {joint} is negative')
-    return values

@@ -278,13 +278,13 @@ def residual_changes(
         return ()
     freedoms = FREEDOM * after.recordings, FREEDOM * before.recordings
     found = []
-    for joint in (one for one in before.rms if one in after.rms):
-        torques = [one.torque(joint) for one in (before, after)]
+    for joint in (one for one in before.misfit.rms if one in after.misfit.rms):
+        left = [one.misfit.rms[joint] for one in (before, after)]
+        torques = [(one.misfit.torque_rms or {}).get(joint, 0.0) for one in (before, after)]
         # residual of a joint, as a share of its torque, below which filters rather than the arm
         # cause it
         first, second = (
-            max(one.rms[joint], 1e-3 * torque)
-            for one, torque in zip((before, after), torques, strict=True)
+            max(rms, 1e-3 * torque) for rms, torque in zip(left, torques, strict=True)
         )
         # the residual of a model grows with the torque
         growth = torques[1] / torques[0] if min(torques) > 0.0 else 1.0
@@ -294,6 +294,5 @@ def residual_changes(
             square = np.square(ratio)
         p_value = 2.0 * min(stats.f.sf(square, *freedoms), stats.f.cdf(square, *freedoms))
         errors = before.errors.get(joint), after.errors.get(joint)
-        left = before.rms[joint], after.rms[joint]
         found.append(ResidualChange(joint, *left, *errors, ratio, min(float(p_value), 1.0)))
     return tuple(found)

@@ -4,6 +4,7 @@
 from dataclasses import replace
 import json
 
+from armid_ros.arm import Misfit
 from armid_ros.errors import ModelError
 from armid_ros.estimate import ParameterName
 from armid_ros.identification.assess.compare import compare, residual_changes
@@ -297,8 +298,8 @@ def test_currents_beside_newton_metres_are_a_unit_and_no_change_of_the_arm(inver
 def fit(rms, torque=1.0, recordings=1, **others):
     """Return a model that leaves so much of a torque of 1 N m."""
     rms = dict(zip('abcdef', rms, strict=False))
-    errors = {joint: 100.0 * left / torque for joint, left in rms.items()}
-    return KnownFit('good', '', rms, errors, recordings, **others)
+    misfit = Misfit('training', rms, 1.0, dict.fromkeys(rms, torque))
+    return KnownFit('good', '', misfit, recordings, **others)
 
 
 def p_values(before, after):
