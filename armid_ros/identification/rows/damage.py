@@ -15,6 +15,7 @@ from armid_ros.identification.samples.straight_line import (
     growth_over,
     innovation_of,
     MAX_GAP,
+    quantile,
     robust_scale,
     share_of_noise,
     smallest_steps,
@@ -55,8 +56,7 @@ def without_damage(
         spread = 1.4826 * np.median(np.abs(some - np.median(some, axis=0)), axis=0)
         # noise of a torque over the spread of that torque, assumed before any fit
         floor = np.concatenate([np.zeros(len(joints)), 0.01 * spread / peak])
-        gate = SpikeGate([True] * len(joints), 'qt')  # angles of a recording are not wrapped
-        excursions = impossible_excursions(gate, t, np.hstack([recording.q, tau]), floor)
+        excursions = impossible_excursions(t, np.hstack([recording.q, tau]), floor)
         damaged = [sample.t for one in excursions for sample in one.samples]
         good = ~np.isin(t, damaged)
         if not damaged or not good.any():
@@ -81,9 +81,7 @@ def without_damage(
     return repaired, tuple(found)
 
 
-def impossible_excursions(
-    gate: SpikeGate, t: FloatArray, x: FloatArray, floor: FloatArray
-) -> list[Excursion]:
+def impossible_excursions(t: FloatArray, x: FloatArray, floor: FloatArray) -> list[Excursion]:
     """
     Return the physically impossible excursions of a recording, as found by a gate.
 
@@ -92,13 +90,11 @@ def impossible_excursions(
 
     Parameters
     ----------
-    gate : SpikeGate
-        Gate that judges the samples.
     t : ndarray, shape (N,)
         Stamps, at least 3, each after the one before [s].
-    x : ndarray, shape (N, m)
-        Signals.
-    floor : ndarray, shape (m,)
+    x : ndarray, shape (N, 2 n)
+        Positions and torques; angles are not wrapped.
+    floor : ndarray, shape (2 n,)
         Negligible error of a sample.
 
     Returns
@@ -106,7 +102,10 @@ def impossible_excursions(
     list of Excursion
 
     """
-    stretch, suspect, model = _suspects(gate, t, x, floor)
+    stretch, suspect, model = _suspects(t, x, floor)
+    if not suspect.any():
+        return []
+    gate = SpikeGate([True] * (x.shape[1] // 2), 'qt')
     found: list[Excursion] = []
     done = 0
     for k in np.flatnonzero(suspect).tolist():
@@ -134,7 +133,7 @@ def impossible_excursions(
 
 
 def _suspects(
-    gate: SpikeGate, t: FloatArray, x: FloatArray, floor: FloatArray
+    t: FloatArray, x: FloatArray, floor: FloatArray
 ) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.bool_], ErrorModel]:
     """
     Compare all samples with the straight lines through the two samples before.
@@ -146,6 +145,7 @@ def _suspects(
     """
     dt = np.diff(t)
     period = float(np.median(dt))
+    allowed = quantile(period, x.shape[1])
     gap = dt > MAX_GAP * period
     first = np.where(np.concatenate([[True], gap]), np.arange(len(t)), 0)
     apart = gap[1:] | gap[:-1]
@@ -168,7 +168,7 @@ def _suspects(
         resolution = min(step if np.isfinite(step) else 0.0, float(np.abs(error).max()))
         size = max(scales[loudest], resolution)
         model = ErrorModel(period, np.array([size]), np.array([white]))
-        limit = np.maximum(model.limits(gate.quantile(period), noise, acceleration), floor[signal])
+        limit = np.maximum(model.limits(allowed, noise, acceleration), floor[signal])
         # a smooth signal keeps its curvature
         error[1:] -= model.correlation * (error[:-1] / acceleration[:-1]) * acceleration[1:]
         suspect[2:] |= (np.abs(error) > limit) & ~apart

@@ -37,17 +37,18 @@ from armid_ros.identification.samples.straight_line import (
     all_unwrapped,
     ErrorModel,
     Excursion,
+    FALSE_ALARM_TIME,
     Innovation,
     innovation_of,
     MAX_GAP,
     NoiseLevel,
+    quantile,
     StreamSample,
     unwrapped,
 )
 from armid_ros.motion import FloatArray
 import numpy as np
 import numpy.typing as npt
-from scipy import stats
 
 #: Number of samples from which noise and period are measured before the first check.
 N_FIRST = 20
@@ -89,7 +90,7 @@ class SpikeGate:
         signals: str,
         *,
         torque_limit: npt.ArrayLike = 0.0,
-        false_alarm_time: float = 360000.0,
+        false_alarm_time: float = FALSE_ALARM_TIME,
     ) -> None:
         turning = ~np.asarray(prismatic, dtype=bool)
         kind = np.repeat(list(signals), len(turning))
@@ -190,7 +191,7 @@ class SpikeGate:
         self._level.set(model)
         self._restart(None if reference else [], reference, curvature)
         if reference:
-            self._period, self._quantile = model.period, self.quantile(model.period)
+            self._set_period(model.period)
 
     def possible(self, excursion: Excursion, lowest: FloatArray, highest: FloatArray) -> bool:
         """
@@ -205,11 +206,6 @@ class SpikeGate:
         beyond = np.maximum(lowest - values, values - highest).max(axis=0)
         far = beyond > np.maximum(excursion.limit, highest - lowest)
         return not bool(np.any((excursion.ratio > 1.0) & (far | ~self._pulsing)))
-
-    def quantile(self, period: float) -> float:
-        """Return the limit in standard deviations for the false alarm time, given a period [s]."""
-        chance = period / self._false_alarm_time / len(self._turn)
-        return float(stats.norm.isf(min(chance, 0.5) / 2.0))
 
     def _restart(
         self,
@@ -227,6 +223,11 @@ class SpikeGate:
         self._delayed = None
         self._period = np.inf
         self._quantile = 0.0
+
+    def _set_period(self, period: float) -> None:
+        """Set the sampling period [s], and the limit of errors that follows from it."""
+        self._period = period
+        self._quantile = quantile(period, len(self._turn), self._false_alarm_time)
 
     @property
     def _tail(self) -> StreamSample | None:
@@ -259,8 +260,7 @@ class SpikeGate:
         """Measure noise and period of the first samples, and check these samples."""
         raw, self._first = self._first or [], None
         first = all_unwrapped(raw, self._turn)
-        self._period = float(np.median(np.diff([s.t for s in first])))
-        self._quantile = self.quantile(self._period)
+        self._set_period(float(np.median(np.diff([s.t for s in first]))))
         innovations = self._lines_through(first)
         self._level.begin(innovations, np.diff([s.x for s in first], axis=0), self._period)
         straight = [bool(np.all(self._ratio_to_limit(m) <= 1.0)) for m in innovations]

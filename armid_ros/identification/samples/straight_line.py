@@ -27,6 +27,8 @@ WINDOW = 100
 #: Largest number of successive damaged samples, and of periods in a gap; a longer deviation is
 #: real, and a longer gap begins a new stretch.
 MAX_GAP = 10
+#: Mean time between two good samples that are left out by error, in normal noise [s].
+FALSE_ALARM_TIME = 360_000.0
 
 #: Growth factor of errors over other times, of one sample or of each, shape (N, 1).
 Factor = float | FloatArray
@@ -105,13 +107,6 @@ class ErrorModel:
         """Correlation of successive errors, 0 for noise, shape (m,)."""
         return np.clip(1.0 - (1.0 - _NOISE_CORRELATION) * self.white, 0.0, 1.0)
 
-    @cached_property
-    def _shares(self) -> tuple[FloatArray, FloatArray]:
-        """Return deviation of noise, and largest error by acceleration, over `size`, (m,)."""
-        # the largest acceleration of an arm is twice its 95 % quantile, which is 1.96 standard
-        # deviations of a normal variable
-        return np.sqrt(self.white), np.sqrt(1.0 - self.white) * (2.0 * 1.96)
-
     def limits(self, quantile: float, noise: Factor, acceleration: Factor) -> FloatArray:
         """
         Return the largest allowed prediction errors, shape (m,) or (N, m).
@@ -121,7 +116,9 @@ class ErrorModel:
         distribution.
 
         """
-        white, smooth = self._shares
+        # the largest acceleration of an arm is twice its 95 % quantile, which is 1.96 standard
+        # deviations of a normal variable
+        white, smooth = np.sqrt(self.white), np.sqrt(1.0 - self.white) * (2.0 * 1.96)
         tails = quantile * self.growth(noise, acceleration)
         return np.asarray(
             self.size * np.minimum(tails, quantile * white * noise + smooth * acceleration)
@@ -178,6 +175,11 @@ def all_unwrapped(samples: Sequence[StreamSample], turn: FloatArray) -> list[Str
     for sample in samples[1:]:
         found.append(replace(sample, x=unwrapped(sample.x, found[-1].x, turn)))
     return found
+
+
+def quantile(period: float, count: int, false_alarm_time: float = FALSE_ALARM_TIME) -> float:
+    """Return the limit of the errors of `count` signals, in standard deviations of noise."""
+    return float(-special.ndtri(min(period / false_alarm_time / count, 0.5) / 2.0))
 
 
 def robust_scale(innovations: FloatArray, share: float = 0.95) -> FloatArray:

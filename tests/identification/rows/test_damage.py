@@ -88,7 +88,7 @@ def test_a_gate_that_takes_every_sample_finds_the_same(seed):
     ):
         x[start : start + length, signal] += 9.0
     x[1525:, 1] += 0.5  # a change that lasts is none
-    found = impossible_excursions(SpikeGate([True], 'qt'), t, x, np.zeros(2))
+    found = impossible_excursions(t, x, np.zeros(2))
     gate = SpikeGate([True], 'qt')
     passed = [s.t for stamp, row in zip(t, x, strict=True) for s in gate.take(float(stamp), row)]
     left = [sample.t for one in found for sample in one.samples]
