@@ -29,7 +29,6 @@ from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from armid_ros.changes.statistic import quadratic_form
 from armid_ros.estimate import Estimate
 from armid_ros.identification.online.background import Background, Pieces
 from armid_ros.identification.online.change import Change, ChangeCandidate
@@ -105,9 +104,23 @@ class ScoreStatistics:
     strength: FloatArray
 
     def ratios(self, sets: npt.NDArray[np.intp]) -> FloatArray:
-        """Return twice the log likelihood ratio of G sets of p changes, (G, p): (G,)."""
-        information = self.information[sets[:, :, np.newaxis], sets[:, np.newaxis, :]]
-        return quadratic_form(self.score[sets], information, _MIN_EIGENVALUE)[0]
+        """
+        Return twice the log likelihood ratio of G sets of changes, shape (G,).
+
+        Parameters
+        ----------
+        sets : ndarray of int, shape (G, p)
+            Changes of each set; a set of fewer changes repeats one of them.
+
+        """
+        squares = np.diag(self.information)
+        # a change of which the window shows nothing has the ratio 0
+        scale = np.where(squares > 0.0, np.abs(squares), np.inf) ** -0.5
+        score, information = scale * self.score, np.outer(scale, scale) * self.information
+        own = information[sets[:, :, np.newaxis], sets[:, np.newaxis, :]]
+        own += _MIN_EIGENVALUE * np.eye(sets.shape[1])
+        values = np.linalg.solve(own, score[sets][:, :, np.newaxis])
+        return np.einsum('gp,gp->g', score[sets], values[:, :, 0])
 
     def size(self, some: slice) -> tuple[FloatArray, FloatArray]:
         """
@@ -210,12 +223,8 @@ class ChangeSearch:
         sizes = [len(c.parameters) for c in self._candidates]
         self._sizes, ends = np.array(sizes), np.cumsum(sizes)
         self._slices = [slice(end - size, end) for end, size in zip(ends, sizes, strict=True)]
-        firsts = ends - self._sizes
-        self._of_size = [
-            (some, firsts[some, np.newaxis] + np.arange(size))
-            for size in sorted(set(sizes))
-            for some in [np.flatnonzero(self._sizes == size)]
-        ]
+        places = np.minimum(np.arange(max(sizes)), self._sizes[:, np.newaxis] - 1)
+        self._sets = (ends - self._sizes)[:, np.newaxis] + places
         self.set_chance(chance)
         self.reset()
 
@@ -257,7 +266,7 @@ class ChangeSearch:
                 blocks[-m:], blocks[-m], self.directions, residual_scale
             )
             yield
-            statistics[m] = self._ratios(window), window.strength
+            statistics[m] = window.ratios(self._sets), window.strength
             yield
             if self._chance > 0.0:
                 excess = self._calibrations[m].excess(*statistics[m], self._chance)
@@ -291,12 +300,6 @@ class ChangeSearch:
         )
         return Estimate(candidate.parameters, values, covariance * usual)
 
-    def _ratios(self, window: ScoreStatistics) -> FloatArray:
-        ratios = np.empty(len(self._candidates))
-        for some, sets in self._of_size:
-            ratios[some] = window.ratios(sets)
-        return ratios
-
     def _judge(self, residual_scale: float) -> Pieces[FoundChange | None]:
         """Return onset and cause of the change; None if they are still ambiguous."""
         # difference of log-likelihoods from which one explanation is clearly better
@@ -307,7 +310,7 @@ class ChangeSearch:
                 blocks[k:], block, self.directions, residual_scale
             )
             yield
-            rows.append(self._ratios(window))
+            rows.append(window.ratios(self._sets))
             yield
         # log-likelihoods, with a penalty for each free parameter
         usual = np.nanmedian(np.concatenate([u.factors for u in self._calibrations.values()]))

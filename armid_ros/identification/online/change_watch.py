@@ -36,6 +36,8 @@ import numpy as np
 BLOCK_LENGTH = 0.25
 #: Samples in one piece of work; fewer arrive in the meantime, so that the backlog shrinks.
 _SAMPLES_PER_PIECE = 10
+#: Arrays of a motion.
+_OF_MOTION = 't', 'q', 'dq', 'ddq'
 Item = TypeVar('Item')
 
 
@@ -109,10 +111,10 @@ class NuisanceRows:
 
     def columns(self, rows: Sequence[Row]) -> Pieces[FloatArray]:
         """Compute the columns of N successive rows, shape (N, n, K n), in pieces."""
-        moved = [(row.motion.q, row.motion.dq, row.motion.ddq) for row in rows]
-        q, dq, ddq = (np.stack(part) for part in zip(*moved, strict=True))
-        t = np.array([row.motion.t for row in rows])
-        motion = Motion(self._arm.robot.joints, t, q, dq, ddq)
+        motion = Motion(
+            self._arm.robot.joints,
+            *(np.array([getattr(row.motion, name) for row in rows]) for name in _OF_MOTION),
+        )
         # friction per unit of each quantity; every quantity acts on its own joint only
         torques = np.empty((len(rows), motion.n_joints, len(self._effects)))
         for k, effect in enumerate(self._effects):

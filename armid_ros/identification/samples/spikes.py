@@ -45,6 +45,7 @@ from armid_ros.identification.samples.straight_line import (
     quantile,
     StreamSample,
     unwrapped,
+    WINDOW,
 )
 from armid_ros.motion import FloatArray
 import numpy as np
@@ -168,6 +169,16 @@ class SpikeGate:
             return self._judge(sample)
         self._first.append(sample)
         return self._begin() if len(self._first) == N_FIRST else []
+
+    def settle(self) -> bool:
+        """
+        Update the usual errors if a window is nearly complete; return whether it was.
+
+        Otherwise `take` does so with the sample that completes the window. A stream calls this
+        with a sample that needs no other work.
+
+        """
+        return self._level.settle(self._period, WINDOW - 4)
 
     def begin(
         self,

@@ -282,10 +282,10 @@ class NoiseLevel:
         self._moves[self._waiting] = move
         self._waiting += 1
 
-    def settle(self, period: float) -> None:
-        """Update the usual error when a window of errors is complete."""
-        if self._waiting < WINDOW:
-            return
+    def settle(self, period: float, count: int = WINDOW) -> bool:
+        """Update the usual error if a number of errors is known; return whether it was."""
+        if self._waiting < count:
+            return False
         growths, moves = self._growths[: self._waiting], self._moves[: self._waiting]
         errors = self._errors[: self._waiting] / self.model.growth(growths[:, 0], growths[:, 1])
         self._waiting = 0
@@ -296,6 +296,7 @@ class NoiseLevel:
         loudest = np.argmax(self._sizes, axis=0), np.arange(len(size))
         size = np.maximum(self._sizes[loudest], self._min_error(period))
         self.model = ErrorModel(period, size, self._shares[loudest])
+        return True
 
     def _remember(self, size: FloatArray, white: FloatArray) -> None:
         place = self._seen % len(self._sizes)
