@@ -27,7 +27,7 @@ from armid_ros.effects.catalogue import (
     register,
     USUAL_EFFECTS,
 )
-from armid_ros.effects.layout import joint_columns, scatter
+from armid_ros.effects.joint_law import joint_columns, scatter
 from armid_ros.effects.quantities import Quantity, Shape
 from armid_ros.effects.readings import Displacing, TorqueReading
 from armid_ros.effects.slipping import Hysteresis

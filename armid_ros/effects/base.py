@@ -22,13 +22,7 @@ from dataclasses import dataclass, replace
 from typing import Any, ClassVar, Protocol, Self
 
 from armid_ros.effects.action import Action, Displacement
-from armid_ros.effects.quantities import (
-    joint_unit,
-    places_among,
-    Quantity,
-    Shape,
-    spread_shape,
-)
+from armid_ros.effects.quantities import joint_unit, places_among, Quantity, Shape
 from armid_ros.effects.traits import TRAITS, Traits
 from armid_ros.errors import meant, ModelError
 from armid_ros.estimate import ParameterName
@@ -192,10 +186,6 @@ class Effect(ABC):
     def shape_values(self) -> FloatArray:
         """Shape parameters, shape (number of owners, S)."""
         return np.array(self.shape).reshape(len(self.owners), len(self.shapes))
-
-    def shape_over_joints(self, robot: Robot) -> FloatArray:
-        """Return each shape parameter for all joints of a robot, with defaults, shape (S, n)."""
-        return spread_shape(self.shapes, self.shape, self.joints, robot.joints)
 
     def with_shape(self, values: npt.ArrayLike) -> Effect:
         """

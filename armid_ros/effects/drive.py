@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from armid_ros.effects.action import Action
 from armid_ros.effects.base import Arm, Effect, Unexplained
-from armid_ros.effects.layout import joint_columns, scatter
+from armid_ros.effects.joint_law import joint_columns, JointLaw, scatter
 from armid_ros.effects.quantities import Quantity, Shape
 from armid_ros.effects.readings import TorqueReading
 from armid_ros.motion import FloatArray, Motion
@@ -46,7 +46,7 @@ _MIN_RIPPLE_ORDER = 1.5
 
 
 @dataclass(frozen=True)
-class TorqueRipple(Effect):
+class TorqueRipple(JointLaw):
     """
     Torque that repeats at a fixed angle, tau = A sin(n q) + B cos(n q).
 
@@ -92,23 +92,12 @@ class TorqueRipple(Effect):
         """Return whether the order is above the range that other causes explain."""
         return bool(np.all(self.shape_values > 1.05 * _MIN_RIPPLE_ORDER))
 
-    def columns(self, motion: Motion, arm: Arm) -> FloatArray:
-        """Return dtau/d(A, B) = (sin(n q), cos(n q)) [-], shape (N, n, P)."""
-        (order,) = self.shape_over_joints(arm.robot)
-        own, (sine, cosine) = list(self.indices(motion.joints)), np.zeros((2, *motion.q.shape))
-        angle = order[own] * motion.q[:, own]
-        sine[:, own], cosine[:, own] = np.sin(angle), np.cos(angle)
-        return joint_columns(self, motion, sine, cosine)
-
-    def action(self, values: FloatArray, arm: Arm) -> Action:
-        """Return an action with the ripple torque."""
-        (order,) = self.shape_over_joints(arm.robot)
-        sine, cosine = scatter(self, values, arm.robot)
-
-        def torque(t: FloatArray, q: FloatArray, dq: FloatArray) -> FloatArray:
-            return np.asarray(sine * np.sin(order * q) + cosine * np.cos(order * q))
-
-        return Action(torque=torque)
+    def law(
+        self, t: FloatArray, q: FloatArray, dq: FloatArray, forwards: FloatArray
+    ) -> tuple[FloatArray, ...]:
+        """Return sin(n q) and cos(n q) [-]."""
+        angle = self.shape_values[:, 0] * q
+        return np.sin(angle), np.cos(angle)
 
 
 def wave_orders(unexplained: Unexplained, joint: int, between: tuple[float, float]) -> FloatArray:
@@ -209,7 +198,7 @@ class ActuatorSaturation(TorqueReading):
     def action(self, values: FloatArray, arm: Arm) -> Action:
         """Return the law of the drives and the law of the reading."""
         lost = scatter(self, values, arm.robot)[0]
-        (level,) = self.shape_over_joints(arm.robot)
+        (level,) = scatter(self, self.shape_values, arm.robot)
 
         def drive(tau: FloatArray) -> FloatArray:
             return np.asarray(tau - lost * _beyond(tau, level))

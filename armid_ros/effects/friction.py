@@ -8,9 +8,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar, Self
 
-from armid_ros.effects.action import Action, direction, DryFriction, merge_actions
+from armid_ros.effects.action import Action, direction, DryFriction
 from armid_ros.effects.base import Arm, Effect
-from armid_ros.effects.layout import joint_columns, scatter
+from armid_ros.effects.joint_law import joint_columns, JointLaw, scatter
 from armid_ros.effects.quantities import MIN_Z_SCORE, Quantity, Shape
 from armid_ros.files import finite
 from armid_ros.motion import FloatArray, Motion, Temperatures
@@ -71,7 +71,7 @@ class CoulombFriction(Effect):
 
 
 @dataclass(frozen=True)
-class AsymmetricFriction(Effect):
+class AsymmetricFriction(JointLaw):
     """
     Difference of friction between the two directions of motion.
 
@@ -98,24 +98,15 @@ class AsymmetricFriction(Effect):
         shift, doubt = (np.abs(scatter(self, each, arm.robot)[0]) for each in (values, std))
         return bool(np.all(shift <= known + MIN_Z_SCORE * doubt))
 
-    def columns(self, motion: Motion, arm: Arm) -> FloatArray:
-        """Return dtau/d(dFc, dFv) = (|sign(dq)|, |dq|), shape (N, n, P)."""
-        forwards = direction(motion)
-        return joint_columns(self, motion, forwards**2, forwards * motion.dq)
-
-    def action(self, values: FloatArray, arm: Arm) -> Action:
-        """Return the shift of the dry friction levels, and the torque proportional to |dq|."""
-        coulomb, viscous = scatter(self, values, arm.robot)
-
-        def torque(t: FloatArray, q: FloatArray, dq: FloatArray) -> FloatArray:
-            return np.asarray(viscous * np.abs(dq))
-
-        levels = DryFriction(np.eye(len(coulomb)), coulomb, coulomb)
-        return Action(dry_friction=levels, torque=torque)
+    def law(
+        self, t: FloatArray, q: FloatArray, dq: FloatArray, forwards: FloatArray
+    ) -> tuple[FloatArray, ...]:
+        """Return |sign(dq)| and |dq|."""
+        return forwards**2, forwards * dq
 
 
 @dataclass(frozen=True)
-class QuadraticFriction(Effect):
+class QuadraticFriction(JointLaw):
     """
     Friction torque that grows with the square of the joint velocity, tau = Fq dq |dq|.
 
@@ -131,22 +122,15 @@ class QuadraticFriction(Effect):
     summary = 'friction that grows with the square of the velocity, or flattens'
     quantities = (Quantity('quadratic_coefficient', 'N m s^2/rad^2', typical=(0.0004, 1.0)),)
 
-    def columns(self, motion: Motion, arm: Arm) -> FloatArray:
-        """Return dtau/dFq = dq |dq| [rad^2/s^2], shape (N, n, P)."""
-        return joint_columns(self, motion, motion.dq * np.abs(motion.dq))
-
-    def action(self, values: FloatArray, arm: Arm) -> Action:
-        """Return an action with the torque that is quadratic in the velocity."""
-        (quadratic,) = scatter(self, values, arm.robot)
-
-        def torque(t: FloatArray, q: FloatArray, dq: FloatArray) -> FloatArray:
-            return np.asarray(quadratic * dq * np.abs(dq))
-
-        return Action(torque=torque)
+    def law(
+        self, t: FloatArray, q: FloatArray, dq: FloatArray, forwards: FloatArray
+    ) -> tuple[FloatArray, ...]:
+        """Return dq |dq| [rad^2/s^2]."""
+        return (dq * np.abs(dq),)
 
 
 @dataclass(frozen=True)
-class StribeckFriction(Effect):
+class StribeckFriction(JointLaw):
     """
     Friction in addition to Coulomb friction that decreases with velocity by lubrication.
 
@@ -167,28 +151,16 @@ class StribeckFriction(Effect):
     )
     holds_at_rest = True
 
-    def columns(self, motion: Motion, arm: Arm) -> FloatArray:
-        """Return dtau/ddFs = exp(-|dq / vs|^d) sign(dq) [-], shape (N, n, P)."""
-        return joint_columns(self, motion, self._left(motion.dq, arm) * direction(motion))
-
-    def action(self, values: FloatArray, arm: Arm) -> Action:
-        """Return an action with dry friction of breakaway, and its decrease with velocity."""
-        (breakaway,) = scatter(self, values, arm.robot)
-
-        def torque(t: FloatArray, q: FloatArray, dq: FloatArray) -> FloatArray:
-            return np.asarray(breakaway * (self._left(dq, arm) - 1.0) * np.sign(dq))
-
-        dry = DryFriction(np.eye(len(breakaway)), -breakaway, breakaway)
-        return Action(dry_friction=dry, torque=torque)
-
-    def _left(self, dq: FloatArray, arm: Arm) -> FloatArray:
-        """Return the remaining share of the breakaway torque at a velocity."""
-        velocity, exponent = self.shape_over_joints(arm.robot)
-        return np.asarray(np.exp(-(np.abs(dq / velocity) ** exponent)))
+    def law(
+        self, t: FloatArray, q: FloatArray, dq: FloatArray, forwards: FloatArray
+    ) -> tuple[FloatArray, ...]:
+        """Return exp(-|dq / vs|^d) sign(dq) [-]."""
+        velocity, exponent = self.shape_values.T
+        return (np.exp(-(np.abs(dq / velocity) ** exponent)) * forwards,)
 
 
 @dataclass(frozen=True)
-class ThermalFriction(Effect):
+class ThermalFriction(JointLaw):
     """
     Viscous friction that changes while the joint warms up, tau = dFv (1 - exp(-t / T)) dq.
 
@@ -212,22 +184,11 @@ class ThermalFriction(Effect):
         """Return the class that also has a change that is present from the beginning."""
         return ThermalChange
 
-    def columns(self, motion: Motion, arm: Arm) -> FloatArray:
-        """Return dtau/ddFv = (1 - exp(-t / T)) dq [rad/s], shape (N, n, P)."""
-        return joint_columns(self, motion, self._warm(motion.t, arm) * motion.dq)
-
-    def action(self, values: FloatArray, arm: Arm) -> Action:
-        """Return an action with the change of the viscous torque."""
-        (change,) = scatter(self, values, arm.robot)
-
-        def torque(t: FloatArray, q: FloatArray, dq: FloatArray) -> FloatArray:
-            return np.asarray(change * self._warm(t, arm) * dq)
-
-        return Action(torque=torque)
-
-    def _warm(self, t: FloatArray, arm: Arm) -> FloatArray:
-        (constant,) = self.shape_over_joints(arm.robot)
-        return np.asarray(-np.expm1(-np.asarray(t)[..., np.newaxis] / constant))
+    def law(
+        self, t: FloatArray, q: FloatArray, dq: FloatArray, forwards: FloatArray
+    ) -> tuple[FloatArray, ...]:
+        """Return (1 - exp(-t / T)) dq [rad/s]."""
+        return (-np.expm1(-t / self.shape_values[:, 0]) * dq,)
 
 
 @dataclass(frozen=True)
@@ -248,14 +209,11 @@ class ThermalChange(ThermalFriction):
         """Return the name of the change while the joint warms up."""
         return ThermalFriction.name
 
-    def columns(self, motion: Motion, arm: Arm) -> FloatArray:
-        """Return dtau/ddFv and dtau/dc [rad/s], shape (N, n, P)."""
-        return joint_columns(self, motion, self._warm(motion.t, arm) * motion.dq, motion.dq)
-
-    def action(self, values: FloatArray, arm: Arm) -> Action:
-        """Return an action with the sum of both viscous torques."""
-        both = self.named_as(values, arm)
-        return merge_actions(arm.robot, [part.action(own, arm) for part, own in both])
+    def law(
+        self, t: FloatArray, q: FloatArray, dq: FloatArray, forwards: FloatArray
+    ) -> tuple[FloatArray, ...]:
+        """Return (1 - exp(-t / T)) dq and dq [rad/s]."""
+        return *super().law(t, q, dq, forwards), dq
 
     def named_as(self, values: FloatArray, arm: Arm) -> tuple[tuple[Effect, FloatArray], ...]:
         """Return thermal_friction and viscous_friction with their values."""

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from armid_ros.effects.action import Action, direction, DryFriction
 from armid_ros.effects.base import Arm, Effect
-from armid_ros.effects.layout import joint_columns, scatter
+from armid_ros.effects.joint_law import joint_columns, scatter
 from armid_ros.effects.quantities import Quantity, Shape
 from armid_ros.effects.slipping import Hysteresis
 from armid_ros.motion import FloatArray, Motion

@@ -18,7 +18,7 @@ from typing import Any, Self
 
 from armid_ros.effects.action import Action
 from armid_ros.effects.base import Arm, Effect
-from armid_ros.effects.layout import joint_columns, scatter
+from armid_ros.effects.joint_law import joint_columns, scatter
 from armid_ros.effects.quantities import Quantity
 from armid_ros.errors import ModelError
 from armid_ros.files import finite

@@ -7,7 +7,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import lru_cache
 
-from armid_ros.motion import FloatArray, read_only
 from armid_ros.robots import Robot
 import numpy as np
 
@@ -178,16 +177,3 @@ def written_units(unit: str) -> tuple[str, ...]:
 def places_among(joints: tuple[str, ...], among: tuple[str, ...]) -> tuple[int, ...]:
     """Return the indices of joints; cached, because streams repeat the call per sample."""
     return tuple(among.index(joint) for joint in joints)
-
-
-@lru_cache(maxsize=1024)
-def spread_shape(
-    shapes: tuple[Shape, ...],
-    values: tuple[float, ...],
-    joints: tuple[str, ...],
-    among: tuple[str, ...],
-) -> FloatArray:
-    """Return the shape parameters of all joints, defaults included, shape (S, n)."""
-    spread = np.tile([[s.default] for s in shapes], len(among))
-    spread[:, places_among(joints, among)] = np.array(values).reshape(-1, len(shapes)).T
-    return read_only(spread)

@@ -73,11 +73,16 @@ class TorqueReading(Effect):
 
         """
 
-    @abstractmethod
     def transfer(
         self, values: FloatArray, motion: Motion, tau: FloatArray, columns: FloatArray
     ) -> FloatArray:
-        """Apply the derivative of the reading by the torque to columns, shape (N, n, Q)."""
+        """
+        Apply the derivative of the reading by the torque to columns, shape (N, n, Q).
+
+        By default, the reading is linear in the torque, and `read` takes columns as well.
+
+        """
+        return self.read(values, motion, columns)
 
     @abstractmethod
     def sensitivity(self, values: FloatArray, motion: Motion, tau: FloatArray) -> FloatArray:

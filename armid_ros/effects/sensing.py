@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from armid_ros.effects.action import Action, Displacement
 from armid_ros.effects.base import Arm, Effect, Unexplained
-from armid_ros.effects.layout import joint_columns, scatter
+from armid_ros.effects.joint_law import joint_columns, scatter
 from armid_ros.effects.quantities import Quantity, Shape
 from armid_ros.effects.readings import Displacing, TorqueReading
 from armid_ros.motion import FloatArray, Motion
@@ -60,23 +60,14 @@ class TorqueGain(TorqueReading):
     quantities = (Quantity('gain_error', '', lower=-0.95, typical=(0.005, 0.3)),)
 
     def read(self, values: FloatArray, motion: Motion, tau: FloatArray) -> FloatArray:
-        """Return the scaled torque, shape (N, n) [N m]."""
-        return np.asarray(tau * self._gain(values, motion))
-
-    def transfer(
-        self, values: FloatArray, motion: Motion, tau: FloatArray, columns: FloatArray
-    ) -> FloatArray:
-        """Return columns of true torques, scaled to columns of readings."""
-        return np.asarray(columns * self._gain(values, motion)[:, np.newaxis])
+        """Return the scaled torque, shape (N, n) [N m], or scaled columns."""
+        gain = np.ones(motion.n_joints)
+        gain[self.indices(motion.joints)] += values
+        return np.asarray(tau * gain.reshape(-1, *(1,) * (tau.ndim - 2)))
 
     def sensitivity(self, values: FloatArray, motion: Motion, tau: FloatArray) -> FloatArray:
         """Return the torque [N m], shape (N, n, P)."""
         return joint_columns(self, motion, tau)
-
-    def _gain(self, values: FloatArray, motion: Motion) -> FloatArray:
-        gain = np.ones(motion.n_joints)
-        gain[self.indices(motion.joints)] += values
-        return gain
 
 
 @dataclass(frozen=True)

@@ -6,17 +6,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from armid_ros.effects.action import Action
-from armid_ros.effects.base import Arm, Effect, Unexplained
-from armid_ros.effects.layout import joint_columns, scatter
+from armid_ros.effects.base import Arm, Unexplained
+from armid_ros.effects.joint_law import JointLaw
 from armid_ros.effects.quantities import MIN_Z_SCORE, Quantity, Shape
-from armid_ros.motion import FloatArray, Motion
+from armid_ros.motion import FloatArray
 from armid_ros.robots import Robot
 import numpy as np
 
 
 @dataclass(frozen=True)
-class JointSpring(Effect):
+class JointSpring(JointLaw):
     """
     Spring on a joint, such as a cable, a hose or a balancer, tau = k q + preload.
 
@@ -34,18 +33,13 @@ class JointSpring(Effect):
         Quantity('spring_preload', 'N m', typical=(0.01, 50.0)),
     )
 
-    def columns(self, motion: Motion, arm: Arm) -> FloatArray:
-        """Return dtau/d(k, preload) = (q, 1), shape (N, n, P)."""
-        return joint_columns(self, motion, arm.link_motion(motion).q, np.ones_like(motion.q))
+    on_links = True
 
-    def action(self, values: FloatArray, arm: Arm) -> Action:
-        """Return the torque of the springs, without columns to save time in simulations."""
-        stiffness, preload = scatter(self, values, arm.robot)
-
-        def torque(t: FloatArray, q: FloatArray, dq: FloatArray) -> FloatArray:
-            return np.asarray(stiffness * q + preload)
-
-        return Action(link_torque=torque)
+    def law(
+        self, t: FloatArray, q: FloatArray, dq: FloatArray, forwards: FloatArray
+    ) -> tuple[FloatArray, ...]:
+        """Return q and 1."""
+        return q, np.ones_like(q)
 
     def plausible(self, values: FloatArray, std: FloatArray, arm: Arm) -> bool:
         """Return whether the stiffness is significant; a preload alone is an offset."""
@@ -53,7 +47,7 @@ class JointSpring(Effect):
 
 
 @dataclass(frozen=True)
-class SoftLimit(Effect):
+class SoftLimit(JointLaw):
     """
     Bumpers that push back beyond a position at either end of the range of motion.
 
@@ -73,6 +67,8 @@ class SoftLimit(Effect):
         Shape('upper_position', 'rad', -1e4, 1e4, 1.0, (0.5, 1.0, 1.5, 2.0)),
     )
 
+    on_links = True
+
     def _default_shape(self, robot: Robot) -> FloatArray:
         joints = self.indices(robot.joints)
         lower, upper = robot.lower[joints], robot.upper[joints]
@@ -91,8 +87,9 @@ class SoftLimit(Effect):
         depth = (highest - lowest) * np.array((0.02, 0.05, 0.1, 0.2, 0.3))
         return lowest + depth, highest - depth
 
-    def columns(self, motion: Motion, arm: Arm) -> FloatArray:
-        """Return the signed compression of each bumper [rad], shape (N, n, P)."""
-        q = arm.link_motion(motion).q
-        lower, upper = self.shape_over_joints(arm.robot)
-        return joint_columns(self, motion, -np.maximum(lower - q, 0.0), np.maximum(q - upper, 0.0))
+    def law(
+        self, t: FloatArray, q: FloatArray, dq: FloatArray, forwards: FloatArray
+    ) -> tuple[FloatArray, ...]:
+        """Return the signed compression of each bumper [rad]."""
+        lower, upper = self.shape_values.T
+        return -np.maximum(lower - q, 0.0), np.maximum(q - upper, 0.0)

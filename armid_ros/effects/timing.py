@@ -4,12 +4,11 @@
 
 from __future__ import annotations
 
-from abc import abstractmethod
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
 from armid_ros.effects.base import Arm
-from armid_ros.effects.layout import joint_columns
+from armid_ros.effects.joint_law import joint_columns
 from armid_ros.effects.quantities import Quantity
 from armid_ros.effects.readings import TorqueReading
 from armid_ros.errors import ModelError
@@ -23,20 +22,6 @@ from scipy.signal import butter, lfilter, sosfiltfilt
 @dataclass(frozen=True)
 class LateReading(TorqueReading):
     """Late torque reading, with an error proportional to the rate of the torque."""
-
-    @abstractmethod
-    def _late(self, values: FloatArray, motion: Motion, x: FloatArray) -> FloatArray:
-        """Return delayed signals of all joints, shape (N, n, ...)."""
-
-    def read(self, values: FloatArray, motion: Motion, tau: FloatArray) -> FloatArray:
-        """Return the delayed torque, shape (N, n) [N m]."""
-        return self._late(values, motion, tau)
-
-    def transfer(
-        self, values: FloatArray, motion: Motion, tau: FloatArray, columns: FloatArray
-    ) -> FloatArray:
-        """Return the columns with the delay of the torque."""
-        return self._late(values, motion, columns)
 
     def columns(self, motion: Motion, arm: Arm) -> FloatArray:
         """
@@ -85,13 +70,17 @@ class TimeDelay(LateReading):
 
     def sensitivity(self, values: FloatArray, motion: Motion, tau: FloatArray) -> FloatArray:
         """Return -dtau/dt at the earlier time [N m/s], shape (N, n, P)."""
-        return _by_owner(self, motion, -self._late(values, motion, tau, derivative=1))
+        return _by_owner(self, motion, -self._delayed(values, motion, tau, derivative=1))
 
     def memory(self, values: FloatArray) -> float:
         """Return the longest delay [s]."""
         return float(np.max(np.abs(values)))
 
-    def _late(
+    def read(self, values: FloatArray, motion: Motion, tau: FloatArray) -> FloatArray:
+        """Return the delayed torque, shape (N, n) [N m], or delayed columns."""
+        return self._delayed(values, motion, tau)
+
+    def _delayed(
         self, values: FloatArray, motion: Motion, x: FloatArray, derivative: int = 0
     ) -> FloatArray:
         rate = rate_of_change(motion.t, x)
@@ -120,11 +109,12 @@ class TorqueLag(LateReading):
     linear = False
     instantaneous = False
 
-    def _late(self, values: FloatArray, motion: Motion, x: FloatArray) -> FloatArray:
-        result = x.copy()
+    def read(self, values: FloatArray, motion: Motion, tau: FloatArray) -> FloatArray:
+        """Return the filtered torque, shape (N, n) [N m], or filtered columns."""
+        result = tau.copy()
         for lag, rows in zip(values, self._owned(motion), strict=True):
             if lag:
-                result[:, rows] = low_pass(motion.t, x[:, rows], float(lag))
+                result[:, rows] = low_pass(motion.t, tau[:, rows], float(lag))
         return result
 
     def sensitivity(self, values: FloatArray, motion: Motion, tau: FloatArray) -> FloatArray:

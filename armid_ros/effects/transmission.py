@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 
 from armid_ros.effects.action import Action, Displacement, Transmission
 from armid_ros.effects.base import Arm
-from armid_ros.effects.layout import joint_columns, scatter
+from armid_ros.effects.joint_law import joint_columns, scatter
 from armid_ros.effects.quantities import Quantity, Shape
 from armid_ros.effects.readings import Displacing
 from armid_ros.effects.timing import low_pass, rate_of_change, within_band
@@ -48,7 +48,7 @@ class JointElasticity(Displacing):
     def displacements(self, motion: Motion, arm: Arm) -> Displacement:
         """Return the negative torque that twists the transmission, and its time derivatives."""
         load = within_band(motion, arm.load(motion))
-        (retardation,) = self.shape_over_joints(arm.robot)
+        (retardation,) = scatter(self, self.shape_values, arm.robot)
         for joint in np.flatnonzero(retardation):
             load[:, joint] = low_pass(motion.t, load[:, joint], float(retardation[joint]))
         return _twist(self, motion, load)
@@ -56,7 +56,7 @@ class JointElasticity(Displacing):
     def action(self, values: FloatArray, arm: Arm) -> Action:
         """Return springs and dampers, and their effect on motor encoder readings."""
         (compliance,) = scatter(self, values, arm.robot)
-        (retardation,) = self.shape_over_joints(arm.robot)
+        (retardation,) = scatter(self, self.shape_values, arm.robot)
         with np.errstate(divide='ignore'):
             stiffness = np.where(compliance > 0.0, 1.0 / compliance, np.inf)
         damping = np.where(compliance > 0.0, retardation, 0.0) * np.where(
@@ -92,15 +92,14 @@ class Backlash(Displacing):
 
     def displacements(self, motion: Motion, arm: Arm) -> Displacement:
         """Return the negative motor position in the gap, as a share, and its time derivatives."""
-        (width,) = self.shape_over_joints(arm.robot)
         load = arm.load(motion)
         inertia = np.diagonal(arm.load_derivatives(motion)[2], axis1=1, axis2=2)
         place = np.zeros(motion.q.shape)
-        for joint in self.indices(motion.joints):
+        for joint, (width,) in zip(self.indices(motion.joints), self.shape_values, strict=True):
             # lower limit of the inertia, for a link without inertia [kg m^2]
             pull = load[:, joint] / np.maximum(inertia[:, joint], 1e-9)
-            place[:, joint] = place_in_gap(motion.t, pull, float(width[joint]))
-        return _twist(self, motion, place / width)
+            place[:, joint] = place_in_gap(motion.t, pull, float(width)) / width
+        return _twist(self, motion, place)
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
         """Return the gaps, and their effect on motor encoder readings."""

@@ -1,0 +1,152 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Effects on each joint separately, and the arrangement of their parameters."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import ClassVar
+
+from armid_ros.effects.action import Action, direction, DryFriction
+from armid_ros.effects.base import Arm, Effect
+from armid_ros.effects.quantities import places_among
+from armid_ros.motion import FloatArray, Motion
+from armid_ros.robots import Robot
+import numpy as np
+import numpy.typing as npt
+
+
+@dataclass(frozen=True)
+class JointLaw(Effect):
+    """Effect on each joint separately, by a law of time and of the motion of the joint."""
+
+    #: Whether the torque acts on the link side of an elastic transmission.
+    on_links: ClassVar[bool] = False
+
+    @abstractmethod
+    def law(
+        self, t: FloatArray, q: FloatArray, dq: FloatArray, forwards: FloatArray
+    ) -> tuple[FloatArray, ...]:
+        """
+        Return the torque per unit of each quantity, for the k joints of the effect alone.
+
+        Parameters
+        ----------
+        t : ndarray, shape (..., 1)
+            Time since the begin of the recording [s].
+        q, dq : ndarray, shape (..., k)
+            Positions and velocities.
+        forwards : ndarray, shape (..., k)
+            Direction of motion, from -1 to 1. A law that depends on it holds the joint at rest,
+            between levels that depend on nothing else.
+
+        Returns
+        -------
+        tuple of ndarray, each of shape (..., k)
+            One array for each quantity.
+
+        """
+
+    def columns(self, motion: Motion, arm: Arm) -> FloatArray:
+        """Return the law along a motion, shape (N, n, P)."""
+        side = arm.link_motion(motion) if self.on_links else motion
+        own = self.indices(motion.joints)
+        states = (part[:, own] for part in (side.q, side.dq, direction(side)))
+        return _placed(self, motion, self.law(motion.t[:, np.newaxis], *states))
+
+    def action(self, values: FloatArray, arm: Arm) -> Action:
+        """Return the levels of a joint at rest as dry friction, and the other torque."""
+        own, n = self.indices(arm.robot.joints), arm.robot.n_joints
+        amplitudes = values.reshape(len(own), -1).T
+
+        def total(*state: FloatArray) -> FloatArray:
+            laws = self.law(*state)
+            return np.asarray(sum(a * law for a, law in zip(amplitudes, laws, strict=True)))
+
+        lower, upper = np.zeros((2, len(own)))
+        if self.holds_at_rest:
+            rest = np.zeros(1), lower, lower
+            lower, upper = (total(*rest, np.full(len(own), sign)) for sign in (-1.0, 1.0))
+
+        def torque(t: FloatArray, q: FloatArray, dq: FloatArray) -> FloatArray:
+            tau, moving = np.zeros(np.shape(q)), dq[..., own]
+            forwards = np.where(moving < 0.0, -1.0, 1.0)
+            level = np.where(moving < 0.0, lower, upper)
+            time = np.asarray(t)[..., np.newaxis]
+            tau[..., own] = total(time, q[..., own], moving, forwards) - level
+            return tau
+
+        if self.on_links:
+            return Action(link_torque=torque)
+        levels = DryFriction(np.eye(n)[own], lower, upper) if self.holds_at_rest else None
+        return Action(torque=torque, dry_friction=levels)
+
+
+def joint_columns(effect: Effect, motion: Motion, *quantities: FloatArray) -> FloatArray:
+    """
+    Return the columns of an effect that acts on each of its joints separately.
+
+    Parameters
+    ----------
+    effect : Effect
+        Effect with the joints.
+    motion : Motion
+        Motion with the joint order.
+    *quantities : ndarray, shape (N, n)
+        One array per quantity of the effect: dtau_j / dtheta_j for all joints of the motion.
+
+    Returns
+    -------
+    ndarray, shape (N, n, P)
+        Zero where a parameter belongs to another joint.
+
+    """
+    own = effect.indices(motion.joints)
+    return _placed(effect, motion, [values[:, own] for values in quantities])
+
+
+def scatter(effect: Effect, values: FloatArray, robot: Robot) -> FloatArray:
+    """
+    Spread values of a joint effect over all joints of the robot, zero elsewhere.
+
+    Parameters
+    ----------
+    effect : Effect
+        Effect with k joints.
+    values : ndarray, shape (k c,)
+        Values of c quantities or shapes, joint by joint.
+    robot : Robot
+        The arm.
+
+    Returns
+    -------
+    ndarray, shape (c, n)
+
+    """
+    rows = values.reshape(len(effect.joints), -1).T
+    spread = np.zeros((len(rows), robot.n_joints))
+    spread[:, effect.indices(robot.joints)] = rows
+    return spread
+
+
+def _placed(effect: Effect, motion: Motion, quantities: Sequence[FloatArray]) -> FloatArray:
+    """Return the columns of quantities of the joints of an effect, each (N, k)."""
+    size = len(quantities) * len(effect.joints)
+    columns = np.zeros((len(motion), motion.n_joints * size))
+    places = _flat_places(effect.joints, motion.joints, len(quantities))
+    for place, values in zip(places, quantities, strict=True):
+        columns[:, place] = values
+    return columns.reshape(len(motion), motion.n_joints, size)
+
+
+@lru_cache(maxsize=1024)
+def _flat_places(
+    joints: tuple[str, ...], among: tuple[str, ...], count: int
+) -> tuple[npt.NDArray[np.intp], ...]:
+    """Return the columns of each quantity in a flattened sample."""
+    own = np.array(places_among(joints, among), dtype=np.intp)
+    size = count * len(own)
+    return tuple(own * size + np.arange(first, size, count) for first in range(count))
