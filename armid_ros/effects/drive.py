@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from armid_ros.effects.action import Action
 from armid_ros.effects.base import Arm, Effect, Unexplained
-from armid_ros.effects.joint_law import joint_columns, JointLaw, scatter
+from armid_ros.effects.joint_law import joint_columns, JointLaw, JointStates, scatter
 from armid_ros.effects.quantities import Quantity, Shape
 from armid_ros.effects.readings import TorqueReading
 from armid_ros.motion import FloatArray, Motion
@@ -92,11 +92,9 @@ class TorqueRipple(JointLaw):
         """Return whether the order is above the range that other causes explain."""
         return bool(np.all(self.shape_values > 1.05 * _MIN_RIPPLE_ORDER))
 
-    def law(
-        self, t: FloatArray, q: FloatArray, dq: FloatArray, forwards: FloatArray
-    ) -> tuple[FloatArray, ...]:
+    def law(self, x: JointStates) -> tuple[FloatArray, ...]:
         """Return sin(n q) and cos(n q) [-]."""
-        angle = self.shape_values[:, 0] * q
+        angle = self.shape_values[:, 0] * x.q
         return np.sin(angle), np.cos(angle)
 
 

@@ -10,7 +10,7 @@ from typing import Any, ClassVar, Self
 
 from armid_ros.effects.action import Action, direction, DryFriction
 from armid_ros.effects.base import Arm, Effect
-from armid_ros.effects.joint_law import joint_columns, JointLaw, scatter
+from armid_ros.effects.joint_law import joint_columns, JointLaw, JointStates, scatter
 from armid_ros.effects.quantities import MIN_Z_SCORE, Quantity, Shape
 from armid_ros.files import finite
 from armid_ros.motion import FloatArray, Motion, Temperatures
@@ -98,11 +98,9 @@ class AsymmetricFriction(JointLaw):
         shift, doubt = (np.abs(scatter(self, each, arm.robot)[0]) for each in (values, std))
         return bool(np.all(shift <= known + MIN_Z_SCORE * doubt))
 
-    def law(
-        self, t: FloatArray, q: FloatArray, dq: FloatArray, forwards: FloatArray
-    ) -> tuple[FloatArray, ...]:
+    def law(self, x: JointStates) -> tuple[FloatArray, ...]:
         """Return |sign(dq)| and |dq|."""
-        return forwards**2, forwards * dq
+        return x.forwards**2, x.forwards * x.dq
 
 
 @dataclass(frozen=True)
@@ -122,11 +120,9 @@ class QuadraticFriction(JointLaw):
     summary = 'friction that grows with the square of the velocity, or flattens'
     quantities = (Quantity('quadratic_coefficient', 'N m s^2/rad^2', typical=(0.0004, 1.0)),)
 
-    def law(
-        self, t: FloatArray, q: FloatArray, dq: FloatArray, forwards: FloatArray
-    ) -> tuple[FloatArray, ...]:
+    def law(self, x: JointStates) -> tuple[FloatArray, ...]:
         """Return dq |dq| [rad^2/s^2]."""
-        return (dq * np.abs(dq),)
+        return (x.dq * np.abs(x.dq),)
 
 
 @dataclass(frozen=True)
@@ -151,12 +147,10 @@ class StribeckFriction(JointLaw):
     )
     holds_at_rest = True
 
-    def law(
-        self, t: FloatArray, q: FloatArray, dq: FloatArray, forwards: FloatArray
-    ) -> tuple[FloatArray, ...]:
+    def law(self, x: JointStates) -> tuple[FloatArray, ...]:
         """Return exp(-|dq / vs|^d) sign(dq) [-]."""
         velocity, exponent = self.shape_values.T
-        return (np.exp(-(np.abs(dq / velocity) ** exponent)) * forwards,)
+        return (np.exp(-(np.abs(x.dq / velocity) ** exponent)) * x.forwards,)
 
 
 @dataclass(frozen=True)
@@ -184,11 +178,9 @@ class ThermalFriction(JointLaw):
         """Return the class that also has a change that is present from the beginning."""
         return ThermalChange
 
-    def law(
-        self, t: FloatArray, q: FloatArray, dq: FloatArray, forwards: FloatArray
-    ) -> tuple[FloatArray, ...]:
+    def law(self, x: JointStates) -> tuple[FloatArray, ...]:
         """Return (1 - exp(-t / T)) dq [rad/s]."""
-        return (-np.expm1(-t / self.shape_values[:, 0]) * dq,)
+        return (-np.expm1(-x.t / self.shape_values[:, 0]) * x.dq,)
 
 
 @dataclass(frozen=True)
@@ -209,11 +201,9 @@ class ThermalChange(ThermalFriction):
         """Return the name of the change while the joint warms up."""
         return ThermalFriction.name
 
-    def law(
-        self, t: FloatArray, q: FloatArray, dq: FloatArray, forwards: FloatArray
-    ) -> tuple[FloatArray, ...]:
+    def law(self, x: JointStates) -> tuple[FloatArray, ...]:
         """Return (1 - exp(-t / T)) dq and dq [rad/s]."""
-        return *super().law(t, q, dq, forwards), dq
+        return *super().law(x), x.dq
 
     def named_as(self, values: FloatArray, arm: Arm) -> tuple[tuple[Effect, FloatArray], ...]:
         """Return thermal_friction and viscous_friction with their values."""

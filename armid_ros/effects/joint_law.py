@@ -8,7 +8,7 @@ from abc import abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
 from armid_ros.effects.action import Action, direction, DryFriction
 from armid_ros.effects.base import Arm, Effect
@@ -19,6 +19,27 @@ import numpy as np
 import numpy.typing as npt
 
 
+class JointStates(NamedTuple):
+    """
+    States of the k joints of an effect.
+
+    Attributes
+    ----------
+    t : ndarray, shape (..., 1)
+        Time since the begin of the recording [s].
+    q, dq : ndarray, shape (..., k)
+        Positions [rad or m] and velocities.
+    forwards : ndarray, shape (..., k)
+        Direction of motion, from -1 to 1.
+
+    """
+
+    t: FloatArray
+    q: FloatArray
+    dq: FloatArray
+    forwards: FloatArray
+
+
 @dataclass(frozen=True)
 class JointLaw(Effect):
     """Effect on each joint separately, by a law of time and of the motion of the joint."""
@@ -27,26 +48,12 @@ class JointLaw(Effect):
     on_links: ClassVar[bool] = False
 
     @abstractmethod
-    def law(
-        self, t: FloatArray, q: FloatArray, dq: FloatArray, forwards: FloatArray
-    ) -> tuple[FloatArray, ...]:
+    def law(self, x: JointStates) -> tuple[FloatArray, ...]:
         """
-        Return the torque per unit of each quantity, for the k joints of the effect alone.
+        Return the torque per unit of each quantity, each of shape (..., k).
 
-        Parameters
-        ----------
-        t : ndarray, shape (..., 1)
-            Time since the begin of the recording [s].
-        q, dq : ndarray, shape (..., k)
-            Positions and velocities.
-        forwards : ndarray, shape (..., k)
-            Direction of motion, from -1 to 1. A law that depends on it holds the joint at rest,
-            between levels that depend on nothing else.
-
-        Returns
-        -------
-        tuple of ndarray, each of shape (..., k)
-            One array for each quantity.
+        A law that depends on the direction of motion holds the joint at rest, between two levels
+        that depend on nothing else.
 
         """
 
@@ -55,7 +62,7 @@ class JointLaw(Effect):
         side = arm.link_motion(motion) if self.on_links else motion
         own = self.indices(motion.joints)
         states = (part[:, own] for part in (side.q, side.dq, direction(side)))
-        return _placed(self, motion, self.law(motion.t[:, np.newaxis], *states))
+        return _placed(self, motion, self.law(JointStates(motion.t[:, np.newaxis], *states)))
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
         """Return the levels of a joint at rest as dry friction, and the other torque."""
@@ -63,7 +70,7 @@ class JointLaw(Effect):
         amplitudes = values.reshape(len(own), -1).T
 
         def total(*state: FloatArray) -> FloatArray:
-            laws = self.law(*state)
+            laws = self.law(JointStates(*state))
             return np.asarray(sum(a * law for a, law in zip(amplitudes, laws, strict=True)))
 
         lower, upper = np.zeros((2, len(own)))

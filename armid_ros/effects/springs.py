@@ -7,7 +7,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from armid_ros.effects.base import Arm, Unexplained
-from armid_ros.effects.joint_law import JointLaw
+from armid_ros.effects.joint_law import JointLaw, JointStates
 from armid_ros.effects.quantities import MIN_Z_SCORE, Quantity, Shape
 from armid_ros.motion import FloatArray
 from armid_ros.robots import Robot
@@ -35,11 +35,9 @@ class JointSpring(JointLaw):
 
     on_links = True
 
-    def law(
-        self, t: FloatArray, q: FloatArray, dq: FloatArray, forwards: FloatArray
-    ) -> tuple[FloatArray, ...]:
+    def law(self, x: JointStates) -> tuple[FloatArray, ...]:
         """Return q and 1."""
-        return q, np.ones_like(q)
+        return x.q, np.ones_like(x.q)
 
     def plausible(self, values: FloatArray, std: FloatArray, arm: Arm) -> bool:
         """Return whether the stiffness is significant; a preload alone is an offset."""
@@ -87,9 +85,7 @@ class SoftLimit(JointLaw):
         depth = (highest - lowest) * np.array((0.02, 0.05, 0.1, 0.2, 0.3))
         return lowest + depth, highest - depth
 
-    def law(
-        self, t: FloatArray, q: FloatArray, dq: FloatArray, forwards: FloatArray
-    ) -> tuple[FloatArray, ...]:
+    def law(self, x: JointStates) -> tuple[FloatArray, ...]:
         """Return the signed compression of each bumper [rad]."""
         lower, upper = self.shape_values.T
-        return -np.maximum(lower - q, 0.0), np.maximum(q - upper, 0.0)
+        return -np.maximum(lower - x.q, 0.0), np.maximum(x.q - upper, 0.0)
