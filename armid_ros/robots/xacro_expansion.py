@@ -116,26 +116,9 @@ def package_folders(
         The given folder, if any. Otherwise, in this order: folders whose package.xml has the name,
         which enclose the file or are next to an enclosing folder; such folders in
         ROS_PACKAGE_PATH; the folder in AMENT_PREFIX_PATH; folders of that name without a
-        package.xml, which enclose the file or are next to an enclosing folder. A copy of such a
-        folder around the file, which has all its subfolders and the file at the same path, comes
-        before it.
+        package.xml, which enclose the file or are next to an enclosing folder.
 
     """
-    path = (file or Path()).resolve()
-    for folder in _folders(name, file, given):
-        for root in () if file is None or (given and name in given) else path.parents:
-            with suppress(OSError):
-                inside = [one.name for one in os.scandir(folder) if one.is_dir()]
-                whole = (folder / path.relative_to(root)).is_file()
-                if whole and inside and all((root / one).is_dir() for one in inside):
-                    yield root
-        yield folder
-
-
-def _folders(
-    name: str, file: Path | None, given: Mapping[str, str | Path] | None
-) -> Iterator[Path]:
-    """Yield the folders of `package_folders` without copies around the file."""
     if given and name in given:
         yield Path(given[name])
         return
@@ -181,19 +164,35 @@ def main() -> None:
     answers.close()
 
 
+class _Arguments(dict[str, str]):
+    """Arguments of a xacro, with the names that its files declare or use."""
+
+    def __init__(self, given: Mapping[str, str]) -> None:
+        super().__init__(given)
+        self.known: dict[str, None] = {}
+
+    def __contains__(self, name: object) -> bool:
+        self.known[str(name)] = None
+        return super().__contains__(name)
+
+    def __getitem__(self, name: str) -> str:
+        self.known[name] = None
+        return super().__getitem__(name)
+
+
 def expanded(request: dict[str, Any]) -> dict[str, str]:
     """Return the expanded text of a file, or the error message."""
     answer: dict[str, str] = {}
     missing: dict[str, str] = {}
+    arguments = _Arguments(request['arguments'])
     try:
         import xacro.substitution_args
 
         _find_packages(xacro, request, missing)
-        document = xacro.process_file(request['path'], mappings=dict(request['arguments']))
-        text = str(document.toxml())
-        unknown = _unknown(xacro, request) if request['arguments'] else ''
+        text = str(xacro.process_file(request['path'], mappings=arguments).toxml())
+        unknown = [name for name in request['arguments'] if name not in arguments.known]
         if unknown:
-            return {'error': unknown}
+            return {'error': _unknown_argument(unknown[0], arguments, request)}
         answer['text'] = text.replace(f'file://{_MISSING_PACKAGE}', 'package://')
         answer['text'] = answer['text'].replace(_MISSING_PACKAGE, 'package://')
     except ImportError:
@@ -251,14 +250,12 @@ def _reason(error: Exception, request: dict[str, Any], missing: dict[str, str]) 
     cause = error.exc if isinstance(error, xacro.XacroException) else None
     place, path = _place(xacro), str(request['path'])
     if isinstance(cause, xacro.substitution_args.ArgException):
-        name, declared = str(cause), _declared(xacro, path)
-        needed = [one for one, default in declared.items() if default is None]
-        values = dict.fromkeys([*needed, name], 'VALUE') | request['arguments']
+        values = {str(cause): 'VALUE'} | request['arguments']
         written = ' '.join(f'{one}:={value}' for one, value in values.items())
-        rest = _unknown(xacro, request) or f"grep '<xacro:arg' {path} lists the others"
         return (
-            f"{'the file' if place == path else place} uses the argument '{name}', which has no "
-            f"value there; write --robot '{path} {written}'; {rest}"
+            f"{'the file' if place == path else place} uses the argument '{cause}', which has no "
+            f"value there; write --robot '{path} {written}'; grep '<xacro:arg' {path} lists the "
+            'others'
         )
     if missing:
         lines = '; '.join(f"package '{name}' ({file})" for name, file in missing.items())
@@ -267,40 +264,19 @@ def _reason(error: Exception, request: dict[str, Any], missing: dict[str, str]) 
     return text if place == path else f'{place}: {text}'
 
 
-def _unknown(xacro: Any, request: dict[str, Any]) -> str:
-    """Return a message on arguments that no file declares or uses; '' if there are none."""
-    path, declared = str(request['path']), _declared(xacro, request['path'])
-    files = [Path(file) for file in (path, *xacro.all_includes)]
-    texts = [file.read_text('utf-8', 'replace') for file in files if file.is_file()]
-    unknown = []
-    for name in request['arguments']:
-        used = re.compile(rf'\$\(arg\s+{re.escape(name)}\s*\)')
-        if name not in declared and not any(used.search(text) for text in texts):
-            near = difflib.get_close_matches(name, declared, 1, 0.75)
-            unknown.append(f"'{name}'" + (f" (did you mean '{near[0]}'?)" if near else ''))
-    if not unknown:
-        return ''
-    return f"the file has no argument {', '.join(unknown)}; grep '<xacro:arg' {path} lists them"
+def _unknown_argument(name: str, arguments: _Arguments, request: dict[str, Any]) -> str:
+    """Return a message on an argument that no file declares or uses."""
+    near = difflib.get_close_matches(name, arguments.known, 1, 0.75)
+    guess = f" (did you mean '{near[0]}'?)" if near else ''
+    return (
+        f"the file has no argument '{name}'{guess}; grep '<xacro:arg' {request['path']} lists them"
+    )
 
 
 def _place(xacro: Any) -> str:
     """Return the file in expansion: the file of the macro, if a macro is expanded."""
     macros, files = xacro.macrostack, xacro.filestack
     return str(macros[-1].history[-1][-1] if macros else files[-1])
-
-
-def _declared(xacro: Any, path: str) -> dict[str, str | None]:
-    """Return the declared arguments with their defaults; None for required arguments."""
-    known: dict[str, str | None] = {}
-    for file in (path, *xacro.all_includes):
-        try:
-            elements = xacro.parse(None, file).getElementsByTagName('xacro:arg')
-        except Exception:  # errors of the main file are reported elsewhere
-            continue
-        for element in elements:
-            default = element.getAttribute('default') if element.hasAttribute('default') else None
-            known[element.getAttribute('name')] = default
-    return known
 
 
 if __name__ == '__main__':

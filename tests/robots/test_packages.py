@@ -92,21 +92,6 @@ def test_packages_are_found_where_vendors_have_them(workspace, monkeypatch, layo
     assert collision_model(robot).left_out == ()
 
 
-def test_a_copy_around_the_named_file_comes_before_its_package(workspace):
-    text = f'{XACRO}<xacro:include filename="$(find arm_description)/urdf/macro.xacro"/>'
-    files = {
-        'urdf/arm.xacro': f'{text}<xacro:property name="mass" value="1"/><xacro:arm prefix=""/>'
-        '</robot>',
-        'urdf/macro.xacro': MACRO,
-    }
-    package(workspace / 'vendor' / 'arm_description', 'arm_description', files)
-    copy = package(workspace / 'mine', 'arm_description', files)
-    (copy / 'package.xml').unlink()
-    (copy / 'urdf' / 'macro.xacro').write_text(MACRO.replace('joint"', 'other"'))
-    assert load_robot(copy / 'urdf' / 'arm.xacro').joints == ('other',)
-    assert load_robot(workspace / 'vendor/arm_description/urdf/arm.xacro').joints == ('joint',)
-
-
 def test_a_package_is_given_on_the_command_line_and_known_to_the_model(workspace):
     path = description(workspace / 'x' / 'arm')
     place = package(workspace / 'a' / 'b' / 'my files', 'other', RESOURCES)
