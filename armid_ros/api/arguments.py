@@ -14,10 +14,8 @@ from armid_ros.errors import RecordingError, RobotError, TrajectoryError
 from armid_ros.identification import SignalSettings
 from armid_ros.identification.rows.signals import conditioning, no_stretch, segments
 from armid_ros.motion import Motion
-from armid_ros.recording import ReadSettings, Recording, Topic
-from armid_ros.recording.anything import is_table, read_anything
+from armid_ros.recording import reader, ReadSettings, Recording, Topic
 from armid_ros.recording.columns import ColumnSettings, numbers
-from armid_ros.recording.reader import bag_contents
 from armid_ros.recording.source import DEFAULT
 from armid_ros.robots import joints_beside_arms, load_robot, Robot, shipped_robots
 from armid_ros.robots.load import shipped_path
@@ -254,19 +252,19 @@ def read_recording(
             raise RecordingError(
                 f'{path}: topics of JointState: {", ".join(named)}; give one as topic'
             )
-        return read_anything(path, topics=topics, topic=topic, columns=settings)
+        return reader.read_recording(path, topic=topic, columns=settings)
     if isinstance(robot, (Robot, ArmModel, str, Path)):
         described = robot_of(robot)
         slides = [bool(one) for one in described.prismatic]
-        return read_anything(
+        return reader.read_recording(
             path, joints=described.joints, slides=slides, topic=topic, columns=settings
         )
-    return read_anything(path, joints=tuple(robot), topic=topic, columns=settings)
+    return reader.read_recording(path, joints=tuple(robot), topic=topic, columns=settings)
 
 
 def topics_of(path: Path, settings: ReadSettings = DEFAULT) -> tuple[Topic, ...]:
     """Return the topics of a bag; empty for a table."""
-    return () if is_table(path) else bag_contents(path, settings)
+    return () if reader.is_table(path) else reader.bag_contents(path, settings)
 
 
 def _numbers(given: _Numbers) -> tuple[float, ...]:

@@ -35,7 +35,7 @@ from armid_ros.inspection import (
 from armid_ros.inspection import inspect as look
 from armid_ros.inspection.inspect import SCHEMA
 from armid_ros.recording import Recording, Topic
-from armid_ros.recording.anything import read_anything
+from armid_ros.recording.reader import read_recording
 from armid_ros.report.inspection_report import (
     check_word,
     description_check_report,
@@ -183,7 +183,7 @@ def inspect(
         read = recording
     else:
         topics = topics_of(Path(recording)) if topics is None else topics
-        read = read_anything(recording, topics=topics)
+        read = read_recording(recording)
     arm = None if described is None else arm_of(described)
     found = look(read, arm, topics=topics or (), rng=np.random.default_rng(rng))
     return InspectionResult(found)

@@ -45,11 +45,11 @@ def convert(
 
     Tables are CSV (.tsv, .txt, .gz too), NPZ and NPY, MAT, HDF5, Parquet, and folders of LeRobot
     datasets. Columns without an option are guessed and printed. Several tables are joined column
-    by column and need equal rows. Bags of ROS 1 and ROS 2 are copied; joints may be renamed.
+    by column and need equal rows. Bags of ROS 1 are copied.
 
     """
     from armid_ros.cli import options
-    from armid_ros.recording.anything import is_table
+    from armid_ros.recording.reader import is_table
 
     if out is None and not dry_run:
         raise click.UsageError('give --out with the bag to write, or --dry-run to write nothing')
@@ -70,7 +70,7 @@ def _table(
 ) -> None:
     from armid_ros.files.cells import listed
     from armid_ros.recording import write_recording
-    from armid_ros.recording.anything import read_tables
+    from armid_ros.recording.reader import read_tables
 
     def show(plan: TablePlan) -> None:
         for line in plan.lines():
@@ -100,22 +100,17 @@ def _bag(path: Path, out: Path | None) -> None:
     from armid_ros.recording.columns import refuse_columns
     from armid_ros.recording.copying import copy_bag
 
-    settings = columns.settings()
-    refuse_columns(path, settings, copied=True)
+    refuse_columns(path, columns.settings(), copied=True)
     if out is None:
         raise RecordingError(f'{path}: --dry-run is for tables; armid inspect shows a bag')
-    if not is_ros1(path) and not settings.rename:
+    if not is_ros1(path):
         topics(path)  # raises an error if the path is not a bag
-        raise RecordingError(
-            f'{path}: nothing to do: without --rename, a bag of ROS 2 does not change'
-        )
-    copied = copy_bag(path, out, settings.rename, options.read_settings())
+        raise RecordingError(f'{path}: nothing to do: it is a bag of ROS 2')
+    copied = copy_bag(path, out, options.read_settings())
     for topic in copied.topics:
         say(f'  {topic.name} ({topic.type_name}): {topic.count} messages')
     for text in copied.left_out:
         say(f'  left out: {text}')
     if copied.damage:
         say(f'  {copied.damage}')
-    if copied.renamed:
-        say('  renamed: ' + ', '.join(f'{old} to {new}' for old, new in copied.renamed))
     say(f'{out}: {copied.messages} messages')

@@ -46,7 +46,7 @@ def inspect(
     from armid_ros.api.inspection import InspectionResult
     from armid_ros.cli import options
     from armid_ros.files.cells import listed
-    from armid_ros.recording.anything import read_anything
+    from armid_ros.recording import read_recording
 
     staged = (
         None if out is None else options.stage(out, InspectionResult.schema, robot_source or '')
@@ -57,9 +57,8 @@ def inspect(
     topics = topics_of(bag, options.read_settings())
     with progress('reading') as tick:
         if robot is None:
-            recording = read_anything(
+            recording = read_recording(
                 bag,
-                topics=topics,
                 joints=listed(joints) if joints else None,
                 topic=topic,
                 columns=columns.settings(),

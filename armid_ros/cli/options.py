@@ -35,9 +35,9 @@ from armid_ros.files.output import hash_files, written_by
 from armid_ros.identification import write_document
 from armid_ros.motion import FloatArray
 from armid_ros.recording import read_robot_description, ReadSettings, Recording
-from armid_ros.recording.anything import is_table, read_anything
 from armid_ros.recording.columns import numbers
 from armid_ros.recording.columns import per_joint as values_per_joint
+from armid_ros.recording.reader import is_table, read_recording
 from armid_ros.report.blocks import VerdictSection
 from armid_ros.report.provenance import Provenance, ResultOrigin, versions
 from armid_ros.robots import driven_in_words, load_robot, parse_gravity, Robot, robot_from_urdf
@@ -317,7 +317,7 @@ def read(paths: Sequence[Path], robot: Robot, topic: str | None) -> list[Recordi
                 f"--rename '{settings.rename[-1][0]}:{settings.rename[-1][1]}' --rename '{path}'"
             )
     return [
-        read_anything(
+        read_recording(
             path,
             joints=robot.joints,
             slides=list(robot.prismatic),

@@ -12,10 +12,10 @@ from armid_ros.errors import RecordingError
 from armid_ros.files import reading
 from armid_ros.positions.loop import CommandedMotion
 from armid_ros.recording import ReadSettings, Recording
-from armid_ros.recording.anything import is_table, read_anything
 from armid_ros.recording.bag import Bag
 from armid_ros.recording.columns import ColumnSettings
 from armid_ros.recording.message_types import JOINT_STATE, store_for
+from armid_ros.recording.reader import is_table, read_recording
 from armid_ros.recording.source import DEFAULT, listed, Topic
 from armid_ros.robots import Robot
 import numpy as np
@@ -70,7 +70,7 @@ def read_commands(
         if topic.type_name.endswith(_STATE):
             return CommandedMotion.of(_controller_state(path, robot, topic, settings), recording)
         name = topic.name
-    commanded = read_anything(
+    commanded = read_recording(
         path,
         joints=robot.joints,
         slides=list(robot.prismatic),

@@ -31,6 +31,8 @@ _TABLE_SETTINGS = (
     'episode',
 )
 _UNIT_SETTINGS = ('degrees', 'position_scale', 'effort_scale', 'zero', 'gear')
+#: Settings that a copied bag does not take.
+_NOT_COPIED = (*_UNIT_SETTINGS, 'rename')
 #: Command-line options whose name differs from that of the setting.
 _OPTIONS = {'rate_hz': '--rate', 'effort_scale': '--effort-scale or --current-gain'}
 
@@ -171,7 +173,8 @@ def refuse_columns(path: str | Path, settings: ColumnSettings, *, copied: bool =
     settings : ColumnSettings
         Settings of the user.
     copied : bool
-        Whether the bag is copied unchanged, so that unit settings are not permitted either.
+        Whether the bag is copied unchanged, so that settings of units and names are not permitted
+        either.
 
     """
     reasons = dict.fromkeys(
@@ -181,7 +184,7 @@ def refuse_columns(path: str | Path, settings: ColumnSettings, *, copied: bool =
     )
     if copied:
         reason = 'has no effect on a copied bag; give it to the command that reads the bag'
-        reasons |= dict.fromkeys(_UNIT_SETTINGS, reason)
+        reasons |= dict.fromkeys(_NOT_COPIED, reason)
     for name, reason in reasons.items():
         if getattr(settings, name) != getattr(ColumnSettings, name):  # unchanged default
             option = _OPTIONS.get(name, f'--{name.replace("_", "-")}')

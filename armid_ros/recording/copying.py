@@ -1,26 +1,17 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Copy bags of ROS 1 and ROS 2, rename their joints, and recover damaged bags."""
+"""Copy bags of ROS 1 to ROS 2, and recover damaged bags."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from contextlib import closing
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 import os
 from pathlib import Path
-from typing import Any
 
 from armid_ros.errors import RecordingError
-from armid_ros.files import reading
 from armid_ros.recording.bag import Bag
-from armid_ros.recording.columns import renamed
-from armid_ros.recording.joint_state.conversion import require_standard
-from armid_ros.recording.mcap.source import McapSource
-from armid_ros.recording.message_types import JOINT_STATE
-from armid_ros.recording.source import DEFAULT, ReadSettings, Source, Topic, UNREADABLE
+from armid_ros.recording.source import DEFAULT, ReadSettings, Topic, UNREADABLE
 from armid_ros.recording.writer import whole_bag
-from rosbags.typesys import get_typestore, Stores
 
 
 @dataclass(frozen=True)
@@ -40,8 +31,6 @@ class Copied:
         Time from the first to the last message [s].
     left_out : tuple of str
         Topics that ROS 2 has no type for, with their types.
-    renamed : tuple of (str, str)
-        Old and new names of the renamed joints.
 
     """
 
@@ -51,7 +40,6 @@ class Copied:
     damage: str
     duration: float
     left_out: tuple[str, ...] = ()
-    renamed: tuple[tuple[str, str], ...] = ()
 
     @property
     def messages(self) -> int:
@@ -101,78 +89,49 @@ def recover(file: str | Path, out: str | Path, settings: ReadSettings = DEFAULT)
         path = files[0]
     if not os.path.lexists(path):
         raise RecordingError(f'{path}: there is no such file')
-    with reading(path, RecordingError), closing(McapSource(path, settings)) as source:
-        if next(source.messages(), None) is None:
+    with Bag(path, settings) as bag:
+        if next(bag.messages(), None) is None:
             raise RecordingError(
-                f'{path}: there is no message to recover; {source.damage or "the file is whole"}'
+                f'{path}: there is no message to recover; {bag.damage or "the file is whole"}'
             )
-        return _copied(path, source, out)
+        return _copied(bag, out)
 
 
-def copy_bag(
-    path: Path,
-    out: Path,
-    rename: Sequence[tuple[str, str]] = (),
-    settings: ReadSettings = DEFAULT,
-) -> Copied:
+def copy_bag(path: Path, out: Path, settings: ReadSettings = DEFAULT) -> Copied:
     """
     Copy a bag message by message.
 
     Parameters
     ----------
     path : Path
-        A bag of ROS 2, or the .bag of ROS 1.
+        The .bag of ROS 1, or a bag of ROS 2.
     out : Path
         Bag directory to create; it must not exist.
-    rename : sequence of (str, str)
-        Pairs of an old and a new name, or of an old and a new beginning of names.
     settings : ReadSettings
         Which checks are made when the bag is read, and the memory limit.
 
     Raises
     ------
     RecordingError
-        If the bag cannot be read, has no type that ROS 2 has, or its joints cannot be renamed.
+        If the bag cannot be read, or has no type that ROS 2 has.
 
     """
-    store = get_typestore(Stores.ROS2_JAZZY)
-    names: dict[str, str] = {}
-
-    def change(topic: Topic, cdr: bytes) -> bytes:
-        if topic.type_name != JOINT_STATE or not rename:
-            return cdr
-        message: Any = store.deserialize_cdr(cdr, JOINT_STATE)
-        for name in message.name:
-            names.setdefault(name, renamed(name, rename))
-        message.name = [names[name] for name in message.name]
-        return bytes(store.serialize_cdr(message, JOINT_STATE))
-
     with Bag(path, settings) as bag:
-        topics = bag.topics()
-        left_out = [
-            f'{one.name} ({one.type_name})' for one in topics if one.encoding == UNREADABLE
-        ]
-        if len(left_out) == len(topics):
-            raise RecordingError(
-                f'{path}: no topic has a message type of ROS 2; left out: '
-                f'{"; ".join(left_out) or "the bag is empty"}'
-            )
-        for topic in topics:
-            if rename and topic.type_name == JOINT_STATE:
-                require_standard(bag, topic)
-        copied = _copied(path, bag, out, change)
-    changed = tuple((old, new) for old, new in names.items() if old != new)
-    return replace(copied, left_out=tuple(left_out), renamed=changed)
+        return _copied(bag, out)
 
 
-def _copied(
-    path: Path,
-    source: Source,
-    out: str | Path,
-    change: Callable[[Topic, bytes], bytes] | None = None,
-) -> Copied:
-    """Write the topics and messages of a source to a new bag, and report it."""
+def _copied(bag: Bag, out: str | Path) -> Copied:
+    """Write the topics and messages of a bag to a new bag."""
+    topics = bag.topics()
+    left_out = tuple(
+        f'{one.name} ({one.type_name})' for one in topics if one.encoding == UNREADABLE
+    )
+    if len(left_out) == len(topics):
+        raise RecordingError(
+            f'{bag.path}: no topic has a message type of ROS 2; left out: '
+            f'{"; ".join(left_out) or "the bag is empty"}'
+        )
     with whole_bag(out) as writer:
-        writer.copy(source, change)
+        writer.copy(bag)
     start, end = writer.time_range
-    return Copied(path, writer.path, writer.topics, source.damage, (end - start) * 1e-9)
+    return Copied(bag.path, writer.path, writer.topics, bag.damage, (end - start) * 1e-9, left_out)

@@ -1,51 +1,80 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Read the joint measurements of a bag."""
+"""Read the joint measurements of a bag of ROS 2 or ROS 1, or of a table."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from importlib.util import find_spec
 from itertools import chain
 from pathlib import Path
 import struct
+from typing import TYPE_CHECKING
 
 from armid_ros.errors import nearest, RecordingError
 from armid_ros.files import reading
-from armid_ros.recording.bag import Bag
-from armid_ros.recording.columns import renaming
+from armid_ros.recording.bag import Bag, is_bag_file
+from armid_ros.recording.columns import (
+    ColumnSettings,
+    in_si,
+    name_in_file,
+    refuse_columns,
+    renamed,
+    renaming,
+)
 from armid_ros.recording.joint_state.conversion import holds_joint_state, joint_state_blocks
 from armid_ros.recording.joint_state.decoder import JointSamples, JointStateDecoder
 from armid_ros.recording.message_types import BYTE_ORDERS, JOINT_STATE, STRING
 from armid_ros.recording.recording import PositionRange, Recording
 from armid_ros.recording.series import assemble
-from armid_ros.recording.source import DEFAULT, ReadSettings, Topic
+from armid_ros.recording.source import DEFAULT, listed, ReadSettings, Topic
 from armid_ros.recording.temperature import read_temperatures
 import numpy as np
+
+if TYPE_CHECKING:
+    from armid_ros.recording.tables import TablePlan
+
+#: Callback that shows the plan of a table.
+Show = Callable[['TablePlan'], None]
+#: Package that reads tables, a plug-in.
+_TABLES = 'armid_ros.recording.tables'
 
 
 def read_recording(
     path: str | Path,
     *,
-    joints: Sequence[str],
+    joints: Sequence[str] | None = None,
     topic: str | None = None,
+    columns: ColumnSettings | None = None,
+    slides: Sequence[bool] | None = None,
+    show: Show | None = None,
     settings: ReadSettings = DEFAULT,
 ) -> Recording:
     """
-    Read the measurements of some joints from a bag.
+    Read the measurements of some joints from a bag or a table.
 
     Parameters
     ----------
     path : str or Path
-        A rosbag2 directory (MCAP or SQLite, split, compressed, with or without metadata.yaml), or
-        a file .mcap, .db3 or (ROS 1) .bag. A file truncated by a crash is read up to its end.
-    joints : sequence of str
-        Joints to read, in this order. Of other joints in the messages, such as a gripper's, only
-        the range of the positions is kept.
+        A rosbag2 directory (MCAP or SQLite, split, compressed, with or without metadata.yaml), a
+        file .mcap, .db3 or (ROS 1) .bag, or a table: CSV, NPZ, MAT, Parquet, or the folder of a
+        LeRobot dataset. A bag truncated by a crash is read up to its end.
+    joints : sequence of str, optional
+        Joints to read, in this order; by default all of the table or topic. Of other joints, such
+        as a gripper's, only the range of the positions is kept.
     topic : str, optional
         Topic of sensor_msgs/JointState. The default is the only topic of this type, or the only
         one that names all joints. Of several such topics the one called 'joint_states' is taken.
-        If no topic names all joints, topics are combined that name each joint once.
+        If no topic names all joints, topics are combined that name each joint once. Without
+        ``joints``, the default is the topic with the most messages.
+    columns : ColumnSettings, optional
+        Which columns of a table hold which quantity, in which unit. Missing settings are guessed
+        from the file. Names, units, zeros and gears apply to bags too; columns and rate do not.
+    slides : sequence of bool, optional
+        Whether each joint is prismatic. Positions of prismatic joints are never in degrees.
+    show : callable, optional
+        Called with the plan of a table before the table is read.
     settings : ReadSettings
         Whether checksums are compared, and the memory limit.
 
@@ -59,11 +88,44 @@ def read_recording(
     Raises
     ------
     RecordingError
-        If the bag or topic does not exist, a joint is not named, no usable sample remains, or the
-        memory limit is exceeded.
+        If the file or topic does not exist, a joint is not named, no usable sample remains, or the
+        memory limit is exceeded. The message names the file, the topic, joint, column or line,
+        and the remedy.
 
     """
-    joints = tuple(joints)
+    path = Path(path)
+    columns = columns or ColumnSettings()
+    if is_table(path):
+        return read_tables([path], columns, joints, slides, show)
+    if columns.temperature == 'none':
+        columns = replace(columns, temperature=None)
+        settings = replace(settings, temperatures=False)
+    refuse_columns(path, columns)
+    if joints is None:
+        topics = bag_contents(path, settings)
+        there = [one for one in topics if one.joints]
+        if topic is not None:
+            there = [one for one in there if one.name.lstrip('/') == topic.lstrip('/')]
+        if not there:
+            which = f'{topic} of ' if topic else 'topic of '
+            raise RecordingError(f'{path}: no {which}{JOINT_STATE}; there are {listed(topics)}')
+        fullest = max(there, key=lambda one: one.count)
+        topic, joints = fullest.name, fullest.joints
+    recording = _read_bag(
+        path, tuple(name_in_file(joint, columns.rename) for joint in joints), topic, settings
+    )
+    if columns.rename:
+        others = tuple(
+            replace(one, joint=renamed(one.joint, columns.rename)) for one in recording.others
+        )
+        recording = replace(recording, joints=tuple(joints), others=others)
+    return in_si(recording, columns, slides)
+
+
+def _read_bag(
+    path: Path, joints: tuple[str, ...], topic: str | None, settings: ReadSettings
+) -> Recording:
+    """Read some joints, by their names in the bag, with the numbers of the bag."""
     if not joints or len(set(joints)) != len(joints):
         raise RecordingError(f'{path}: give at least one joint, and each joint once; got {joints}')
     with Bag(path, settings) as bag:
@@ -78,6 +140,58 @@ def read_recording(
         recording = assembled(path, name, joints, pieces, decoder, bag.damage)
         measured = read_temperatures(bag, recording) if settings.temperatures else None
     return replace(recording, temperature=measured) if measured else recording
+
+
+def is_table(path: Path) -> bool:
+    """Return whether a path is a table; without the package `tables`, all but bags are tables."""
+    if find_spec(_TABLES) is None:
+        return path.is_file() and not is_bag_file(path)
+    from armid_ros.recording import tables
+
+    return tables.is_table(path)
+
+
+def read_tables(
+    paths: Sequence[Path],
+    columns: ColumnSettings,
+    joints: Sequence[str] | None = None,
+    slides: Sequence[bool] | None = None,
+    show: Show | None = None,
+) -> Recording:
+    """
+    Read the measurements of some joints from tables of the same samples.
+
+    Parameters
+    ----------
+    paths : sequence of Path
+        Files with the columns of the same samples.
+    columns : ColumnSettings
+        Which columns hold which quantity, in which unit; missing settings are guessed.
+    joints : sequence of str, optional
+        Joints to read, in this order; by default named by the columns.
+    slides : sequence of bool, optional
+        Whether each joint is prismatic.
+    show : callable, optional
+        Called with the plan before the columns are converted.
+
+    Raises
+    ------
+    RecordingError
+        If a file cannot be read, or the package that reads tables is not installed.
+
+    """
+    if find_spec(_TABLES) is None:
+        raise RecordingError(
+            f'{paths[0]}: not a bag; reading a table needs {_TABLES}, which this installation '
+            'does not have'
+        )
+    from armid_ros.recording.tables import measured, open_table, plan, side_by_side
+
+    table = side_by_side([open_table(path, episode=columns.episode) for path in paths])
+    settled = plan(table, columns, joints, slides)
+    if show is not None:
+        show(settled)
+    return measured(settled)
 
 
 def assembled(

@@ -336,7 +336,7 @@ class BagWriter:
             more = len(waiting) + np.arange(len(some), dtype=np.int64) * record.itemsize
             self._mcap.write_chunk(waiting + records.tobytes(), np.concatenate([offsets, more]))
 
-    def copy(self, source: Source, change: Callable[[Topic, bytes], bytes] | None = None) -> None:
+    def copy(self, source: Source) -> None:
         """
         Copy all topics and messages of a source, with unchanged types, QoS and times.
 
@@ -346,12 +346,11 @@ class BagWriter:
         ----------
         source : Source
             A bag, or one of its files.
-        change : callable, optional
-            Returns the CDR to write in place of a message; called with topic and CDR.
 
         """
-        topics = {one.name: one for one in source.topics() if one.encoding != UNREADABLE}
-        for topic in topics.values():
+        for topic in source.topics():
+            if topic.encoding == UNREADABLE:
+                continue
             kept = topic.message_type
             add = partial(
                 self.add_topic, topic.name, kept.name, qos=topic.qos, encoding=kept.encoding
@@ -362,8 +361,7 @@ class BagWriter:
             except RecordingError:
                 add(definition=text, type_hash=digest)
         for message in source.messages():
-            cdr = message.cdr if change is None else change(topics[message.topic], message.cdr)
-            self.write(message.topic, cdr, message.log_time_ns, message.publish_time_ns)
+            self.write(message.topic, message.cdr, message.log_time_ns, message.publish_time_ns)
 
     def flush(self) -> None:
         """Write the messages in memory to the file; call it from a timer."""

@@ -50,15 +50,6 @@ def damaged(tmp_path_factory):
     return bag
 
 
-def test_what_a_copy_lacks_is_said(damaged, tmp_path):
-    said = armid('convert', damaged, '--rename', 'elbow:knee', '--out', tmp_path / 'copy').output
-    assert 'checksum' in said
-    whole = armid(
-        'convert', damaged, '--rename', 'elbow:knee', '--no-crc', '--out', tmp_path / 'all'
-    )
-    assert 'checksum' not in whole.output and '4000 messages' in whole.output
-
-
 def test_inspect_reads_with_and_without(damaged):
     said = ' '.join(armid('inspect', damaged).output.split())
     assert '3940 messages' in said and 'checksum' in said

@@ -7,8 +7,8 @@ import json
 import zipfile
 import zlib
 
-from armid_ros.recording.anything import read_anything
 from armid_ros.recording.columns import ColumnSettings
+from armid_ros.recording.reader import read_recording
 from hypothesis import given
 from hypothesis import strategies as st
 import numpy as np
@@ -71,7 +71,7 @@ def folder(tmp_path_factory):
 
 
 def read(path):
-    return read_anything(path, joints=JOINTS, columns=ColumnSettings(velocity='none'))
+    return read_recording(path, joints=JOINTS, columns=ColumnSettings(velocity='none'))
 
 
 def agrees(answer, whole):

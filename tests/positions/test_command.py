@@ -94,11 +94,11 @@ def test_commands_beyond_limits_and_torques_at_limits_are_hints(robot, played):
 
 
 def test_a_table_has_positions_and_commands_in_columns(folder, robot, played):
-    from armid_ros.recording.anything import read_anything
     from armid_ros.recording.columns import ColumnSettings
+    from armid_ros.recording.reader import read_recording
 
     columns = ColumnSettings(time='t', position='q', velocity='none', effort='none')
-    measured = read_anything(folder / 'run.npz', joints=robot.joints, columns=columns)
+    measured = read_recording(folder / 'run.npz', joints=robot.joints, columns=columns)
     found = read_commands(folder / 'run.npz', robot, measured, 'q_des', columns)
     np.testing.assert_allclose(found.q[::2], played[1].q, atol=1e-9)
     with pytest.raises(RecordingError, match='--commands'):

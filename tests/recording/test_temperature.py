@@ -8,7 +8,6 @@ import struct
 from armid_ros.errors import RecordingError
 from armid_ros.motion import Temperatures
 from armid_ros.recording import BagWriter, read_recording, Recording, write_recording
-from armid_ros.recording.anything import read_anything
 from armid_ros.recording.columns import ColumnSettings
 from armid_ros.recording.joint_state.encoder import write_joint_states
 from armid_ros.recording.temperature import TEMPERATURE
@@ -83,7 +82,7 @@ def test_wrong_temperatures_are_refused_with_their_place(tmp_path, value, proble
     path = bag_with(tmp_path / 'bag', [('/heat', 'elbow', value)])
     with pytest.raises(RecordingError, match=f'bag: /heat: elbow: .*{problem}'):
         read_recording(path, joints=JOINTS)
-    without = read_anything(path, columns=ColumnSettings(temperature='none'))
+    without = read_recording(path, columns=ColumnSettings(temperature='none'))
     assert without.temperature is None
 
 

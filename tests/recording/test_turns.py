@@ -4,8 +4,8 @@
 
 from armid_ros.errors import RecordingError
 from armid_ros.recording import Recording
-from armid_ros.recording.anything import read_anything
 from armid_ros.recording.columns import ColumnSettings
+from armid_ros.recording.reader import read_recording
 from armid_ros.recording.series import unwrapped
 import numpy as np
 import pytest
@@ -30,7 +30,7 @@ def test_a_joint_kept_within_one_turn_is_continuous_and_said_once(lowest, tmp_pa
     t, q = motion()
     wrapped = q.copy()
     wrapped[:, 0] = (q[:, 0] - lowest) % (2.0 * np.pi) + lowest
-    read = read_anything(as_table(tmp_path, t, wrapped, q), joints=JOINTS)
+    read = read_recording(as_table(tmp_path, t, wrapped, q), joints=JOINTS)
     off = (read.q[:, 0] - q[:, 0]) / (2.0 * np.pi)
     assert np.ptp(off) < 1e-12 and off[0] == pytest.approx(round(off[0]), abs=1e-9)
     np.testing.assert_allclose(read.q[:, 1], q[:, 1], atol=1e-12)
@@ -43,7 +43,7 @@ def test_a_joint_kept_within_one_turn_is_continuous_and_said_once(lowest, tmp_pa
 def test_degrees_are_made_continuous_too(tmp_path):
     t, q = motion()
     path = as_table(tmp_path, t, np.rad2deg((q + np.pi) % (2.0 * np.pi) - np.pi), q)
-    read = read_anything(path, joints=JOINTS, columns=ColumnSettings(degrees=True))
+    read = read_recording(path, joints=JOINTS, columns=ColumnSettings(degrees=True))
     assert np.ptp(read.q[:, 0] - q[:, 0]) < 1e-9 and read.report.unwrapped == ('turntable',)
 
 
@@ -66,7 +66,7 @@ def test_messages_before_the_first_stamp_are_left_out(table, tmp_path, write_bag
         recording = Recording(joints=JOINTS, t=t, q=q, tau=q)
         stamps = np.where(late, 10**18 + np.round(t * 1e9).astype(np.int64), 0)
         path = write_bag(messages_of(recording, stamps, log=stamps))
-    read = read_anything(path, joints=JOINTS)
+    read = read_recording(path, joints=JOINTS)
     assert (len(read), read.report.unstamped, read.clock) == (3851, 150, 'header')
     np.testing.assert_allclose(read.q, q[150:])
 
@@ -76,7 +76,7 @@ def test_values_beyond_all_quantities_are_no_numbers(value, tmp_path):
     t, q = motion()
     tau = q.copy()
     tau[[3, 70], 1] = value
-    read = read_anything(as_table(tmp_path, t, q, tau), joints=JOINTS)
+    read = read_recording(as_table(tmp_path, t, q, tau), joints=JOINTS)
     assert read.report.nan == 2 and 'elbow' in read.report.not_finite[0]
     assert np.abs(read.tau).max() < 10.0
 
@@ -84,4 +84,4 @@ def test_values_beyond_all_quantities_are_no_numbers(value, tmp_path):
 def test_efforts_beyond_all_quantities_throughout_are_refused(tmp_path):
     t, q = motion()
     with pytest.raises(RecordingError, match='elbow'):
-        read_anything(as_table(tmp_path, t, q, q * [1.0, 1e300]), joints=JOINTS)
+        read_recording(as_table(tmp_path, t, q, q * [1.0, 1e300]), joints=JOINTS)

@@ -8,8 +8,8 @@ import json
 import sys
 
 from armid_ros.errors import RecordingError
-from armid_ros.recording.anything import read_anything
 from armid_ros.recording.columns import ColumnSettings
+from armid_ros.recording.reader import read_recording
 from armid_ros.recording.source import DEFAULT
 from armid_ros.recording.tables import open_table, side_by_side, table
 import numpy as np
@@ -131,7 +131,7 @@ WRITERS = {
 def test_the_motion_comes_out(write, motion, tmp_path):
     path = tmp_path / WRITERS[write]
     write(path, motion)
-    assert_holds(read_anything(path, joints=JOINTS), motion)
+    assert_holds(read_recording(path, joints=JOINTS), motion)
 
 
 def lerobot(folder, motion, version):
@@ -175,7 +175,7 @@ def lerobot(folder, motion, version):
 def test_an_episode_of_a_dataset_comes_out(version, motion, tmp_path):
     lerobot(tmp_path / 'dataset', motion, version)
     said = ColumnSettings(episode=1)
-    assert_holds(read_anything(tmp_path / 'dataset', joints=JOINTS, columns=said), motion)
+    assert_holds(read_recording(tmp_path / 'dataset', joints=JOINTS, columns=said), motion)
     with pytest.raises(RecordingError, match=r'7.*1'):
         open_table(tmp_path / 'dataset', episode=7)
 
@@ -248,13 +248,13 @@ def test_what_is_wrong_is_named_with_file_line_and_column(write, message, motion
     path = tmp_path / 'run.csv'
     write(path, motion)
     with pytest.raises(RecordingError, match=f'run.csv: .*{message}'):
-        read_anything(path, joints=JOINTS)
+        read_recording(path, joints=JOINTS)
 
 
 def test_a_last_line_cut_off_is_left_out_and_said(motion, tmp_path):
     path = tmp_path / 'run.csv'
     path.write_text(text(motion)[:-30])
-    recording = read_anything(path, joints=JOINTS)
+    recording = read_recording(path, joints=JOINTS)
     assert len(recording) == 199
     assert '201' in recording.report.describe()
 
@@ -277,7 +277,7 @@ def test_empty_cells_are_counted_and_the_first_is_named_with_its_line(motion, tm
     path.write_text('\n'.join(lines))
     (note,) = open_table(path).notes
     assert all(fact in note for fact in ('2 cells', 'line 4', 'q1'))
-    lacking = read_anything(path, joints=JOINTS).report.not_finite
+    lacking = read_recording(path, joints=JOINTS).report.not_finite
     assert len(lacking) == 2 and all(one.endswith(' in 1') for one in lacking)
 
 

@@ -6,8 +6,8 @@ from datetime import datetime, UTC
 from itertools import chain
 
 from armid_ros.errors import RecordingError
-from armid_ros.recording.anything import read_anything
 from armid_ros.recording.columns import ColumnSettings
+from armid_ros.recording.reader import read_recording
 from armid_ros.recording.tables import open_table, plan
 import numpy as np
 import pytest
@@ -40,18 +40,6 @@ def as_rostopic_echoes(folder, motion):
         text += ','.join(map(str, cells)) + '\n'
     (folder / 'run.csv').write_text(text)
     return 'run.csv'
-
-
-def as_lists(write):
-    def lists(folder, motion):
-        text = 'Time,header.stamp.secs,header.stamp.nsecs,name,position,velocity,effort\n'
-        for sec, nanosec, *fields in rows(motion, lambda k: (k % 2, 1 - k % 2)):
-            cells = (f'"{write(field)}"' for field in fields)
-            text += f'{sec + 1},{sec},{nanosec},{",".join(cells)}\n'
-        (folder / 'run.csv').write_text(text)
-        return 'run.csv'
-
-    return lists
 
 
 def as_parquet(folder, motion):
@@ -91,16 +79,13 @@ def with_dates(folder, motion):
     'write',
     [
         as_rostopic_echoes,
-        as_lists(str),
-        as_lists(lambda field: str(tuple(field))),
-        as_lists(lambda field: f'[{" ".join(map(str, field))}]'),
         as_parquet,
         as_hdf5,
         with_dates,
     ],
 )
 def test_each_joint_has_its_own_values_at_the_stamps_of_the_driver(write, tmp_path, motion):
-    recording = read_anything(tmp_path / write(tmp_path, motion), joints=JOINTS)
+    recording = read_recording(tmp_path / write(tmp_path, motion), joints=JOINTS)
     assert_holds(recording, motion)
     assert recording.start_ns == pytest.approx(START * 10**9, abs=1000)
     assert len(recording) == len(motion[0])
@@ -109,10 +94,10 @@ def test_each_joint_has_its_own_values_at_the_stamps_of_the_driver(write, tmp_pa
 def test_joints_that_cells_name_are_not_taken_for_others(tmp_path, motion):
     path = tmp_path / as_rostopic_echoes(tmp_path, motion)
     with pytest.raises(RecordingError, match=r'field.position'):
-        read_anything(path, joints=('hip', 'knee'))
+        read_recording(path, joints=('hip', 'knee'))
     assert plan(open_table(path), ColumnSettings()).joints == ('elbow', 'shoulder')
     asked = ColumnSettings(position='field.position{}', velocity='none', effort='none')
-    np.testing.assert_allclose(read_anything(path, joints=JOINTS, columns=asked).q, motion[1])
+    np.testing.assert_allclose(read_recording(path, joints=JOINTS, columns=asked).q, motion[1])
 
 
 @pytest.mark.parametrize(

@@ -7,8 +7,8 @@ from dataclasses import replace
 from armid_ros.errors import RecordingError
 from armid_ros.motion import Motion
 from armid_ros.recording import write_recording
-from armid_ros.recording.anything import read_anything
 from armid_ros.recording.columns import ColumnSettings, in_si
+from armid_ros.recording.reader import read_recording
 from armid_ros.recording.recording import PositionRange
 import numpy as np
 import pytest
@@ -27,7 +27,7 @@ def bag(tmp_path):
 
 
 def read(bag, **said):
-    return read_anything(bag, joints=JOINTS, slides=(True, False), columns=ColumnSettings(**said))
+    return read_recording(bag, joints=JOINTS, slides=(True, False), columns=ColumnSettings(**said))
 
 
 @pytest.mark.parametrize(

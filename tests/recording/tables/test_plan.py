@@ -3,8 +3,8 @@
 """Columns are matched to joints by name, else by number; what is guessed is said to be."""
 
 from armid_ros.errors import RecordingError
-from armid_ros.recording.anything import read_anything
 from armid_ros.recording.columns import ColumnSettings, numbers
+from armid_ros.recording.reader import read_recording
 from armid_ros.recording.tables import measured, open_table, plan, Table, TableColumn
 import numpy as np
 import pytest
@@ -218,8 +218,8 @@ def test_a_table_has_columns_of_temperatures(tmp_path):
         heat = ['', ''] if k % 50 else [f'{25 + t}', '31']
         rows.append(','.join([f'{t}', f'{np.sin(t)}', f'{np.cos(t)}', *heat]))
     (tmp_path / 'run.csv').write_text('\n'.join(rows))
-    found = read_anything(tmp_path / 'run.csv')
+    found = read_recording(tmp_path / 'run.csv')
     np.testing.assert_allclose(found.temperature.at([1.0]), [[26.0, 31.0]])
     (tmp_path / 'run.csv').write_text('\n'.join(rows).replace(',31', ',310'))
     with pytest.raises(RecordingError, match=r'run.csv: column joint_temperatures_1: .*kelvin'):
-        read_anything(tmp_path / 'run.csv')
+        read_recording(tmp_path / 'run.csv')
