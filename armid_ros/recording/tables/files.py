@@ -234,8 +234,8 @@ def _flattened(
 
 def read_parquet(path: Path) -> Table:
     """Read a Parquet file; a column of lists becomes one column per element."""
-    columns, words = _columns(path, {})
-    return Table(str(path), columns, 'Parquet', words=words)
+    arrays, words = _columns(path)
+    return replace(table_of_arrays(str(path), arrays, 'Parquet'), words=words)
 
 
 def read_lerobot(path: Path, episode: int | None = None) -> Table:
@@ -252,9 +252,8 @@ def read_lerobot(path: Path, episode: int | None = None) -> Table:
     """
     with reading(path / INFO, RecordingError):
         info = json.loads(read_document(path / INFO, RecordingError))
-        features: Mapping[str, Any] = info['features']
         names: dict[str, list[str]] = {}
-        for key, feature in features.items():
+        for key, feature in info['features'].items():
             called = feature.get('names')
             if isinstance(called, Mapping):  # datasets nest the names of elements differently
                 called = next(iter(called.values()), None)
@@ -267,24 +266,24 @@ def read_lerobot(path: Path, episode: int | None = None) -> Table:
     files = sorted((path / 'data').glob('**/*.parquet'))
     own = [file for file in files if file.name == f'episode_{chosen:06d}.parquet']
     for file in own or [file for file in files if not file.name.startswith('episode_')]:
-        columns, _ = _columns(file, names)
-        index = next((c.values for c in columns if c.name == 'episode_index'), None)
-        rows = np.ones(len(columns[0].values), np.bool_) if index is None else index == chosen
-        if rows.any():
-            kept = tuple(
-                TableColumn(c.name, c.values[rows], c.array)
-                for c in columns
-                if not (c.name.endswith('index') or c.name.startswith('next.'))
-            )
+        arrays, _ = _columns(file)
+        if 'episode_index' in arrays:
+            rows = arrays['episode_index'] == chosen
+            arrays = {name: values[rows] for name, values in arrays.items()}
+        arrays = {
+            name: values
+            for name, values in arrays.items()
+            if len(values) and not name.endswith('index') and not name.startswith('next.')
+        }
+        if arrays:
+            table = table_of_arrays(str(path), arrays, 'LeRobot dataset', names)
             notes = (f'episode {chosen} of 0 to {total - 1}',)
-            return Table(str(path), kept, 'LeRobot dataset', rate_hz=rate, notes=notes)
+            return replace(table, rate_hz=rate, notes=notes)
     raise RecordingError(f'{path}: no episode {chosen}; the dataset has 0 to {total - 1}')
 
 
-def _columns(
-    path: Path, names: Mapping[str, Sequence[str]]
-) -> tuple[tuple[TableColumn, ...], dict[str, Sequence[str]]]:
-    """Return the columns of numbers, and the cells of text columns."""
+def _columns(path: Path) -> tuple[Arrays, dict[str, Sequence[str]]]:
+    """Return the columns of numbers, (N,) or (N, k) for lists, and the cells of text columns."""
     parquet = imported('pyarrow.parquet', path, 'Parquet')
     types = imported('pyarrow', path, 'Parquet').types
     stated = parquet.read_metadata(path)
@@ -294,45 +293,24 @@ def _columns(
     table = parquet.read_table(path)
     while any(types.is_struct(field.type) for field in table.schema):
         table = table.flatten()
-    columns: list[TableColumn] = []
+    arrays: Arrays = {}
     words: dict[str, Sequence[str]] = {}
     for field, chunked in zip(table.schema, table.columns, strict=True):
-        column = chunked.combine_chunks()
+        column, name = chunked.combine_chunks(), field.name
         if types.is_timestamp(field.type):
             values = column.cast('int64').to_numpy(zero_copy_only=False)
-            columns.append(TableColumn(field.name, values.astype(float), unit=field.type.unit))
+            arrays[f'{name} [{field.type.unit}]'] = values.astype(float)
         elif types.is_integer(field.type) or types.is_floating(field.type):
-            values = column.to_numpy(zero_copy_only=False)
-            columns.append(TableColumn(field.name, values.astype(float)))
+            arrays[name] = column.to_numpy(zero_copy_only=False).astype(float)
         elif types.is_string(field.type) or types.is_large_string(field.type):
-            words[field.name] = [one or '' for one in column.to_pylist()]
+            words[name] = [one or '' for one in column.to_pylist()]
         elif types.is_list(field.type) or types.is_fixed_size_list(field.type):
-            labels = names.get(field.name, ())
-            for name, cells in _elements(path, field.name, column.to_pylist(), labels):
-                if any(isinstance(cell, str) for cell in cells):
-                    words[name] = [str(cell or '') for cell in cells]
-                else:
-                    columns.append(TableColumn(name, np.array(cells, dtype=float), field.name))
-    return tuple(columns), words
-
-
-def _elements(
-    path: Path, name: str, cells: Sequence[Sequence[Any] | None], labels: Sequence[str]
-) -> Iterator[tuple[str, list[Any]]]:
-    """Yield the name and the cells of each list element; None for missing rows."""
-    rows = [one or () for one in cells]
-    width = max(map(len, rows), default=0)
-    if any(isinstance(row[0], (list, dict)) for row in rows if row):
-        return
-    odd = next((k for k, row in enumerate(rows) if row and len(row) != width), None)
-    if odd is not None:
-        raise RecordingError(
-            f'{path}: row {odd}, column {name}: a list of {len(rows[odd])}, the others have '
-            f'{width}'
-        )
-    for k in range(width):
-        label = labels[k] if len(labels) == width else k
-        yield f'{name}[{label}]', [row[k] if row else None for row in rows]
+            lists = np.array(column.to_pylist())  # of equal lengths
+            if lists.dtype.kind == 'U':
+                words |= {f'{name}[{k}]': one.tolist() for k, one in enumerate(lists.T)}
+            else:
+                arrays[name] = lists
+    return arrays, words
 
 
 #: Readers of table files, by suffix.

@@ -12,6 +12,7 @@ from importlib import import_module
 import os
 from pathlib import Path
 import re
+from types import MappingProxyType
 from typing import Any
 import zlib
 
@@ -204,7 +205,10 @@ def _normal_unit(text: str) -> str:
 
 
 def table_of_arrays(
-    source: str, arrays: Mapping[str, npt.NDArray[np.generic]], described: str
+    source: str,
+    arrays: Mapping[str, npt.NDArray[np.generic]],
+    described: str,
+    labels: Mapping[str, Sequence[str]] = MappingProxyType({}),
 ) -> Table:
     """
     Make a table of named arrays; the most common axis length is the number of samples.
@@ -217,6 +221,8 @@ def table_of_arrays(
         Numeric arrays; scalars and arrays of other lengths are skipped.
     described : str
         Kind of the file.
+    labels : mapping of str to sequence of str
+        Names of the elements of an array; by default their numbers.
 
     """
     usable = {
@@ -237,7 +243,13 @@ def table_of_arrays(
             columns.append(TableColumn(name or '[0]', numbers))
         else:
             rows = numbers if len(numbers) == length else numbers.T
-            columns += [TableColumn(f'{name}[{k}]', row, name) for k, row in enumerate(rows.T)]
+            own = labels.get(name, ())
+            if len(own) != rows.shape[1]:
+                own = [str(k) for k in range(rows.shape[1])]
+            columns += [
+                TableColumn(f'{name}[{label}]', row, name)
+                for label, row in zip(own, rows.T, strict=True)
+            ]
     return Table(source, tuple(columns), described)
 
 

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 import csv
 import io
@@ -19,8 +19,6 @@ import numpy as np
 _SEPARATORS = {';': 'semicolons', '\t': 'tabs', ',': 'commas', ' ': 'blanks'}
 _COMMENTS = ('#', '%')
 _EMPTY = ('', 'nan', 'na', 'n/a', 'null', 'none', '-')
-_LIST = re.compile(r'[\[(]([^\[\]()]*)[\])]\s*\)?$')
-_COMMAS = re.compile(r'[,;\s]+')
 _DECIMAL_COMMA = re.compile(r'[-+]?\d+,\d+([eE][-+]?\d+)?')
 
 
@@ -37,29 +35,22 @@ def read_text(path: Path) -> Table:
     lines = _lines(path)
     first, header, units = _heading(path, lines)
     separator = _separator(lines[first : first + 20])
-    cells = _split(lines[first], separator)
-    names = _split(header, separator) if header else [f'[{k}]' for k in range(len(cells))]
-    if len(names) != len(cells):
+    width = len(_split(lines[first], separator))
+    given = _split(header, separator) if header else [''] * width
+    if len(given) != width:
         raise RecordingError(
-            f'{path}: {len(names)} names ({", ".join(names[:6])} ...), but {len(cells)} '
+            f'{path}: {len(given)} names ({", ".join(given[:6])} ...), but {width} '
             f'values in line {first + 1}'
         )
-    widths = [len(_elements(cell)) or None for cell in cells]
-    heads: list[tuple[str, str, str]] = []
-    unit_of = dict(enumerate(_split(units, separator)))
-    for k, (name, width) in enumerate(zip(names, widths, strict=True)):
-        name = name or f'[{k}]'
-        if width is None:
-            heads.append((name, '' if header else '[]', unit_of.get(k, '')))
-        else:
-            heads += [(f'{name}[{i}]', name, unit_of.get(k, '')) for i in range(width)]
-    columns = [name for name, _, _ in heads]
-    values, words, notes, damage = _numbers(
-        path, lines[first:], separator, columns, widths, first + 1
-    )
+    names = [name or f'[{k}]' for k, name in enumerate(given)]
+    values, words, notes, damage = _numbers(path, lines[first:], separator, names, first + 1)
+    array, unit_of = '' if header else '[]', dict(enumerate(_split(units, separator)))
     return Table(
         str(path),
-        tuple(TableColumn(n, v, a, u) for (n, a, u), v in zip(heads, values.T, strict=True)),
+        tuple(
+            TableColumn(name, column, array, unit_of.get(k, ''))
+            for k, (name, column) in enumerate(zip(names, values.T, strict=True))
+        ),
         f'text with {_SEPARATORS[separator]}',
         first_line=first + 1,
         notes=notes,
@@ -114,8 +105,7 @@ def _has_numbers(line: str) -> bool:
     count = 0
     for cell in cells:
         with suppress(ValueError):
-            for part in _elements(cell) or [cell]:
-                _number(part, ';')
+            _number(cell, ';')
             count += 1
     return count > len(cells) / 2
 
@@ -138,12 +128,6 @@ def _split(line: str, separator: str) -> list[str]:
     return [cell.strip() for row in csv.reader([line], delimiter=separator) for cell in row]
 
 
-def _elements(cell: str) -> list[str]:
-    """Return the elements of a list such as '[1, 2]', '(1, 2)' or '[1 2]'; empty if no list."""
-    found = _LIST.search(cell) if cell[:1] in ('[', '(', 'a') else None
-    return [part.strip('\'"') for part in _COMMAS.split(found[1]) if part] if found else []
-
-
 def _number(cell: str, separator: str) -> float:
     """Convert a cell to a number, NaN if empty; raise a ValueError for text."""
     if cell.lower() in _EMPTY:
@@ -158,7 +142,6 @@ def _numbers(
     rows: list[str],
     separator: str,
     names: list[str],
-    widths: list[int | None],
     first_line: int,
 ) -> tuple[FloatArray, dict[str, Sequence[str]], tuple[str, ...], tuple[str, ...]]:
     """Return values (N, columns), text cells by column, and notes on content and damage."""
@@ -174,7 +157,7 @@ def _numbers(
     for k, line in enumerate(rows):
         where = f'line {first_line + k}'
         cells = _split(line, separator)
-        if len(cells) != len(widths):
+        if len(cells) != len(names):
             if not cells or line.lstrip().startswith(_COMMENTS):
                 continue
             if k == len(rows) - 1:
@@ -182,9 +165,9 @@ def _numbers(
                 values = values[:k]
                 break
             raise RecordingError(
-                f'{path}: {where} has {len(cells)} values, the others {len(widths)}'
+                f'{path}: {where} has {len(cells)} values, the others {len(names)}'
             )
-        for j, cell in enumerate(_expanded_lists(cells, widths, f'{path}: {where}')):
+        for j, cell in enumerate(cells):
             try:
                 values[k, j] = _number(cell, separator)
             except ValueError:
@@ -209,14 +192,3 @@ def _numbers(
             f'column {names[column]}',
         )
     return values, words, notes, damage
-
-
-def _expanded_lists(cells: list[str], widths: list[int | None], where: str) -> Iterator[str]:
-    """Yield cells, and for lists their elements."""
-    for k, (cell, width) in enumerate(zip(cells, widths, strict=True)):
-        elements = [cell] if width is None else _elements(cell)
-        if width is not None and len(elements) != width:
-            raise RecordingError(
-                f'{where}, column {k + 1}: a list of {len(elements)}, the first has {width}'
-            )
-        yield from elements
