@@ -28,7 +28,7 @@ from armid_ros.recording.joint_state.decoder import JointSamples, JointStateDeco
 from armid_ros.recording.message_types import BYTE_ORDERS, JOINT_STATE, STRING
 from armid_ros.recording.recording import PositionRange, Recording
 from armid_ros.recording.series import assemble
-from armid_ros.recording.source import DEFAULT, listed, ReadSettings, Topic
+from armid_ros.recording.source import DEFAULT, ReadSettings, Topic
 from armid_ros.recording.temperature import read_temperatures
 import numpy as np
 
@@ -101,35 +101,30 @@ def read_recording(
         columns = replace(columns, temperature=None)
         settings = replace(settings, temperatures=False)
     refuse_columns(path, columns)
-    if joints is None:
-        topics = bag_contents(path, settings)
-        there = [one for one in topics if one.joints]
-        if topic is not None:
-            there = [one for one in there if one.name.lstrip('/') == topic.lstrip('/')]
-        if not there:
-            which = f'{topic} of ' if topic else 'topic of '
-            raise RecordingError(f'{path}: no {which}{JOINT_STATE}; there are {listed(topics)}')
-        fullest = max(there, key=lambda one: one.count)
-        topic, joints = fullest.name, fullest.joints
-    recording = _read_bag(
-        path, tuple(name_in_file(joint, columns.rename) for joint in joints), topic, settings
-    )
-    if columns.rename:
-        others = tuple(
-            replace(one, joint=renamed(one.joint, columns.rename)) for one in recording.others
+    rules = columns.rename
+    if joints is not None:
+        joints = [name_in_file(joint, rules) for joint in joints]
+        if not joints or len(set(joints)) != len(joints):
+            raise RecordingError(
+                f'{path}: give at least one joint, and each joint once; got {joints}'
+            )
+    recording = _read_bag(path, joints, topic, settings)
+    if rules:
+        recording = replace(
+            recording,
+            joints=tuple(renamed(joint, rules) for joint in recording.joints),
+            others=tuple(replace(o, joint=renamed(o.joint, rules)) for o in recording.others),
         )
-        recording = replace(recording, joints=tuple(joints), others=others)
     return in_si(recording, columns, slides)
 
 
 def _read_bag(
-    path: Path, joints: tuple[str, ...], topic: str | None, settings: ReadSettings
+    path: Path, wanted: Sequence[str] | None, topic: str | None, settings: ReadSettings
 ) -> Recording:
     """Read some joints, by their names in the bag, with the numbers of the bag."""
-    if not joints or len(set(joints)) != len(joints):
-        raise RecordingError(f'{path}: give at least one joint, and each joint once; got {joints}')
     with Bag(path, settings) as bag:
-        chosen = choose_topics(bag, joints, topic)
+        chosen = choose_topics(bag, wanted, topic)
+        joints = tuple(named_joints(bag, chosen[0]) if wanted is None else wanted)
         decoder = JointStateDecoder(joints, sum(one.count for one in chosen))
         name = ' + '.join(one.name for one in chosen)
         pieces, size = [], 0
@@ -206,12 +201,12 @@ def assembled(
     where = f'{path}: {topic}'
     if not decoder.messages:
         raise RecordingError(f'{where} has no messages')
-    missing = [joint for joint in joints if joint not in decoder.names_seen]
-    if missing and not decoder.names_seen:
+    if not decoder.names_seen:
         raise RecordingError(
             f'{where}: none of {decoder.messages} messages names a joint; '
             f'{decoder.first_problem or "the names are empty"}'
         )
+    missing = [joint for joint in joints if joint not in decoder.names_seen]
     if missing:
         listed = ', '.join(f"'{name}'" for name in missing)
         others = [name for name in decoder.names_seen if name not in joints]
@@ -320,15 +315,15 @@ def _decoded(bag: Bag, topic: Topic, decoder: JointStateDecoder) -> Iterator[Joi
             yield from decoder.decode(block)
 
 
-def choose_topics(bag: Bag, joints: Sequence[str], wanted: str | None) -> tuple[Topic, ...]:
+def choose_topics(bag: Bag, joints: Sequence[str] | None, wanted: str | None) -> tuple[Topic, ...]:
     """Return the topic to read, or several topics that together name all joints."""
     topics = bag.topics()
     candidates = [topic for topic in topics if topic.type_name == JOINT_STATE]
     candidates = candidates or [topic for topic in topics if holds_joint_state(topic)]
     if wanted is not None or not candidates:
         return (bag.topic_of(JOINT_STATE, wanted, holds_joint_state),)
-    if len(candidates) == 1:
-        return (candidates[0],)
+    if joints is None or len(candidates) == 1:
+        return (max(candidates, key=lambda topic: topic.count),)
     names = {topic.name: named_joints(bag, topic) for topic in candidates}
     complete = [topic for topic in candidates if set(joints) <= set(names[topic.name])]
     if len(complete) > 1:
