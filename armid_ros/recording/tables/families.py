@@ -223,19 +223,17 @@ def guess(
 
 
 def guess_time(table: Table) -> TableColumn | None:
-    """Return a column with the name of a time that increases, or otherwise decreases."""
-    for way in (1.0, -1.0):
-        scores = {}
-        for column in table.columns:
-            words = words_of(column.bare_name)
-            score = max((TIMES.get(word, 0.0) for word in words), default=0.0)
-            score += sum(QUALIFIERS.get(word, 0.0) for word in words) - 0.1 * len(words)
-            steps = way * np.diff(column.finite)
-            if score > 0.5 and len(steps) and np.mean(steps >= 0.0) > 0.9:
-                scores[column] = score
-        if scores:
-            return max(scores, key=lambda column: scores[column])
-    return None
+    """Return a column with the name of a time; one that increases before one that decreases."""
+    scores = {}
+    for column in table.columns:
+        words = words_of(column.bare_name)
+        score = max((TIMES.get(word, 0.0) for word in words), default=0.0)
+        score += sum(QUALIFIERS.get(word, 0.0) for word in words) - 0.1 * len(words)
+        steps = np.diff(column.finite)
+        onwards = np.mean(steps >= 0.0) if len(steps) else 0.5
+        if score > 0.5 and max(onwards, 1.0 - onwards) > 0.9:
+            scores[column] = onwards > 0.5, score
+    return max(scores, key=lambda column: scores[column]) if scores else None
 
 
 def _family(

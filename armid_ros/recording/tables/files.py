@@ -20,7 +20,6 @@ from armid_ros.errors import RecordingError
 from armid_ros.files import finite, open_regular, reading
 from armid_ros.files import read_text as read_document
 from armid_ros.recording.source import DEFAULT
-from armid_ros.recording.tables.families import TIMES, words_of
 from armid_ros.recording.tables.table import (
     imported,
     read_content,
@@ -134,11 +133,7 @@ def _with_dates(table: Table) -> Table:
 
 def _with_stamps(table: Table) -> Table:
     """Merge seconds and nanoseconds of a stamp into one column."""
-    arrays: dict[str, list[TableColumn]] = {}
-    for column in table.columns:
-        if column.array and any(word in TIMES for word in words_of(column.array)):
-            arrays.setdefault(column.array, []).append(column)
-    pairs = [(two[0], two[1], name) for name, two in arrays.items() if len(two) == 2]
+    pairs = []
     starts = {
         match[1]: column for column in table.columns if (match := _SECONDS.fullmatch(column.name))
     }

@@ -92,13 +92,6 @@ class TablePlan:
             for one in self.missing
         )
 
-    @property
-    def unread(self) -> str:
-        """Return the names of the columns that are not read, as a text."""
-        taken = [self.time, *(one for source in self.sources for one in source.columns)]
-        rest = tuple(one for one in self.table.columns if one not in taken)
-        return replace(self.table, columns=rest).listed() if rest else ''
-
     def lines(self) -> list[str]:
         """Format the plan as lines."""
         table = self.table
@@ -117,8 +110,10 @@ class TablePlan:
             why = f": '{one.pattern}' has no column of numbers for {', '.join(one.missing)}"
             lines.append(f'  {one.quantity:9s} none{why if one.pattern else ""}')
         lines.append(f'  joints    {", ".join(self.joints)}')
-        if self.unread:
-            lines.append(f'  not read  {self.unread}')
+        taken = [self.time, *(one for source in self.sources for one in source.columns)]
+        unread = tuple(one for one in table.columns if one not in taken)
+        if unread:
+            lines.append(f'  not read  {replace(table, columns=unread).listed()}')
         lines += [f'  note: {note}' for note in (*table.damage, *table.notes, *self.notes)]
         return lines[:1] + [
             textwrap.fill(line, 80, subsequent_indent=' ' * 12, break_long_words=False)
@@ -261,15 +256,13 @@ def _position_notes(
     if position.unit != 'rad' or settings.gear or settings.position_scale:
         return
     reach = np.fmax.reduce(np.abs(position.values()))
-    far = reach > 4.5 * np.pi  # the unit is probably neither rad nor m
-    turned, slid = far & ~slides, far & slides
-    if turned.any() and not settings.degrees:
-        yield f'positions reach {reach[turned].max():.4g}: --degrees, or motor angles (--gear)?'
-    if slid.any():
-        others = 'pi/180' if settings.degrees else '1'
-        scale = ','.join('0.001' if one else others for one in slides)
-        most = f'{reach[slid].max():.4g}'
-        yield f'positions that slide reach {most} m: --position-scale {scale} if in mm?'
+    for kind, unit, remedy in (
+        (~slides & (not settings.degrees), 'rad', '--degrees, or motor angles (--gear)?'),
+        (slides, 'm', '--position-scale, 0.001 for joints in mm?'),
+    ):
+        most = np.max(reach[kind], initial=0.0)
+        if most > 4.5 * np.pi:  # the unit is probably neither rad nor m
+            yield f'positions reach {most:.4g} {unit}: {remedy}'
 
 
 def _time(table: Table, settings: ColumnSettings) -> tuple[TableColumn | None, str, float | None]:
@@ -337,15 +330,6 @@ def measured(plan: TablePlan) -> Recording:
     table = plan.table
     t, start = _times(plan)
     stamped = np.isfinite(t)
-    for source in plan.sources:
-        for column in source.columns if source.quantity != 'temperature' else ():
-            empty = np.flatnonzero(~np.isfinite(column.values))
-            if len(empty) > MAX_NOT_FINITE * len(table):
-                raise RecordingError(
-                    f'{table.source}: column {column.name} has no number in {len(empty)} of '
-                    f'{len(table)} rows, first in {table.where(int(empty[0]))}; leave '
-                    f'{source.quantity} out with --{source.quantity} none, or repair the file'
-                )
     if np.mean(~stamped) > MAX_NOT_FINITE:
         raise RecordingError(
             f'{table.source}: {np.sum(~stamped)} of {len(table)} rows have a time that is not a '
@@ -357,9 +341,6 @@ def measured(plan: TablePlan) -> Recording:
         start + np.round(t[stamped] * 1e9).astype(np.int64),
         (read['position'], read.get('velocity'), read.get('effort')),
     )
-    topic = 'the table'
-    if 'effort' not in read and plan.unread:
-        topic += f' (--effort names columns of it; not read are {plan.unread})'
     others: list[PositionRange] = []
     position, settings = plan.sources[0], plan.settings
     # joints that were not requested, with known unit
@@ -383,7 +364,7 @@ def measured(plan: TablePlan) -> Recording:
             'damage': '; '.join(table.damage),
         },
         source=table.source,
-        topic=topic,
+        topic='the table',
         others=tuple(others),
     )
     recording = replace(recording, temperature=_temperatures(plan, recording, t, start))

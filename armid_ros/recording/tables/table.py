@@ -54,8 +54,6 @@ class TableColumn:
         Name of the array that contains the column; empty for a single column.
     unit : str
         Unit in the name, or in a line below the names; empty if none is given.
-    filled : bool
-        Whether the column has a finite number in the file, even a too large one.
 
     """
 
@@ -63,11 +61,9 @@ class TableColumn:
     values: FloatArray
     array: str = ''
     unit: str = ''
-    filled: bool = field(init=False)
 
     def __post_init__(self) -> None:
         """Freeze the values, and read a missing unit from the name."""
-        object.__setattr__(self, 'filled', bool(np.isfinite(self.values).any()))
         with np.errstate(invalid='ignore'):  # ignore warnings for signalling NaN
             values = np.where(np.abs(self.values) <= LARGEST, self.values, np.nan)
         object.__setattr__(self, 'values', read_only(values))
@@ -126,7 +122,7 @@ class Table:
 
     def __post_init__(self) -> None:
         """Separate columns without numbers; raise a RecordingError for invalid tables."""
-        there = tuple(one for one in self.columns if one.filled)
+        there = tuple(one for one in self.columns if len(one.finite))
         empty = {one.name: () for one in self.columns if one not in there}
         object.__setattr__(self, 'columns', there)
         object.__setattr__(self, 'words', {**empty, **self.words})

@@ -237,7 +237,7 @@ def counter(path, motion):
         broken_cell: 'line 2,.* time.*oops',
         ragged: 'line 8.*8.*7',
         unnamed: '3.*time, q1, q2.*7.*line 2',
-        holes: 'tau2.*100 of 200.*line 51',
+        holes: '100 of 200.*effort of elbow',
         empty_column: 'q2',
         still_clock: 'time',
         counter: 'time.*--time-unit',

@@ -126,9 +126,12 @@ def test_what_is_not_read_is_listed_with_the_words_in_it(tmp_path):
     text = 't,mode,q1,q2,heat[0],heat[1],eff1,eff2\n'
     text += ''.join(f'{0.01 * k},run,{k},{k},20,21,{k},{k}\n' for k in range(50))
     (tmp_path / 'run.csv').write_text(text)
-    found = plan(open_table(tmp_path / 'run.csv'), ColumnSettings())
-    assert all(fact in found.unread for fact in ('heat[0]', 'heat[1]', 'mode', 'run'))
-    assert any('heat[0]' in line for line in found.lines())
+    (line,) = (
+        one
+        for one in plan(open_table(tmp_path / 'run.csv'), ColumnSettings()).lines()
+        if 'not read' in one
+    )
+    assert all(fact in line for fact in ('heat[0]', 'heat[1]', 'mode', 'run'))
 
 
 @pytest.mark.parametrize('word', ['eff', 'torque', 'tau', 'cur', 'i', 'load'])

@@ -206,7 +206,7 @@ def test_large_ways_of_a_joint_that_slides_are_doubted_apart():
     columns = table(q1=np.linspace(0, 1, 50), q2=np.linspace(0, 180, 50))
     assert any('--degrees' in note for note in plan(columns, ColumnSettings(), JOINTS).notes)
     (note,) = plan(columns, ColumnSettings(), JOINTS, [False, True]).notes
-    assert '180 m' in note and '--position-scale 1,0.001' in note
+    assert '180 m' in note and '--position-scale' in note
     scaled = ColumnSettings(position_scale=(1.0, 0.001))
     assert not plan(columns, scaled, JOINTS, [False, True]).notes
 
