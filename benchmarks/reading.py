@@ -73,7 +73,8 @@ def motion_messages(stamps: np.ndarray, number: int) -> list[bytes]:
     q = np.sin(rates * t) + 1e-4 * noise[0]
     dq = rates * np.cos(rates * t) + 1e-3 * noise[1]
     tau = 20 * np.sin(rates * t + 0.3) + 0.2 * noise[2]
-    return joint_state_cdr(JOINTS, stamps, q, dq, tau, frame_id=('base', '', 'world')[number])
+    batches = joint_state_cdr(JOINTS, stamps, q, dq, tau, frame_id=('base', '', 'world')[number])
+    return [message for batch in batches for message in batch.tolist()]
 
 
 def read_ours(path: Path) -> Arrays:

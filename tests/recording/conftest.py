@@ -31,6 +31,11 @@ def swing(samples=500, joints=JOINTS, period_ns=PERIOD_NS, start_ns=START_NS):
     )
 
 
+def serialised(*samples, **options):
+    """Return the messages of samples as a list of CDR."""
+    return [cdr for batch in joint_state_cdr(*samples, **options) for cdr in batch.tolist()]
+
+
 def sqlite_bag(path, messages, columns=', offered_qos_profiles TEXT'):
     """Write messages of one topic into a database as rosbag2 does; return the open database."""
     database = sqlite3.connect(path)
@@ -99,7 +104,7 @@ def messages_of():
         for quantity in ('q', 'dq', 'tau'):
             array = kept.get(quantity, getattr(recording, quantity))
             values.append(None if array is None else array[:, columns])
-        cdr = joint_state_cdr(names, stamps, *values)
+        cdr = serialised(names, stamps, *values)
         times = np.asarray(stamps if log is None else log).tolist()
         return [(topic, data, time) for data, time in zip(cdr, times, strict=True)]
 

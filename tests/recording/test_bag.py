@@ -13,7 +13,6 @@ from armid_ros.recording import (
     topics,
     write_recording,
 )
-from armid_ros.recording.joint_state.encoder import joint_state_cdr
 from armid_ros.recording.message_types import JOINT_STATE, message_type, STRING, string_cdr
 from mcap.writer import CompressionType, IndexType
 from mcap.writer import Writer as McapFileWriter
@@ -23,7 +22,7 @@ from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import get_typestore, Stores
 import yaml
 
-from .conftest import iter_raw, JOINTS, sqlite_bag
+from .conftest import iter_raw, JOINTS, serialised, sqlite_bag
 
 
 @pytest.fixture
@@ -73,7 +72,7 @@ def test_files_of_mcaps_own_writer_are_read_however_bare(
 ):
     """Of two publishers there are two channels, which are one topic."""
     path = tmp_path / 'file.mcap'
-    messages = joint_state_cdr(JOINTS, stamps, swinging.q, swinging.dq, swinging.tau)
+    messages = serialised(JOINTS, stamps, swinging.q, swinging.dq, swinging.tau)
     with path.open('wb') as stream:
         writer = McapFileWriter(
             stream,
@@ -198,7 +197,7 @@ def test_a_crashed_sqlite_recording_is_read_with_its_journal(
 ):
     bag = tmp_path / 'bag'
     store = get_typestore(Stores.ROS2_JAZZY)
-    messages = joint_state_cdr(JOINTS, stamps, swinging.q, swinging.dq, swinging.tau)
+    messages = serialised(JOINTS, stamps, swinging.q, swinging.dq, swinging.tau)
     with Writer(bag, version=9, storage_plugin=StoragePlugin.SQLITE3) as writer:
         connection = writer.add_connection('/joint_states', JOINT_STATE, typestore=store)
         for stamp, message in zip(stamps[:300].tolist(), messages[:300], strict=True):

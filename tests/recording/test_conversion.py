@@ -4,7 +4,6 @@
 
 from armid_ros.errors import RecordingError
 from armid_ros.recording import read_recording
-from armid_ros.recording.joint_state.encoder import joint_state_cdr
 from armid_ros.recording.message_types import JOINT_STATE, JOINT_STATE_HASH, message_type
 from armid_ros.recording.reader import bag_contents
 from mcap.writer import Writer as McapFileWriter
@@ -13,7 +12,7 @@ import pytest
 from rosbags.typesys import get_types_from_msg, get_typestore, Stores
 import zstandard
 
-from .conftest import JOINTS
+from .conftest import JOINTS, serialised
 
 HEADER = 'std_msgs/Header header'
 STANDARD = message_type(JOINT_STATE).definition
@@ -79,13 +78,13 @@ def inside_another_type(path, recording, stamps):
 
 
 def messages_packed_by_zstd(path, recording, stamps):
-    messages = joint_state_cdr(JOINTS, stamps, recording.q, recording.dq, recording.tau)
+    messages = serialised(JOINTS, stamps, recording.q, recording.dq, recording.tau)
     packed = [zstandard.compress(message) for message in messages]
     return write(path, JOINT_STATE, 'ros2msg', STANDARD, 'cdr', packed, stamps)
 
 
 def file_packed_by_zstd(path, recording, stamps):
-    messages = joint_state_cdr(JOINTS, stamps, recording.q, recording.dq, recording.tau)
+    messages = serialised(JOINTS, stamps, recording.q, recording.dq, recording.tau)
     write(path, JOINT_STATE, 'ros2msg', STANDARD, 'cdr', messages, stamps)
     packed = path.with_name('bag.mcap.zst')
     packed.write_bytes(zstandard.compress(path.read_bytes()))
@@ -122,7 +121,7 @@ def test_an_encoding_that_nobody_reads_is_named(swinging, stamps, tmp_path):
 
 
 def test_a_file_behind_a_file_is_said(swinging, stamps, tmp_path):
-    messages = joint_state_cdr(JOINTS, stamps, swinging.q, swinging.dq, swinging.tau)
+    messages = serialised(JOINTS, stamps, swinging.q, swinging.dq, swinging.tau)
     half, path = len(stamps) // 2, tmp_path / 'both.mcap'
     parts = [
         write(tmp_path / 'part.mcap', JOINT_STATE, 'ros2msg', STANDARD, 'cdr', messages[of],

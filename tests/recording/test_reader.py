@@ -4,14 +4,13 @@
 
 from armid_ros.errors import RecordingError
 from armid_ros.recording import read_recording, write_recording
-from armid_ros.recording.joint_state.encoder import joint_state_cdr
 from armid_ros.recording.message_types import JOINT_STATE, STRING
 from armid_ros.recording.recording import TimeGap
 import numpy as np
 import pytest
 from rosbags.typesys import get_typestore, Stores
 
-from .conftest import JOINTS
+from .conftest import JOINTS, serialised
 
 
 @pytest.mark.parametrize('asked', [('elbow', 'wrist', 'shoulder'), ('wrist', 'elbow'), ('wrist',)])
@@ -42,7 +41,7 @@ def test_an_order_and_a_layout_of_its_own_for_every_message_are_followed(
         order = np.roll([0, 1, 2], at)
         names = [JOINTS[k] for k in order]
         values = [x[[at]][:, order] for x in (swinging.q, swinging.dq, swinging.tau)]
-        (cdr,) = joint_state_cdr(names, [stamp], *values, frame_id='f' * (at % 97))
+        (cdr,) = serialised(names, [stamp], *values, frame_id='f' * (at % 97))
         messages.append(('/joint_states', cdr, stamp))
     recording = read_recording(write_bag(messages), joints=JOINTS)
     assert_same(recording, swinging)
@@ -51,7 +50,7 @@ def test_an_order_and_a_layout_of_its_own_for_every_message_are_followed(
 
 def test_big_endian_messages_are_read(swinging, stamps, write_bag, assert_same):
     store = get_typestore(Stores.ROS2_JAZZY)
-    little = joint_state_cdr(JOINTS, stamps, swinging.q, swinging.dq, swinging.tau)
+    little = serialised(JOINTS, stamps, swinging.q, swinging.dq, swinging.tau)
     messages = []
     for cdr, stamp in zip(little, stamps.tolist(), strict=True):
         message = store.deserialize_cdr(cdr, JOINT_STATE)

@@ -14,7 +14,6 @@ from armid_ros.recording import (
     topics,
     write_recording,
 )
-from armid_ros.recording.joint_state.encoder import joint_state_cdr
 from armid_ros.recording.message_types import JOINT_STATE
 from armid_ros.recording.metadata import LATCHED, VOLATILE
 from mcap.reader import make_reader
@@ -24,6 +23,8 @@ import pytest
 from rosbags.rosbag2 import Reader, StoragePlugin, Writer
 from rosbags.rosbag2.enums import CompressionFormat, CompressionMode
 from rosbags.typesys import get_typestore, Stores
+
+from .conftest import serialised
 
 
 @pytest.mark.parametrize('compression', ['zstd', 'lz4', 'none'])
@@ -95,7 +96,7 @@ def test_what_rosbags_writes_is_read(
     store = get_typestore(distribution)
     writer = Writer(tmp_path / 'bag', version=version, storage_plugin=storage)
     writer.set_compression(mode, CompressionFormat.ZSTD)
-    messages = joint_state_cdr(swinging.joints, stamps, swinging.q, swinging.dq, swinging.tau)
+    messages = serialised(swinging.joints, stamps, swinging.q, swinging.dq, swinging.tau)
     with writer:
         connection = writer.add_connection('/arm/joint_states', JOINT_STATE, typestore=store)
         for stamp, message in zip(stamps.tolist(), messages, strict=True):
@@ -122,7 +123,7 @@ def test_the_encoder_agrees_with_rosbags_whatever_the_lengths(names, frame_id, f
     ]
     store = get_typestore(Stores.ROS2_JAZZY)
     stamps = [1, 2 * 10**9 + 3, 4 * 10**9]
-    messages = joint_state_cdr(names, stamps, *arrays, frame_id=frame_id)
+    messages = serialised(names, stamps, *arrays, frame_id=frame_id)
     for at, (stamp, raw) in enumerate(zip(stamps, messages, strict=True)):
         message = store.deserialize_cdr(raw, JOINT_STATE)
         assert message.header.frame_id == frame_id

@@ -11,7 +11,6 @@ import tracemalloc
 
 from armid_ros.errors import RecordingError
 from armid_ros.recording import BagWriter, read_recording, topics, write_recording
-from armid_ros.recording.joint_state.encoder import joint_state_cdr
 from armid_ros.recording.mcap.writer import McapWriter
 from armid_ros.recording.message_types import (
     JOINT_STATE,
@@ -32,7 +31,7 @@ from rosbags.rosbag2 import Reader, StoragePlugin, Writer
 from rosbags.typesys import get_typestore, Stores
 import yaml
 
-from .conftest import iter_raw, JOINTS
+from .conftest import iter_raw, JOINTS, serialised
 
 WRITER_FILES = [inspect.getfile(BagWriter), inspect.getfile(McapWriter)]
 
@@ -45,7 +44,7 @@ def metadata_of(bag):
 def test_metadata_is_that_which_rosbags_writes(swinging, stamps, tmp_path):
     write_recording(tmp_path / 'run', swinging)
     store = get_typestore(Stores.ROS2_JAZZY)
-    cdr = joint_state_cdr(JOINTS, stamps, swinging.q, swinging.dq, swinging.tau)
+    cdr = serialised(JOINTS, stamps, swinging.q, swinging.dq, swinging.tau)
     bag = tmp_path / 'run_0'  # whose file is run_0.mcap
     with Writer(bag, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
         connection = writer.add_connection(
@@ -249,9 +248,8 @@ joints = [f'joint_{i}' for i in range(7)]
 for number in range(int(rate * seconds)):
     now[0] = number / rate
     stamp = 10**9 + round(now[0] * 1e9)
-    writer.write(
-        '/joint_states', joint_state_cdr(joints, [stamp], values, values, values)[0], stamp
-    )
+    (message,) = joint_state_cdr(joints, [stamp], values, values, values)
+    writer.write('/joint_states', message.tobytes(), stamp)
 print('written', flush=True)
 sys.stdin.read()
 """
@@ -282,7 +280,7 @@ def test_a_chunk_leaves_nothing_in_memory(tmp_path):
     """A recorder writes ten chunks a second, for days."""
     with BagWriter(tmp_path / 'bag', clock=lambda: 0.0) as writer:
         writer.add_topic('/joint_states', JOINT_STATE)
-        cdr = joint_state_cdr(['a'], [10**18], [[0.0]], [[0.0]], [[0.0]])[0]
+        cdr = serialised(['a'], [10**18], [[0.0]], [[0.0]], [[0.0]])[0]
 
         def chunks(count):
             for _ in range(count):
@@ -319,7 +317,7 @@ def test_a_full_disk_is_reported_and_what_fits_again_is_written(
 
 def test_messages_written_at_once_are_those_written_one_by_one(swinging, stamps, tmp_path):
     write_recording(tmp_path / 'once', swinging)
-    cdr = joint_state_cdr(JOINTS, stamps, swinging.q, swinging.dq, swinging.tau)
+    cdr = serialised(JOINTS, stamps, swinging.q, swinging.dq, swinging.tau)
     with BagWriter(tmp_path / 'each') as writer:
         writer.add_topic('/joint_states', JOINT_STATE)
         for data, stamp in zip(cdr, stamps.tolist(), strict=True):

@@ -13,7 +13,6 @@ from armid_ros.recording.joint_state.layout import JointStateLayout
 from armid_ros.recording.mcap.writer import Compression
 from armid_ros.recording.message_types import JOINT_STATE, QUANTITIES
 from armid_ros.recording.recording import Recording
-from armid_ros.recording.source import IntArray
 from armid_ros.recording.temperature import write_temperatures
 from armid_ros.recording.writer import BagWriter, DEFAULT_CHUNK_SIZE, whole_bag
 import numpy as np
@@ -28,7 +27,7 @@ def joint_state_cdr(
     tau: npt.ArrayLike | None = None,
     *,
     frame_id: str = '',
-) -> list[bytes]:
+) -> Iterator[npt.NDArray[np.void]]:
     """
     Serialise joint measurements, one message per sample.
 
@@ -43,17 +42,36 @@ def joint_state_cdr(
     frame_id : str
         Frame of the headers.
 
-    Returns
-    -------
-    list of bytes
-        N messages in CDR, little endian.
+    Yields
+    ------
+    ndarray of void
+        Messages in CDR, little endian, up to 4096 at a time.
 
     """
     stamps = np.asarray(stamps_ns, np.int64)
-    messages: list[bytes] = []
-    for rows in _encoded(tuple(joints), stamps, (q, dq, tau), frame_id):
-        messages += rows.tolist()
-    return messages
+    fields = [None if v is None else np.asarray(v, np.float64) for v in (q, dq, tau)]
+    n = len(joints)
+    for name, values in zip(('q', 'dq', 'tau'), fields, strict=True):
+        if values is not None and values.shape != (len(stamps), n):
+            raise RecordingError(
+                f'{name} has shape {values.shape}, but {len(stamps)} stamps of {n} joints need '
+                f'{(len(stamps), n)}'
+            )
+    frame = frame_id.encode()
+    counts = tuple(0 if values is None else n for values in fields)
+    layout = JointStateLayout('<', len(frame) + 1, tuple(joints), counts)
+    message = bytearray(layout.fixed[0].tobytes())
+    message[16 : 16 + len(frame)] = frame
+    template = np.frombuffer(message, layout.record)
+    size = 4096
+    for at in range(0, len(stamps), size):
+        batch = slice(at, at + size)
+        rows = np.repeat(template, len(stamps[batch]))
+        rows['sec'], rows['nanosec'] = np.divmod(stamps[batch], 10**9)
+        for name, values in zip(QUANTITIES, fields, strict=True):
+            if values is not None and n:
+                rows[name] = values[batch]
+        yield rows.view(np.dtype((np.void, layout.end)))
 
 
 def write_joint_states(
@@ -68,13 +86,13 @@ def write_joint_states(
     """
     Write joint measurements to a topic of a bag, logged at their stamps.
 
-    See ``joint_state_cdr`` for the parameters; ``frame_id`` is empty.
+    See ``joint_state_cdr`` for the parameters.
 
     """
     stamps = np.asarray(stamps_ns, np.int64)
     writer.add_topic(topic, JOINT_STATE)
     at = 0
-    for rows in _encoded(tuple(joints), stamps, (q, dq, tau), ''):
+    for rows in joint_state_cdr(joints, stamps, q, dq, tau):
         writer.write_many(topic, rows, stamps[at : at + len(rows)])
         at += len(rows)
 
@@ -144,35 +162,3 @@ def write_recording(
         write_joint_states(writer, topic, joints, stamps, measured.q, measured.dq, measured.tau)
         if measured.temperature is not None:
             write_temperatures(writer, joints, measured.temperature, start_ns)
-
-
-def _encoded(
-    joints: tuple[str, ...],
-    stamps: IntArray,
-    given: Sequence[npt.ArrayLike | None],
-    frame_id: str,
-) -> Iterator[npt.NDArray[np.void]]:
-    """Yield messages as records, in batches."""
-    fields = [None if v is None else np.asarray(v, np.float64) for v in given]
-    n = len(joints)
-    for name, values in zip(('q', 'dq', 'tau'), fields, strict=True):
-        if values is not None and values.shape != (len(stamps), n):
-            raise RecordingError(
-                f'{name} has shape {values.shape}, but {len(stamps)} stamps of {n} joints need '
-                f'{(len(stamps), n)}'
-            )
-    frame = frame_id.encode()
-    counts = tuple(0 if values is None else n for values in fields)
-    layout = JointStateLayout('<', len(frame) + 1, joints, counts)
-    message = bytearray(layout.fixed[0].tobytes())
-    message[16 : 16 + len(frame)] = frame
-    template = np.frombuffer(message, layout.record)
-    size = 4096
-    for at in range(0, len(stamps), size):
-        batch = slice(at, at + size)
-        rows = np.repeat(template, len(stamps[batch]))
-        rows['sec'], rows['nanosec'] = np.divmod(stamps[batch], 10**9)
-        for name, values in zip(QUANTITIES, fields, strict=True):
-            if values is not None and n:
-                rows[name] = values[batch]
-        yield rows.view(np.dtype((np.void, layout.end)))
