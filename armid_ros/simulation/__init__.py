@@ -10,7 +10,7 @@ plant has an `Elasticity`.
 """
 
 from armid_ros.robots.reference import Reference
-from armid_ros.simulation.controller import ComputedTorque, Controller, GravityPD, MotorControl
+from armid_ros.simulation.controller import ComputedTorque, Controller, MotorControl
 from armid_ros.simulation.integrator import step
 from armid_ros.simulation.plant import Plant, State
 from armid_ros.simulation.run import simulate, SimulatedRun
@@ -25,7 +25,6 @@ __all__ = [
     'Reference',
     'Controller',
     'ComputedTorque',
-    'GravityPD',
     'MotorControl',
     'Sensors',
     'Plant',

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Controllers: computed torque, PD with gravity compensation, and velocity loops of motors."""
+"""Controllers: linear feedback on a rigid body, computed torque, velocity loops of motors."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 from armid_ros.arm import ArmModel
 from armid_ros.errors import ModelError
 from armid_ros.model import inverse_dynamics
-from armid_ros.motion import FloatArray, freeze, Motion, read_only
+from armid_ros.motion import FloatArray, freeze, Motion
 from armid_ros.robots import Robot
 from armid_ros.simulation.plant import Plant
 import numpy as np
@@ -151,7 +151,6 @@ class Controller:
         return self.feedback.torque(q, dq, desired, feedforward)
 
 
-@dataclass(frozen=True, eq=False)
 class ComputedTorque(Controller):
     """
     Inverse dynamics of a nominal arm, with feedback on the acceleration.
@@ -159,7 +158,7 @@ class ComputedTorque(Controller):
     tau = ID(q, dq, ddq_d + 2 omega (dq_d - dq) + omega^2 (q_d - q)) + friction at dq_d.
     Source: Siciliano et al. 2009, section 8.5.2.
 
-    Attributes
+    Parameters
     ----------
     arm : ArmModel
         The controller's model of the arm. Its friction is compensated at the reference velocity.
@@ -168,14 +167,9 @@ class ComputedTorque(Controller):
 
     """
 
-    arm: ArmModel
-    bandwidth: float = BANDWIDTH
-    feedback: LinearFeedback = field(init=False, repr=False)
-
-    def __post_init__(self) -> None:
-        """Collect the actions of the effects of the nominal arm."""
-        feedback = LinearFeedback.of(self.arm, bandwidth=self.bandwidth, follows=True)
-        object.__setattr__(self, 'feedback', feedback)
+    def __init__(self, arm: ArmModel, bandwidth: float = BANDWIDTH) -> None:
+        self.arm = arm
+        self.feedback = LinearFeedback.of(arm, bandwidth=bandwidth, follows=True)
 
     def feedforward(self, desired: Motion) -> FloatArray:
         """Return damping, dry friction and other torques at the reference, shape (N, n)."""
@@ -184,36 +178,6 @@ class ComputedTorque(Controller):
         load = self.arm.load(desired) if depends else np.zeros_like(desired.q)
         effort = action.effort(desired, desired, load)
         return np.asarray(effort - desired.ddq @ self.feedback.added_inertia.T)
-
-
-@dataclass(frozen=True, eq=False)
-class GravityPD(Controller):
-    """
-    A spring and a damper on every joint, plus the gravity torque of the nominal arm.
-
-    tau = kp (q_d - q) + kd (dq_d - dq) + g(q).
-    Source: Siciliano et al. 2009, section 8.5.1. In the middle of the range of motion, each
-    joint by itself is critically damped at 50 rad/s.
-
-    Attributes
-    ----------
-    arm : ArmModel
-        The controller's model of the arm; only its gravity torque is used.
-
-    """
-
-    arm: ArmModel
-    feedback: LinearFeedback = field(init=False, repr=False)
-
-    def __post_init__(self) -> None:
-        """Choose the gains."""
-        body = LinearFeedback.of(self.arm)
-        robot = body.robot
-        inertia = np.diag(robot.inertia(robot.model.createData(), robot.middle_pose))
-        inertia = inertia + np.diag(body.added_inertia)
-        stiffness, damping = inertia * BANDWIDTH**2, 2.0 * BANDWIDTH * inertia
-        feedback = replace(body, stiffness=read_only(stiffness), damping=read_only(damping))
-        object.__setattr__(self, 'feedback', feedback)
 
 
 @dataclass(frozen=True, eq=False)

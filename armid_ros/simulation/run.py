@@ -74,7 +74,6 @@ def simulate(
     sensors: Sensors | None = None,
     rate: float = 1000.0,
     duration: float | None = None,
-    progress: Callable[[float], None] | None = None,
 ) -> SimulatedRun:
     """
     Record a simulated arm that follows a reference from its first point.
@@ -96,8 +95,6 @@ def simulate(
     duration : float, optional
         Recorded time [s]; by default the duration of the reference. After its end, the arm holds
         the last point.
-    progress : callable, optional
-        Called with the share done, 0 to 1, several times a second.
 
     Raises
     ------
@@ -108,7 +105,7 @@ def simulate(
 
     """
     simulated = SimulatedArm(arm, rng=rng, controller=controller, sensors=sensors)
-    return record(simulated, reference, rate=rate, duration=duration, progress=progress)
+    return record(simulated, reference, rate=rate, duration=duration)
 
 
 def record(
@@ -126,8 +123,10 @@ def record(
     ----------
     arm : SimulatedArm
         The arm with its controller, its sensors and the source of their noise.
-    reference, rate, duration, progress
+    reference, rate, duration
         As for `simulate`.
+    progress : callable, optional
+        Called with the share done, 0 to 1, several times a second.
 
     Raises
     ------
@@ -157,7 +156,7 @@ def record(
     truth = Motion(plant.robot.joints, plant.times(0, last + 1), q, dq, ddq, given)
     q, dq, commanded = readings(plant.sensing, truth, commanded)
     late = commanded[np.maximum(np.arange(0, last + 1, stride) - sensors.torque_delay, 0)]
-    measured = sensors.measure(q[rows], dq[rows], late, stride * plant.dt, arm.rng)
+    measured = sensors.measure(q[rows], dq[rows], late, arm.rng)
     truth = truth.select(rows)
     desired = curve.sample(truth.t)
     run = SimulatedRun(truth.joints, truth.t, *measured, truth, desired)
@@ -195,18 +194,14 @@ def _simulated_motion(
 def _both_sides(arm: SimulatedArm, run: SimulatedRun, moved: Motion) -> ElasticRun:
     """Return the readings of motors and links of a run, and the reference of the loops."""
     period = run.t[1] - run.t[0] if len(run.t) > 1 else arm.plant.dt
-    sensors, still = arm.sensors, np.zeros_like(moved.q)
-    q, dq, _ = sensors.measure(moved.q, moved.dq, still, period, arm.rng)
-    measured = arm.accelerometers.readings(moved)
-    if np.any(sensors.acceleration_noise):
-        measured = measured + sensors.acceleration_noise * arm.rng.standard_normal(measured.shape)
+    q, dq, felt = arm.read_links(moved)
     targets = arm.controller.targets(run.reference)
     before = targets.q[:1] - period * run.reference.dq[:1]
     return ElasticRun(
-        Motion(run.joints, run.t, run.q, run.dq, still, run.tau),
+        Motion(run.joints, run.t, run.q, run.dq, np.zeros_like(run.q), run.tau),
         Motion(run.joints, run.t, q, dq, moved.ddq),
         np.diff(targets.q, axis=0, prepend=before) / period,
-        felt=measured,
+        felt=felt,
     )
 
 

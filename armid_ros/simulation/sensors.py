@@ -33,9 +33,6 @@ class Sensors:
         Standard deviation of the velocity noise [rad/s or m/s].
     resolution : float or ndarray, shape (n,)
         Step of the encoder [rad or m]; 0: no quantisation.
-    velocity_from_encoder : bool
-        Whether the velocity is the difference quotient of the last two measured positions, instead
-        of the true velocity. The velocity noise is added.
     torque_delay : int
         Steps of the plant by which the torque reading is older than the position reading.
     acceleration_noise : float
@@ -47,7 +44,6 @@ class Sensors:
     position_noise: float | FloatArray = 0.0
     velocity_noise: float | FloatArray = 0.0
     resolution: float | FloatArray = 0.0
-    velocity_from_encoder: bool = False
     torque_delay: int = 0
     acceleration_noise: float = 0.0
 
@@ -79,9 +75,7 @@ class Sensors:
         q: FloatArray,
         dq: FloatArray,
         tau: FloatArray,
-        dt: float,
         rng: np.random.Generator,
-        previous: FloatArray | None = None,
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
         """
         Add noise and quantisation to successive samples; the caller applies the delay.
@@ -90,13 +84,8 @@ class Sensors:
         ----------
         q, dq, tau : ndarray, shape (N, n)
             True position, velocity and torque.
-        dt : float
-            Time between samples [s].
         rng : numpy.random.Generator
             Source of the noise; N samples at once give the same noise as N single samples.
-        previous : ndarray, shape (n,), or None
-            Measured position one sample earlier. None at the beginning: it is extrapolated back
-            with the true velocity.
 
         Returns
         -------
@@ -104,23 +93,14 @@ class Sensors:
             The readings.
 
         """
-        position, noise = q, None
         if self._noisy:
             noise = rng.standard_normal((len(q), 3, q.shape[1]))
-            position = position + noise[:, 0] * self.position_noise
-        position = self._quantise(position)
-        if self.velocity_from_encoder:
-            before = self._quantise(q[:1] - dt * dq[:1]) if previous is None else previous[None]
-            dq = np.diff(np.concatenate([before, position]), axis=0) / dt
-        if noise is not None:
+            q = q + noise[:, 0] * self.position_noise
             dq = dq + noise[:, 1] * self.velocity_noise
             tau = tau + noise[:, 2] * self.torque_noise
-        return position, dq, tau
-
-    def _quantise(self, q: FloatArray) -> FloatArray:
-        if self._step is None:
-            return q
-        return np.where(self.resolution, np.rint(q / self._step) * self._step, q)
+        if self._step is not None:
+            q = np.where(self.resolution, np.rint(q / self._step) * self._step, q)
+        return q, dq, tau
 
 
 def readings(

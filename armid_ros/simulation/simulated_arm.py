@@ -34,8 +34,6 @@ class LinkSample:
     ----------
     q, dq : ndarray, shape (n,)
         Readings of the encoders at the links [rad or m].
-    ddq : ndarray, shape (n,)
-        True acceleration of the links [rad/s^2 or m/s^2].
     acceleration : ndarray, shape (n, 3)
         Readings of the accelerometers on the links [m/s^2].
     asked_q, asked_dq : ndarray, shape (n,)
@@ -45,7 +43,6 @@ class LinkSample:
 
     q: FloatArray
     dq: FloatArray
-    ddq: FloatArray
     acceleration: FloatArray
     asked_q: FloatArray
     asked_dq: FloatArray
@@ -137,8 +134,6 @@ class SimulatedArm:
         self._acting: Controller
         self._targets: Motion
         self._torque: FloatArray
-        self._previous: FloatArray | None
-        self._previous_link: FloatArray | None
         self.reset()
 
     @property
@@ -294,7 +289,7 @@ class SimulatedArm:
             trace = self._take(missing if self._compiled is None else max(missing, _BLOCK))
             self._block_start = before
             self._ahead += len(trace.tau) - 1
-        return self.read(steps)
+        return self.read()
 
     def traces(self, steps: int) -> Iterator[Trace]:
         """Simulate some steps, and yield their traces, each of some hundred steps."""
@@ -328,27 +323,42 @@ class SimulatedArm:
         self._past.drop(self._ahead)
         self._state, self._torque, self._ahead = trace.state, trace.tau[-1], 0
 
-    def read(self, steps: int = 1) -> Sample:
-        """Advance some steps, and return the sensor readings."""
-        state, dt = self._state, steps * self.plant.dt
-        q, dq, tau = self._past.latest(self._ahead)
-        q, dq, tau = self.sensors.measure(
-            q[np.newaxis], dq[np.newaxis], tau[np.newaxis], dt, self.rng, self._previous
-        )
-        self._previous = q[0]
-        if self.plant.springs is None:
-            return Sample(self.steps, self.t, q[0], dq[0], tau[0])
-        # link side of the springs
-        at, speed, none = state.q[np.newaxis], state.dq[np.newaxis], np.zeros((1, len(state.q)))
-        at, speed, _ = self.sensors.measure(at, speed, none, dt, self.rng, self._previous_link)
-        self._previous_link = at[0]
-        acceleration = self.accelerometers.read(state.q, state.dq, state.ddq)
-        if np.any(self.sensors.acceleration_noise):
-            noise = self.rng.standard_normal(acceleration.shape)
-            acceleration = acceleration + self.sensors.acceleration_noise * noise
-        commanded = self._targets.q[self._row], self._targets.dq[self._row]
-        link = LinkSample(at[0], speed[0], state.ddq, acceleration, *commanded)
-        return Sample(state.steps, state.t, q[0], dq[0], tau[0], link)
+    def read(self) -> Sample:
+        """Return the sensor readings at present."""
+        truth = (values[np.newaxis] for values in self._past.latest(self._ahead))
+        q, dq, tau = (values[0] for values in self.sensors.measure(*truth, self.rng))
+        link = None
+        if self.plant.springs is not None:
+            state = self._state
+            links = Motion.of_states(self.joints, state.q, state.dq, state.ddq)
+            at, speed, acceleration = self.read_links(links)
+            commanded = self._targets.q[self._row], self._targets.dq[self._row]
+            link = LinkSample(at[0], speed[0], acceleration[:, 0], *commanded)
+        return Sample(self.steps, self.t, q, dq, tau, link)
+
+    def read_links(self, links: Motion) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """
+        Return the readings on the link side of the springs.
+
+        Parameters
+        ----------
+        links : Motion
+            True motion of the links, N samples.
+
+        Returns
+        -------
+        q, dq : ndarray, shape (N, n)
+            Readings of the encoders [rad or m].
+        acceleration : ndarray, shape (n, N, 3)
+            Readings of the accelerometers [m/s^2].
+
+        """
+        still = np.zeros_like(links.q)
+        q, dq, _ = self.sensors.measure(links.q, links.dq, still, self.rng)
+        acceleration, noise = self.accelerometers.readings(links), self.sensors.acceleration_noise
+        if noise:
+            acceleration = acceleration + noise * self.rng.standard_normal(acceleration.shape)
+        return q, dq, acceleration
 
     def _begin(self, reference: Reference, steps: int) -> None:
         """Start on a reference, with an empty sensor history."""
@@ -357,7 +367,6 @@ class SimulatedArm:
         self._ahead = 0
         self._reference, self._begun = reference, steps
         self._acting = self.controller.started()
-        self._previous = self._previous_link = None
         self._look_ahead(steps=1)
         self._act()
         self._past = self._new_past()

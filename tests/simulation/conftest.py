@@ -4,8 +4,21 @@
 
 from collections.abc import Callable
 
+from armid_ros.arm import ArmModel
 from armid_ros.robots import load_robot, Robot
+from armid_ros.simulation import Controller
+from armid_ros.simulation.controller import BANDWIDTH, LinearFeedback
+import numpy as np
 import pytest
+
+
+def gravity_pd(arm: ArmModel) -> Controller:
+    """Return a spring and a damper on every joint, and gravity; Siciliano et al. 2009, 8.5.1."""
+    robot, body = arm.robot, LinearFeedback.of(arm)
+    inertia = np.diag(robot.inertia(robot.model.createData(), robot.middle_pose))
+    inertia = inertia + np.diag(body.added_inertia)
+    gains = {'stiffness': inertia * BANDWIDTH**2, 'damping': 2.0 * BANDWIDTH * inertia}
+    return Controller(LinearFeedback.of(arm, **gains))
 
 
 def link(name, com, mass):

@@ -7,10 +7,12 @@ from xml.etree import ElementTree
 from armid_ros.arm import ArmModel
 from armid_ros.effects import make_effect
 from armid_ros.robots import load_robot, Robot
-from armid_ros.simulation import GravityPD, Plant, Reference, simulate, SimulatedRun
+from armid_ros.simulation import Controller, Plant, Reference, simulate, SimulatedRun
 import mujoco
 import numpy as np
 import pytest
+
+from tests.simulation.conftest import gravity_pd
 
 DT = 1e-3
 SUBSTEPS = 5
@@ -50,7 +52,7 @@ def mujoco_model(
 
 
 @pytest.fixture(scope='module', params=['humanoid_arm', 'ur10_robot.urdf', 'panda.urdf'])
-def case(request, example_robot) -> tuple[mujoco.MjModel, GravityPD, SimulatedRun]:
+def case(request, example_robot) -> tuple[mujoco.MjModel, Controller, SimulatedRun]:
     """Move a robot with friction and rotors by springs and dampers for 2 s."""
     shipped = request.param == 'humanoid_arm'
     robot = load_robot(request.param if shipped else example_robot(request.param))
@@ -72,7 +74,7 @@ def case(request, example_robot) -> tuple[mujoco.MjModel, GravityPD, SimulatedRu
         0.15 * w * np.sin(w * t),
         0.15 * w**2 * np.cos(w * t),
     )
-    controller = GravityPD(ArmModel(robot))
+    controller = gravity_pd(ArmModel(robot))
     run = simulate(
         Plant(arm, DT, hard_stops=False),
         reference,
@@ -84,7 +86,7 @@ def case(request, example_robot) -> tuple[mujoco.MjModel, GravityPD, SimulatedRu
 
 def test_the_same_controller_moves_both_alike(case) -> None:
     model, controller, run = case
-    limit = controller.arm.robot.torque_limit
+    limit = controller.feedback.robot.torque_limit
     data = mujoco.MjData(model)
     data.qpos[:], data.qvel[:] = run.truth.q[0], run.truth.dq[0]
     error = 0.0

@@ -7,12 +7,14 @@ from armid_ros.effects import make_effect
 from armid_ros.model.compiled import kernel, kernel_body
 from armid_ros.motion import Motion
 from armid_ros.robots import load_robot, robot_from_urdf
-from armid_ros.simulation import ComputedTorque, GravityPD, Plant, Reference, simulate
+from armid_ros.simulation import ComputedTorque, Plant, Reference, simulate
 from armid_ros.simulation.closed_loop import CompiledLoop
 from armid_ros.simulation.controller import LinearFeedback
 import numpy as np
 import pinocchio as pin
 import pytest
+
+from tests.simulation.conftest import gravity_pd
 
 pytestmark = pytest.mark.skipif(kernel() is None, reason='built without a compiler')
 
@@ -96,7 +98,7 @@ def test_body_is_that_of_pinocchio(source):
         (('coulomb_friction', 'quadratic_friction'), True),
     ],
 )
-@pytest.mark.parametrize('kind', [ComputedTorque, GravityPD])
+@pytest.mark.parametrize('kind', [ComputedTorque, gravity_pd])
 def test_run_is_that_of_python(source, names, stops, kind, monkeypatch):
     body = robot(source)
     plant = Plant(with_effects(body, names), hard_stops=stops)

@@ -7,10 +7,11 @@ from dataclasses import replace
 from armid_ros.arm import ArmModel
 from armid_ros.effects import make_effect
 from armid_ros.robots import Robot
-from armid_ros.simulation import ComputedTorque, GravityPD, Plant, Reference, simulate, step
+from armid_ros.simulation import ComputedTorque, Plant, Reference, simulate, step
 import numpy as np
 import pytest
 
+from tests.simulation.conftest import gravity_pd
 from tests.simulation.test_run import MIDDLE, swinging
 
 
@@ -56,7 +57,7 @@ def test_computed_torque_closes_an_error_like_a_critically_damped_spring(humanoi
 def test_spring_and_damper_sag_under_a_gravity_they_do_not_know(humanoid) -> None:
     moon = ArmModel(humanoid.with_gravity([0.0, 0.0, -1.62]))
     hold = Reference(humanoid.joints, np.zeros(1), MIDDLE[np.newaxis])
-    controller = GravityPD(moon)
+    controller = gravity_pd(moon)
     run = simulate(
         ArmModel(humanoid),
         hold,

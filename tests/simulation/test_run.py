@@ -20,6 +20,7 @@ from armid_ros.simulation import (
     SimulatedRun,
 )
 from armid_ros.simulation.controller import Controller
+from armid_ros.simulation.run import record
 import numpy as np
 import pytest
 
@@ -117,7 +118,7 @@ def test_delayed_torque_is_the_torque_of_some_steps_before(arm) -> None:
 def test_progress_goes_up_to_the_end(arm) -> None:
     shares: list[float] = []
     reference = swinging(arm.robot, 2.5)
-    simulate(arm, reference, rng=np.random.default_rng(0), progress=shares.append)
+    record(SimulatedArm(arm, rng=np.random.default_rng(0)), reference, progress=shares.append)
     assert len(shares) >= 2 and shares == sorted(shares) and shares[-1] == 1.0
 
 

@@ -19,7 +19,7 @@ def test_noise_has_the_standard_deviation_asked_for_and_is_white() -> None:
         velocity_noise=np.array(stds['velocity']),
         torque_noise=np.array(stds['torque']),
     )
-    readings = sensors.measure(ZERO, ZERO, ZERO, 1e-3, np.random.default_rng(1))
+    readings = sensors.measure(ZERO, ZERO, ZERO, np.random.default_rng(1))
     low, high = chi2.ppf([1e-4, 1.0 - 1e-4], N)
     for reading, std in zip(readings, stds.values(), strict=True):
         squares = np.sum((reading / np.array(std)) ** 2, axis=0)
@@ -33,7 +33,7 @@ def test_noise_has_the_standard_deviation_asked_for_and_is_white() -> None:
 def test_an_encoder_reads_whole_steps_within_half_a_step_of_the_truth() -> None:
     q = np.linspace(-1.0, 1.0, N)[:, np.newaxis] * np.array([1.0, 1.0])
     resolution = np.array([2.0 * np.pi / 4096, 0.0])
-    read, _, _ = Sensors(resolution=resolution).measure(q, q, q, 1e-3, np.random.default_rng(0))
+    read, _, _ = Sensors(resolution=resolution).measure(q, q, q, np.random.default_rng(0))
     steps = read[:, 0] / resolution[0]
     np.testing.assert_allclose(steps, np.round(steps), atol=1e-9)
     error = read[:, 0] - q[:, 0]
@@ -42,24 +42,14 @@ def test_an_encoder_reads_whole_steps_within_half_a_step_of_the_truth() -> None:
     np.testing.assert_array_equal(read[:, 1], q[:, 1])
 
 
-def test_velocity_from_the_encoder_is_the_difference_of_its_readings() -> None:
-    t = 1e-3 * np.arange(200)
-    q, dq = np.sin(3.0 * t)[:, np.newaxis], 3.0 * np.cos(3.0 * t)[:, np.newaxis]
-    sensors = Sensors(resolution=1e-3, velocity_from_encoder=True)
-    position, velocity, _ = sensors.measure(q, dq, q, 1e-3, np.random.default_rng(0))
-    np.testing.assert_allclose(velocity[1:], np.diff(position, axis=0) / 1e-3)
-    assert np.abs(velocity - dq).max() <= 1.0 + 0.01
-
-
 def test_one_sample_at_a_time_reads_the_same_as_all_at_once() -> None:
     q, dq, tau = np.random.default_rng(0).normal(size=(3, 20, 2))
-    sensors = Sensors(0.1, 0.2, 0.3, resolution=0.05, velocity_from_encoder=True)
-    together = sensors.measure(q, dq, tau, 0.1, np.random.default_rng(5))
-    rng, previous = np.random.default_rng(5), None
+    sensors = Sensors(0.1, 0.2, 0.3, resolution=0.05)
+    together = sensors.measure(q, dq, tau, np.random.default_rng(5))
+    rng = np.random.default_rng(5)
     for k in range(20):
         row = slice(k, k + 1)
-        single = sensors.measure(q[row], dq[row], tau[row], 0.1, rng, previous)
-        previous = single[0][0]
+        single = sensors.measure(q[row], dq[row], tau[row], rng)
         for one, all_at_once in zip(single, together, strict=True):
             np.testing.assert_array_equal(one, all_at_once[row])
 
