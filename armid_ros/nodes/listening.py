@@ -15,7 +15,7 @@ from armid_ros.nodes.messages.joint_states import (
     SENDER_CONFLICTS,
 )
 from armid_ros.nodes.messages.timeliness import Freshness, StampDifference
-from armid_ros.nodes.parameters.table import NodeParameter, Values
+from armid_ros.nodes.parameters.table import NodeParameter
 from armid_ros.nodes.qos import LATCHED, MatchedSubscription
 from armid_ros.recording.message_types import header_stamp
 from armid_ros.robots import load_robot, parse_gravity, Robot, robot_from_urdf
@@ -145,24 +145,24 @@ class ListeningNode(ArmidNode):
             self.publish_diagnostics()
 
     def take_joint_states(self, data: bytes) -> None:
-        """Decode a serialised joint state, and handle its samples."""
+        """Decode a serialised joint state, and handle its sample."""
         self.received += 1
         self.freshness.heard()
         self.last_stamp_ns = header_stamp(data)
         self.stamps.take(self.last_stamp_ns)
         if self.robot is not None:
-            for sample in self.reader.read(data):
+            sample = self.reader.read(data)
+            if sample is not None:
                 self.take_sample(sample)
+
+    def described_robot(self, description: str | None) -> Robot:
+        """Return the robot of a URDF, or without a URDF the robot of the parameters."""
+        given = {'gravity': self.value('gravity'), 'joints': self.value('joints') or None}
+        if description is None:
+            return load_robot(self.value('robot'), **given)
+        return robot_from_urdf(description, **given)
 
     def _on_description(self, message: String) -> None:
         if message.data != self._description:
             self.take_description(message.data)
             self._description = message.data
-
-
-def robot_of(value: Values, description: str | None) -> Robot:
-    """Return the robot of a URDF, or without a URDF the robot that parameters name."""
-    given = {'gravity': value('gravity'), 'joints': value('joints') or None}
-    if description is None:
-        return load_robot(value('robot'), **given)
-    return robot_from_urdf(description, **given)

@@ -7,6 +7,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
+import math
 from pathlib import Path
 from typing import Any
 
@@ -19,11 +20,11 @@ from armid_ros.errors import IdentificationError, ModelError
 from armid_ros.estimate import name_in_words
 from armid_ros.files.output import refuse_replacing
 from armid_ros.nodes.base import key_values
-from armid_ros.nodes.listening import ListeningNode, robot_of, ROBOT_PARAMETERS
-from armid_ros.nodes.live import Answer, Assistant, LiveDiagnosis, LiveSettings, StreamWatch
+from armid_ros.nodes.listening import ListeningNode, ROBOT_PARAMETERS
+from armid_ros.nodes.live import Answer, Assistant, LiveDiagnosis, LiveSettings
 from armid_ros.nodes.live.assistant import Plan, Save
 from armid_ros.nodes.messages.joint_states import JointSample
-from armid_ros.nodes.parameters.table import NodeParameter, Values
+from armid_ros.nodes.parameters.table import NodeParameter
 from armid_ros.nodes.qos import LATCHED
 from armid_ros.nodes.running.process import run
 from diagnostic_msgs.msg import DiagnosticStatus
@@ -154,12 +155,13 @@ class LiveDiagnosisNode(ListeningNode):
         super().__init__('live_diagnosis', **kwargs)
         self.live: LiveDiagnosis | None = None
         self._logged: object = ()
+        self._disturbed: set[str] = set()  # faults since the last diagnostics
         self._helper = helper or Assistant()
         self._diagnoses = self.create_publisher(Diagnosis, '~/diagnosis', LATCHED)
         self._models = self.create_publisher(String, '~/model', LATCHED)
         self._runs = self.create_publisher(String, '~/experiment', LATCHED)
         if live is None and (self.value('robot') or self.value('model')):
-            live = make_diagnosis(self.value)
+            live = self._described()
         if live is not None:
             self._adopt(live)
         self.listen()
@@ -216,7 +218,9 @@ class LiveDiagnosisNode(ListeningNode):
         """Add a joint state to the window, and start a diagnosis after enough new motion."""
         live = self._require()
         learning = live.learning
-        self._watch.take(sample.t, sample.q, sample.tau)
+        late, self._last = self._last - sample.t, sample.t
+        if late >= 0.0:  # a step back of more than 0.1 s is a jump of the clock
+            self._disturbed.add('jump_back' if late > 0.1 else 'out_of_order')
         live.add(*sample)
         if learning and not live.learning:
             self.tell('the misfit of the model is known; diagnoses begin')
@@ -246,14 +250,16 @@ class LiveDiagnosisNode(ListeningNode):
         values = {
             'received': self.received,
             'kept samples': len(live.window),
-            'memory [bytes]': live.window.nbytes,
             'motion [s]': live.window.moved,
             'diagnoses': live.asked,
             'busy': int(self.busy),
             'proposed': int(live.proposed is not None),
         }
-        for reason in sorted(self._watch.news()):
+        if live.window.frozen:
+            self._disturbed.add('frozen')
+        for reason in sorted(self._disturbed):
             self.report(reason)
+        self._disturbed.clear()
         trouble = self.stream_trouble()
         if live.learning and not (trouble or self.complaints.fresh):
             trouble = 'learning the misfit of the model: the arm must be healthy'
@@ -289,12 +295,12 @@ class LiveDiagnosisNode(ListeningNode):
 
     def check(self, values: Mapping[str, Any]) -> None:
         """Raise an IdentificationError if settings do not fit each other."""
-        settings_of(lambda name: values.get(name, self.value(name)))
+        self._settings(values)
 
     def changed(self, names: frozenset[str]) -> None:
         """Apply changed settings."""
         if self.live is not None and names & {entry.name for entry in LIVE_SETTINGS}:
-            self.live.use(settings_of(self.value))
+            self.live.use(self._settings({}))
 
     def close(self) -> None:
         """End the diagnosis process."""
@@ -302,7 +308,34 @@ class LiveDiagnosisNode(ListeningNode):
 
     def take_description(self, urdf: str) -> None:
         """Diagnose the robot of robot_description."""
-        self._adopt(make_diagnosis(self.value, urdf))
+        self._adopt(self._described(urdf))
+
+    def _settings(self, values: Mapping[str, Any]) -> LiveSettings:
+        """Return the settings of the parameters, some of them with new values."""
+        names = (*(entry.name for entry in LIVE_SETTINGS), 'learning')
+        return LiveSettings(**{name: values.get(name, self.value(name)) for name in names})
+
+    def _described(self, description: str | None = None) -> LiveDiagnosis:
+        """Make the diagnosis that the parameters describe, for their robot or that of a URDF."""
+        robot = model = None
+        if description is not None or self.value('robot'):
+            robot = self.described_robot(description)
+        if self.value('model'):
+            model = Path(self.value('model')).expanduser()
+        arm = load_model(model, robot) if model else ArmModel(robot)
+        given = ArmModel.of(arm.robot, effects=self.value('effects'))
+        values = dict(zip(arm.effects, arm.values, strict=True))
+        values |= zip(given.effects, given.values, strict=True)
+        arm = replace(arm, effects=tuple(values), values=tuple(values.values()))
+        if not arm.robot.rigid_parameters.any():
+            raise ModelError(
+                f'{arm.robot.name}: no link that moves has an <inertial>, so that the model '
+                'predicts no torque to compare with; complete the description, or give a model'
+            )
+        bags = tuple(read_recording(bag, arm) for bag in self.value('baseline'))
+        misfit = load_misfit(model) if model and not bags else None
+        settings, seed = self._settings({}), self.value('seed')
+        return LiveDiagnosis(arm, settings, baseline=bags, misfit=misfit, seed=seed)
 
     def _take(self, answer: Answer) -> None:
         """Publish a diagnosis, and the model if it has changed."""
@@ -356,7 +389,7 @@ class LiveDiagnosisNode(ListeningNode):
         robot = live.accepted.robot
         self.adopt(robot)
         self.live = live
-        self._watch = StreamWatch(robot.n_joints)
+        self._last = -math.inf
         self._publish_model()
 
     def _require(self) -> LiveDiagnosis:
@@ -382,65 +415,6 @@ def _in_words(live: LiveDiagnosis) -> str:
     return '; '.join(
         ' of '.join(filter(None, (name_in_words(name), ', '.join(joints))))
         for name, joints in live.named
-    )
-
-
-def settings_of(value: Values) -> LiveSettings:
-    """
-    Return the settings that parameters describe.
-
-    Raises
-    ------
-    IdentificationError
-        If they do not fit each other.
-
-    """
-    fields = {entry.name: value(entry.name) for entry in LIVE_SETTINGS}
-    return LiveSettings(**fields, learning=value('learning'))
-
-
-def make_diagnosis(value: Values, description: str | None = None) -> LiveDiagnosis:
-    """
-    Make the live diagnosis that parameters describe.
-
-    Parameters
-    ----------
-    value : callable
-        Returns the value of a parameter of `LiveDiagnosisNode.table`.
-    description : str, optional
-        URDF that replaces the robot of the parameters.
-
-    Raises
-    ------
-    ArmidError
-        If robot, model, effects, bags or settings are not valid or do not fit each other.
-
-    """
-    robot = None
-    if description is not None or value('robot'):
-        robot = robot_of(value, description)
-    if value('model'):
-        arm = load_model(Path(value('model')).expanduser(), robot)
-    else:
-        assert robot is not None  # the node then waits for robot_description
-        arm = ArmModel(robot)
-    given = ArmModel.of(arm.robot, effects=value('effects'))
-    for effect, values in zip(given.effects, given.values, strict=True):
-        if effect in arm.effects:
-            known = list(arm.values)
-            known[arm.effects.index(effect)] = values
-            arm = replace(arm, values=tuple(known))
-        else:
-            arm = arm.with_effect(effect, values)
-    if not arm.robot.rigid_parameters.any():
-        raise ModelError(
-            f'{arm.robot.name}: no link that moves has an <inertial>, so that the model predicts '
-            'no torque to compare with; complete the description, or give a model'
-        )
-    bags = [read_recording(bag, arm) for bag in value('baseline')]
-    misfit = load_misfit(value('model')) if value('model') and not bags else None
-    return LiveDiagnosis(
-        arm, settings_of(value), baseline=tuple(bags), misfit=misfit, seed=value('seed')
     )
 
 

@@ -25,10 +25,10 @@ from armid_ros.identification.online.identifier import OnlineIdentifier, OnlineS
 from armid_ros.identification.online.learning_progress import LearningProgress, too_little_motion
 from armid_ros.motion import FloatArray
 from armid_ros.nodes.base import key_values
-from armid_ros.nodes.listening import ListeningNode, robot_of, ROBOT_PARAMETERS
+from armid_ros.nodes.listening import ListeningNode, ROBOT_PARAMETERS
 from armid_ros.nodes.messages.estimates import estimate_message, estimate_values
 from armid_ros.nodes.messages.joint_states import DISTURBANCES, JointSample
-from armid_ros.nodes.parameters.table import NodeParameter, Values
+from armid_ros.nodes.parameters.table import NodeParameter
 from armid_ros.nodes.qos import LATCHED, STREAM
 from armid_ros.nodes.running.process import run
 from diagnostic_msgs.msg import DiagnosticStatus
@@ -128,7 +128,7 @@ class OnlineIdentifierNode(ListeningNode):
         if self.value('save_to'):  # check before the identification, not at its end
             refuse_replacing(Path(self.value('save_to')).expanduser(), FILES)
         if identifier is None and self.value('robot'):
-            identifier = make_identifier(self.value)
+            identifier = self._described()
         if identifier is not None:
             self._begin(identifier)
         self.create_subscription(String, 'model', self._on_model, LATCHED)
@@ -279,11 +279,34 @@ class OnlineIdentifierNode(ListeningNode):
 
     def _settings(self, values: Mapping[str, Any]) -> OnlineSettings:
         """Return the settings of the identifier, with new values of changeable parameters."""
-        described = settings_of(
-            lambda name: values.get(name, self.value(name)), self._require().arm
-        )
+        identifier = self._require()
+        described = self._described_settings(identifier.arm, values)
         can_change = {name: getattr(described, name) for name in OnlineIdentifier.CHANGEABLE}
-        return replace(self._require().settings, **can_change)
+        return replace(identifier.settings, **can_change)
+
+    def _described(self, description: str | None = None) -> OnlineIdentifier:
+        """Make the identifier that the parameters describe, for their robot or that of a URDF."""
+        arm = ArmModel.of(self.described_robot(description), effects=self.value('effects'))
+        settings = self._described_settings(arm, {})
+        return OnlineIdentifier(arm, settings, rng=np.random.default_rng(0))
+
+    def _described_settings(self, arm: ArmModel, values: Mapping[str, Any]) -> OnlineSettings:
+        """Return the settings of the parameters, some of them with new values."""
+
+        def value(name: str) -> Any:
+            return values.get(name, self.value(name))
+
+        noise = tuple(value('torque_noise'))
+        if len(noise) == 1:
+            noise = noise * arm.robot.n_joints
+        return OnlineSettings(
+            cutoff=value('cutoff'),
+            forgetting=value('forgetting'),
+            torque_noise=noise if any(noise) else None,
+            max_gap=value('max_gap'),
+            measured_velocity=value('measured_velocity'),
+            false_alarm_time=value('false_alarm_time') or None,
+        )
 
     def level(self, troubled: bool) -> bytes:
         """Return STALE if joint states have stopped, ERROR if the identification failed."""
@@ -293,7 +316,7 @@ class OnlineIdentifierNode(ListeningNode):
 
     def take_description(self, urdf: str) -> None:
         """Identify the robot of robot_description."""
-        self._begin(make_identifier(self.value, urdf))
+        self._begin(self._described(urdf))
 
     def _on_model(self, message: String) -> None:
         """Restart with the effects and values of a model, if its effects are different."""
@@ -371,42 +394,6 @@ class OnlineIdentifierNode(ListeningNode):
         if self.identifier is None:
             raise IdentificationError('no robot is known: robot_description was not received')
         return self.identifier
-
-
-def make_identifier(value: Values, description: str | None = None) -> OnlineIdentifier:
-    """
-    Make the identifier that parameters describe.
-
-    Parameters
-    ----------
-    value : callable
-        Returns the value of a parameter of `OnlineIdentifierNode.table`.
-    description : str, optional
-        URDF that replaces the robot of the parameter.
-
-    Raises
-    ------
-    ArmidError
-        If robot, effects or settings are not valid or do not fit each other.
-
-    """
-    arm = ArmModel.of(robot_of(value, description), effects=value('effects'))
-    return OnlineIdentifier(arm, settings_of(value, arm), rng=np.random.default_rng(0))
-
-
-def settings_of(value: Values, arm: ArmModel) -> OnlineSettings:
-    """Return the settings that parameters describe."""
-    noise = tuple(value('torque_noise'))
-    if len(noise) == 1:
-        noise = noise * arm.robot.n_joints
-    return OnlineSettings(
-        cutoff=value('cutoff'),
-        forgetting=value('forgetting'),
-        torque_noise=noise if any(noise) else None,
-        max_gap=value('max_gap'),
-        measured_velocity=value('measured_velocity'),
-        false_alarm_time=value('false_alarm_time') or None,
-    )
 
 
 main = partial(run, OnlineIdentifierNode)

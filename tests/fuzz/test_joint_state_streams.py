@@ -130,7 +130,8 @@ def learned(damage: dict[int, tuple], velocity: bool = False) -> OnlineIdentifie
     online = deepcopy(FRESH[velocity])
     reader = JointStateReader(ARM_MODEL.robot.joints, Silent(), Clock())
     for state in stream(damage):
-        for sample in reader.read(serialize_message(state)):
+        sample = reader.read(serialize_message(state))
+        if sample is not None:
             online.update(*sample)
             assert np.all(np.isfinite(online.estimate().values))
     return online

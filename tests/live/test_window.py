@@ -24,13 +24,6 @@ def test_streams_of_any_rate_are_kept_at_the_rate_of_the_window():
         assert kept.duration >= 1.98
 
 
-def test_memory_is_that_of_the_beginning_after_any_time():
-    window = SampleWindow(JOINTS, 2.0, 0.01)
-    before = window.nbytes
-    filled(200.0, 60.0, window)
-    assert window.nbytes == before
-
-
 def test_the_latest_samples_are_kept_as_they_came():
     kept = filled(100.0, 5.0).recording()
     np.testing.assert_allclose(kept.tau[:, 0], kept.t + kept.tau[0, 0], atol=1e-12)

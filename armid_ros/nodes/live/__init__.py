@@ -5,7 +5,6 @@
 from armid_ros.nodes.live.assistant import Assistant, Worker
 from armid_ros.nodes.live.request import Answer, DiagnosisRequest, LiveSettings
 from armid_ros.nodes.live.schedule import LiveDiagnosis
-from armid_ros.nodes.live.stream_watch import StreamWatch
 from armid_ros.nodes.live.window import SampleWindow
 
 __all__ = [
@@ -15,6 +14,5 @@ __all__ = [
     'LiveSettings',
     'DiagnosisRequest',
     'SampleWindow',
-    'StreamWatch',
     'Worker',
 ]

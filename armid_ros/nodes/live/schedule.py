@@ -117,8 +117,8 @@ class LiveDiagnosis:
 
     def add(
         self, t: float, q: npt.ArrayLike, dq: npt.ArrayLike | None, tau: npt.ArrayLike
-    ) -> bool:
-        """Add a sample; see `SampleWindow.add` for arguments and result."""
+    ) -> None:
+        """Add a sample; see `SampleWindow.add` for the arguments."""
         held = len(self.window)
         kept = self.window.add(t, q, dq, tau)
         if kept and held and len(self.window) == 1:
@@ -132,7 +132,6 @@ class LiveDiagnosis:
             motion = self.window.recording(began, 'the motion in which nothing was wrong')
             self._healthy, self.learning = (self.accepted, motion), False
             self._asked_at = self.window.moved
-        return kept
 
     def _holds(self, seconds: float) -> bool:
         """Return whether the window contains motion of a given duration [s]."""

@@ -4,6 +4,9 @@
 
 from __future__ import annotations
 
+from collections import deque
+
+from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording
 import numpy as np
 import numpy.typing as npt
@@ -40,31 +43,45 @@ class SampleWindow:
         self.joints = joints
         self.moved = 0.0
         self._period = period
-        self._capacity = int(np.ceil(duration / (period * _MIN_SPACING))) + 1
-        n = len(joints)
-        # twice the capacity: the window is one slice, and is moved to the front when the end is
-        # reached
-        self._rows = np.empty((2 * self._capacity, 1 + 3 * n))
-        self._first = self._end = 0
+        capacity = int(np.ceil(duration / (period * _MIN_SPACING))) + 1
+        self._rows: deque[FloatArray] = deque(maxlen=capacity)  # t, q, dq, tau
+        # smallest and largest efforts of the arm in motion
+        self._efforts = np.full((2, len(joints)), np.nan)
 
     def __len__(self) -> int:
         """Return the number of kept samples."""
-        return self._end - self._first
+        return len(self._rows)
 
     @property
     def begin(self) -> float:
         """Return the time of the oldest sample [s]; infinite for an empty window."""
-        return float(self._rows[self._first, 0]) if len(self) else np.inf
+        return float(self._rows[0][0]) if self._rows else np.inf
 
     @property
     def end(self) -> float:
         """Return the time of the newest sample [s]; minus infinity for an empty window."""
-        return float(self._rows[self._end - 1, 0]) if len(self) else -np.inf
+        return float(self._rows[-1][0]) if self._rows else -np.inf
 
     @property
-    def nbytes(self) -> int:
-        """Return the memory of the samples [bytes]."""
-        return self._rows.nbytes
+    def frozen(self) -> bool:
+        """
+        Return whether positions are no longer measured.
+
+        The efforts of an arm at rest are constant except for noise. If no position changes while
+        an effort varies over half of its range in motion, the positions are not measured.
+
+        """
+        if not self._rows:
+            return False
+        t, q, _, tau = self._columns()
+        changes = np.flatnonzero(np.diff(q, axis=0).any(axis=1))
+        first = int(changes[-1]) + 1 if len(changes) else 0
+        if t[-1] - t[first] <= 2.0:  # without a change of positions [s]
+            return False
+        effort, steps = np.ptp(tau[first:], axis=0), np.abs(np.diff(tau[first:], axis=0))
+        # noise of a million samples has a range of 9 mean changes per sample
+        varies = effort > 10.0 * steps.mean(axis=0)
+        return bool(np.any(varies & (effort > 0.5 * np.ptp(self._efforts, axis=0))))
 
     def add(
         self, t: float, q: npt.ArrayLike, dq: npt.ArrayLike | None, tau: npt.ArrayLike
@@ -89,26 +106,21 @@ class SampleWindow:
         """
         step = t - self.end
         # longest gap, and longest step back in time, without a restart
-        if len(self) and abs(step) > 20.0 * self._period:
-            self._first = self._end = 0
+        if self._rows and abs(step) > 20.0 * self._period:
+            self._rows.clear()
         elif step < _MIN_SPACING * self._period:
             return False
-        if self._end == len(self._rows):
-            kept = self._rows[self._first : self._end].copy()
-            self._rows[: len(kept)] = kept
-            self._first, self._end = 0, len(kept)
         n = len(self.joints)
-        row = self._rows[self._end]
+        row = np.empty(1 + 3 * n)
         row[0], row[1 : n + 1], row[2 * n + 1 :] = t, q, tau
         row[n + 1 : 2 * n + 1] = np.nan if dq is None else dq
-        if len(self):
-            before = self._rows[self._end - 1]
-            step = row[0] - before[0]
-            # at rest, no joint is faster than 0.01 rad/s or m/s
-            if np.abs(row[1 : n + 1] - before[1 : n + 1]).max() > 0.01 * step:
+        if self._rows:
+            way = np.abs(row[1 : n + 1] - self._rows[-1][1 : n + 1]).max()
+            if way > 0.01 * step:  # at rest, no joint is faster than 0.01 rad/s or m/s
                 self.moved += step
-        self._end += 1
-        self._first = max(self._first, self._end - self._capacity)
+                self._efforts[0] = np.fmin(self._efforts[0], row[2 * n + 1 :])
+                self._efforts[1] = np.fmax(self._efforts[1], row[2 * n + 1 :])
+        self._rows.append(row)
         return True
 
     def recording(self, first: float = -np.inf, source: str = 'window') -> Recording:
@@ -123,16 +135,19 @@ class SampleWindow:
             Name of the recording.
 
         """
-        rows = self._rows[self._first : self._end]
-        rows = rows[rows[:, 0] >= first].copy()
-        n = len(self.joints)
-        dq = rows[:, n + 1 : 2 * n + 1]
-        begin = rows[0, 0] if len(rows) else 0.0
+        columns = self._columns()
+        t, q, dq, tau = (column[columns[0] >= first] for column in columns)
         return Recording(
             joints=self.joints,
-            t=rows[:, 0] - begin,
-            q=rows[:, 1 : n + 1],
+            t=t - (t[0] if len(t) else 0.0),
+            q=q,
             dq=None if np.isnan(dq).any() else dq,
-            tau=rows[:, 2 * n + 1 :],
+            tau=tau,
             source=source,
         )
+
+    def _columns(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+        """Return times (N,), and positions, velocities and torques (N, n) of the samples."""
+        n = len(self.joints)
+        rows = np.array(self._rows).reshape(-1, 1 + 3 * n)
+        return rows[:, 0], rows[:, 1 : n + 1], rows[:, n + 1 : 2 * n + 1], rows[:, 2 * n + 1 :]

@@ -9,7 +9,7 @@ import math
 from typing import NamedTuple
 
 from armid_ros.errors import RecordingError
-from armid_ros.identification.samples.joint_merge import joint_places, JointMerger
+from armid_ros.identification.samples.joint_merge import joint_places
 from armid_ros.motion import FloatArray
 from armid_ros.nodes.complaints import Complaints
 from armid_ros.recording.joint_state.decoder import JointStateMessages
@@ -83,26 +83,15 @@ class JointStateReader:
         self._clock = clock
         self._messages = JointStateMessages()
         self._names: Sequence[str] | None = None
-        self._some: tuple[int, ...] = ()
-        self._whole = False
-        self._merger: JointMerger | None = None
-        self._alone = 0
-        self._order: npt.NDArray[np.intp] | slice = slice(None)
+        self._order: npt.NDArray[np.intp]
         self._epoch: int | None = None
 
-    def read(self, data: bytes) -> list[JointSample]:
-        """
-        Decode a serialised message, and return the samples of all joints that it completes.
-
-        Usually one sample; none for an unusable message. Messages with some of the joints are
-        merged with those of other senders.
-
-        """
+    def read(self, data: bytes) -> JointSample | None:
+        """Decode a serialised message; None for an unusable one, as of some of the joints."""
         try:
             message = self._messages.read(data)
             if message.names is not self._names and message.names != self._names:
                 self._match(message.names)
-            self._names = message.names
             stamp = self._time(message.sec, message.nanosec)
             q = self._values(message.names, message.position, 'position')
             dq = None
@@ -113,44 +102,20 @@ class JointStateReader:
             tau = self._values(message.names, message.effort, 'effort')
         except (MalformedMessage, RecordingError) as error:
             self._complaints.say('joint_states', str(error))
-            return []
-        if self._merger is None:
-            return [JointSample(stamp, q, dq, tau)]
-        return self._merged(stamp, q, dq, tau)
+            return None
+        return JointSample(stamp, q, dq, tau)
 
     def _match(self, names: Sequence[str]) -> None:
         """Find the indices of the joints in messages with these names."""
         self._names = None
-        some = tuple(k for k, joint in enumerate(self._joints) if joint in names)
-        whole = len(some) == len(self._joints)
-        if whole or not some or self._whole:
+        try:
             self._order = joint_places(self._joints, names)
-            self._merger, self._whole = None, True
-        else:
-            self._order = joint_places([self._joints[k] for k in some], names)
-            self._some = some
-            self._merger = self._merger or JointMerger(len(self._joints))
-
-    def _merged(
-        self, stamp: float, q: FloatArray, dq: FloatArray | None, tau: FloatArray
-    ) -> list[JointSample]:
-        """Add a sample of one sender, and return the merged samples that are complete."""
-        assert self._merger is not None
-        parts = [q, np.full(len(q), np.nan) if dq is None else dq, tau]
-        found = [
-            JointSample(t, x[0], None if np.isnan(x[1]).any() else x[1], x[2])
-            for t, x in self._merger.take(self._some, stamp, np.stack(parts))
-        ]
-        self._alone = 0 if found else self._alone + 1
-        if self._alone > 100:  # messages
-            missing = [self._joints[k] for k in self._merger.missing]
-            self._complaints.say(
-                'joint_states',
-                f'joint states without {", ".join(missing)}; they name {", ".join(self._names)}'
-                if missing
-                else 'joint states of different senders do not share their time',
-            )
-        return found
+        except RecordingError as error:
+            missing, some = set(self._joints) - set(names), set(self._joints) & set(names)
+            merge = '; the node joint_state_merger merges several senders'
+            hint = merge if missing and some else ''
+            raise RecordingError(f'{error}{hint}') from error
+        self._names = names
 
     def stamp(self, t: float) -> Time:
         """Convert a time of this reader to a stamp."""
@@ -181,6 +146,7 @@ class JointStateReader:
         # a sum is faster than isfinite; skipped joints may be NaN
         if not math.isfinite(sum(values.tolist())) and not np.all(np.isfinite(values)):
             bad = int(np.argmin(np.isfinite(values)))
-            joint = self._joints[bad if self._merger is None else self._some[bad]]
-            raise RecordingError(f"joint states where the {name} of '{joint}' is not a number")
+            raise RecordingError(
+                f"joint states where the {name} of '{self._joints[bad]}' is not a number"
+            )
         return values
