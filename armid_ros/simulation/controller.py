@@ -167,6 +167,8 @@ class ComputedTorque(Controller):
 
     """
 
+    feedback: LinearFeedback
+
     def __init__(self, arm: ArmModel, bandwidth: float = BANDWIDTH) -> None:
         self.arm = arm
         self.feedback = LinearFeedback.of(arm, bandwidth=bandwidth, follows=True)

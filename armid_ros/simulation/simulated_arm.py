@@ -325,8 +325,8 @@ class SimulatedArm:
 
     def read(self) -> Sample:
         """Return the sensor readings at present."""
-        truth = (values[np.newaxis] for values in self._past.latest(self._ahead))
-        q, dq, tau = (values[0] for values in self.sensors.measure(*truth, self.rng))
+        q, dq, tau = self._past.latest(self._ahead)
+        q, dq, tau = self.sensors.measure(q[np.newaxis], dq[np.newaxis], tau[np.newaxis], self.rng)
         link = None
         if self.plant.springs is not None:
             state = self._state
@@ -334,7 +334,7 @@ class SimulatedArm:
             at, speed, acceleration = self.read_links(links)
             commanded = self._targets.q[self._row], self._targets.dq[self._row]
             link = LinkSample(at[0], speed[0], acceleration[:, 0], *commanded)
-        return Sample(self.steps, self.t, q, dq, tau, link)
+        return Sample(self.steps, self.t, q[0], dq[0], tau[0], link)
 
     def read_links(self, links: Motion) -> tuple[FloatArray, FloatArray, FloatArray]:
         """
