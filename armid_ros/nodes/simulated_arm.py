@@ -10,14 +10,12 @@ from functools import partial
 from typing import Any
 
 from armid_ros.arm import ArmModel
-from armid_ros.arm.model_file import read_model
-from armid_ros.errors import ArmidError, ModelError, TrajectoryError
+from armid_ros.arm.model_file import load_model, read_model
+from armid_ros.errors import ArmidError, ModelError, RobotError, TrajectoryError
 from armid_ros.files import reading
 from armid_ros.nodes.base import ArmidNode
 from armid_ros.nodes.parameters.arm import (
     ARM_PARAMETERS,
-    described_arm,
-    make_arm,
     SENSOR_PARAMETERS,
     sensors_of,
     with_effects,
@@ -26,12 +24,16 @@ from armid_ros.nodes.parameters.table import NodeParameter
 from armid_ros.nodes.qos import LATCHED, SAMPLES, STREAM
 from armid_ros.nodes.running.process import run
 from armid_ros.nodes.running.real_time import RealTime
+from armid_ros.recording.columns import numbers
 from armid_ros.recording.elastic import imu_topic, LINK, REFERENCE
 from armid_ros.recording.trajectory import waypoints_of
+from armid_ros.robots import load_robot, parse_gravity
 from armid_ros.simulation import Reference, SimulatedArm
+from armid_ros.simulation.elastic import make_simulated_arm, shipped_arm
 from armid_ros.simulation.run import whole_steps
 from armid_ros.simulation.simulated_arm import LinkSample
 from builtin_interfaces.msg import Time as TimeMessage
+import numpy as np
 from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.qos_overriding_options import QoSOverridingOptions
@@ -145,10 +147,7 @@ class SimulatedArmNode(ArmidNode):
         """
         super().__init__('simulated_arm', **kwargs)
         self._without_effects: ArmModel | None = None
-        if arm is None:
-            self._without_effects, drives = described_arm(self.value)
-            arm = make_arm(self.value, self._without_effects, drives, self.get_logger().warn)
-        self._arm = arm
+        self._arm = self._described() if arm is None else arm
         self._dt_ns = round(self._arm.plant.dt * 1e9)
         self._stride = self._steps_at(self.value('rate'))  # refused before publishers are made
         self._follows = bool(self.value('use_sim_time'))
@@ -171,6 +170,31 @@ class SimulatedArmNode(ArmidNode):
         self.create_subscription(JointTrajectory, 'joint_trajectory', self._on_trajectory, STREAM)
         self.create_subscription(String, 'model', self._on_model, LATCHED)
         self.offer('~/reset', self.reset)
+
+    def _described(self) -> SimulatedArm:
+        """Make the arm that the parameters describe."""
+        gravity, drives = self.value('gravity'), None
+        if self.value('model'):
+            arm = load_model(self.value('model'))
+            if gravity:
+                arm = replace(arm, robot=arm.robot.with_gravity(parse_gravity(gravity)))
+        else:
+            arm, drives = shipped_arm(load_robot(self.value('robot'), gravity=gravity or 'earth'))
+        self._without_effects, n = arm, arm.robot.n_joints
+        with reading("parameter 'start'", RobotError):
+            start = numbers(self.value('start'))
+            if start and len(start) != n:
+                raise RobotError(f'it has {len(start)} numbers, but there are {n} joints')
+        return make_simulated_arm(
+            with_effects(arm, self.value('effects')),
+            rng=np.random.default_rng(self.value('seed')),
+            warn=self.get_logger().warn,
+            drives=drives,
+            gain=self.value('loop_gain'),
+            dt=self.value('time_step'),
+            sensors=sensors_of(self.value, arm.robot.joints),
+            start=start or None,
+        )
 
     def _steps_at(self, rate: float) -> int:
         """Return the number of plant steps between two samples."""
