@@ -16,7 +16,7 @@ import math
 import os
 from pathlib import Path
 import time
-from typing import Any, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 from armid_ros.arm import ArmModel
 from armid_ros.errors import ArmidError
@@ -43,7 +43,7 @@ MESSAGE_TIMEOUT = 20.0
 EPOCH_NS = 1_000 * 10**9
 
 
-class Progress:
+class Progress(NamedTuple):
     """
     Progress of a run.
 
@@ -56,19 +56,9 @@ class Progress:
 
     """
 
-    def __init__(self, duration: float, on_progress: OnProgress | None) -> None:
-        self._on_progress, self._due = on_progress, 1.0
-        self._begun = time.monotonic()
-        self.duration, self.t, self.real_time_factor = duration, 0.0, 0.0
-
-    def see(self, now_ns: int) -> None:
-        """Update the time of the clock [ns], and report every second."""
-        self.t = (now_ns - EPOCH_NS) * 1e-9
-        self.real_time_factor = self.t / max(time.monotonic() - self._begun, 1e-9)
-        if self.t >= self._due:
-            self._due += 1.0
-            if self._on_progress is not None:
-                self._on_progress(self)
+    t: float
+    duration: float
+    real_time_factor: float
 
 
 OnProgress = Callable[[Progress], None]
@@ -164,32 +154,32 @@ def run_lockstep(
         publisher.start()
         stage.spin_until(lambda: plant.moving or plant.complaints.counts, 'joint_trajectory')
         settling = 0.5  # settling time of the filters after the run [s]
-        run = Progress(publisher.duration + (begun - EPOCH_NS) * 1e-9 + settling, on_progress)
-        while run.t < run.duration:
-            run.see(step())
-        return run
+        duration = publisher.duration + (begun - EPOCH_NS) * 1e-9 + settling
+        return _stepped(step, duration, on_progress)
 
 
-class Stage:
+def _stepped(step: Callable[[], int], duration: float, on_progress: OnProgress | None) -> Progress:
+    """Step until the end of a run; report the progress every second of simulated time."""
+    begun, due, t = time.monotonic(), 1.0, 0.0
+    while t < duration:
+        t = (step() - EPOCH_NS) * 1e-9
+        progress = Progress(t, duration, t / (time.monotonic() - begun))
+        if on_progress is not None and t >= due:
+            due += 1.0
+            on_progress(progress)
+    return progress
+
+
+class Stage(ExitStack):
     """Nodes in one process with their executor, in the domain of ROS_DOMAIN_ID."""
 
     def __enter__(self) -> Stage:
         domain = os.environ.get('ROS_DOMAIN_ID')
-        self._nodes: list[ArmidNode] = []
-        with ExitStack() as stack:
-            self._context = stack.enter_context(private_context(int(domain) if domain else None))
-            stack.enter_context(steady())
-            self._executor = EventsExecutor(context=self._context)
-            stack.callback(self._executor.shutdown)
-            self._scope = stack.pop_all()
+        self._context = self.enter_context(private_context(int(domain) if domain else None))
+        self.enter_context(steady())
+        self._executor = EventsExecutor(context=self._context)
+        self.callback(self._executor.shutdown)
         return self
-
-    def __exit__(self, *error: Any) -> None:
-        for node in reversed(self._nodes):
-            node.close()
-            self._executor.remove_node(node)
-            node.destroy_node()
-        self._scope.close()
 
     def add(self, make: type[AnyNode], *core: Any, **parameters: Any) -> AnyNode:
         parameters = {'use_sim_time': True, **parameters}
@@ -200,9 +190,14 @@ class Stage:
             parameter_overrides=[Parameter(k, value=v) for k, v in parameters.items()],
         )
         node.get_logger().set_level(LoggingSeverity.WARN)
-        self._nodes.append(node)
         self._executor.add_node(node)
+        self.callback(self._remove, node)
         return node
+
+    def _remove(self, node: ArmidNode) -> None:
+        node.close()
+        self._executor.remove_node(node)
+        node.destroy_node()
 
     def spin_until(self, done: Callable[[], object], what: str) -> None:
         deadline = time.monotonic() + MESSAGE_TIMEOUT
