@@ -25,14 +25,11 @@ from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.task import Future
 from std_srvs.srv import Trigger
 
-#: Result document of each command, and the keys that are reported.
-_REPORTED = {
-    'identify': ('identification.json', ('grade',)),
-    'diagnose': ('diagnosis.json', ('verdict', 'summary')),
+#: Folder and document of the results of each command, their schema, and the reported keys.
+_RESULTS = {
+    'identify': ('identification', IDENTIFICATION, ('grade',)),
+    'diagnose': ('diagnosis', DIAGNOSIS, ('verdict', 'summary')),
 }
-
-#: Folders of results in `save_to`, and their schemas.
-_FOLDERS = {'identification': IDENTIFICATION, 'diagnosis': DIAGNOSIS}
 #: A program: its command and arguments.
 Program = tuple[str, ...]
 #: Name of the step, and a function that returns whether its condition is met.
@@ -107,7 +104,7 @@ class IdentificationRunNode(ArmidNode):
             self.value('robot'), effects=effects, gravity=self.value('gravity'), joints=joints
         )
         folder = self.folder('save_to')
-        for subfolder, schema in _FOLDERS.items():
+        for subfolder, schema, _ in _RESULTS.values():
             if (folder / subfolder).is_dir():
                 refuse_foreign(folder / subfolder, schema)
         self._start = start
@@ -204,10 +201,10 @@ class IdentificationRunNode(ArmidNode):
             yield from self._called('recorder', 'stop')
             self._begun.remove('recorder')
         folder = Path(self.value('save_to')).expanduser()
-        yield from self._ended('identify', folder / 'identification', bags)
+        yield from self._ended('identify', folder, bags)
         if self.value('diagnose'):
             model = ('--model', str(folder / 'identification' / 'model.yaml'))
-            yield from self._ended('diagnose', folder / 'diagnosis', bags, *model)
+            yield from self._ended('diagnose', folder, bags, *model)
 
     def _excited(self, service: str, what: str = 'rehearsal') -> Iterator[Wait]:
         """Start a run, with retries until the timeout, and wait until it ends."""
@@ -263,13 +260,14 @@ class IdentificationRunNode(ArmidNode):
             options['effects'] = ','.join(self.value('effects'))
         options['joints'] = ','.join(self.value('joints'))
         given = [part for key, text in options.items() if text for part in (f'--{key}', text)]
-        program = (command, *fitted, *validate, *given, *more, '--out', str(folder))
+        name, _, keys = _RESULTS[command]
+        out = folder / name
+        program = (command, *fitted, *validate, *given, *more, '--out', str(out))
         self._program = self._start(program)
         yield f'armid {command} is under way', lambda: self._program.poll() is not None
-        name, keys = _REPORTED[command]
-        document = {}
-        if (folder / name).is_file():
-            document = json.loads((folder / name).read_text(encoding='utf-8'))
+        document, file = {}, out / f'{name}.json'
+        if file.is_file():
+            document = json.loads(file.read_text(encoding='utf-8'))
         # bad_data is a valid verdict, not a failure
         if self._program.returncode and document.get('verdict') != 'bad_data':
             known = f'; until then: {"; ".join(self._results)}' if self._results else ''
@@ -278,7 +276,7 @@ class IdentificationRunNode(ArmidNode):
                 f'{", ".join(bags)}{known}'
             )
         result = ': '.join(str(document[key]).replace('_', ' ') for key in keys if key in document)
-        self._results.append(f'{command}: {result or "done"} ({folder / "report.html"})')
+        self._results.append(f'{command}: {result or "done"} ({out / "report.html"})')
 
     def _missing(self) -> list[str]:
         """Return the names of the nodes that are not available."""

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 import math
@@ -175,19 +175,20 @@ class LiveDiagnosisNode(ListeningNode):
 
     def accept(self) -> str:
         """Accept the proposed model."""
-        live = self._require()
-        named = _in_words(live)
-        live.accept()
-        self._publish_model()
-        return self.tell(f'accepted: {named}')
+        return self._decide('accepted', self._require().accept)
 
     def reject(self) -> str:
         """Reject the proposed effects, and do not propose them again."""
-        live = self._require()
-        named = _in_words(live)
-        live.reject()
+        return self._decide('rejected', self._require().reject)
+
+    def _decide(self, decision: str, action: Callable[[], None]) -> str:
+        named = '; '.join(
+            ' of '.join(filter(None, (name_in_words(name), ', '.join(joints))))
+            for name, joints in self._require().named
+        )
+        action()
         self._publish_model()
-        return self.tell(f'rejected: {named}')
+        return self.tell(f'{decision}: {named}')
 
     def reset(self) -> str:
         """Restart with the original model."""
@@ -409,13 +410,6 @@ def _gaps(answer: Answer) -> list[tuple[str, float, float, float]]:
         return []
     columns = (column.tolist() for column in (gap.before, gap.after, gap.floor))
     return list(zip(answer.arm.robot.joints, *columns, strict=True))
-
-
-def _in_words(live: LiveDiagnosis) -> str:
-    return '; '.join(
-        ' of '.join(filter(None, (name_in_words(name), ', '.join(joints))))
-        for name, joints in live.named
-    )
 
 
 main = partial(run, LiveDiagnosisNode)

@@ -34,7 +34,6 @@ from armid_ros.nodes.running.process import run
 from diagnostic_msgs.msg import DiagnosticStatus
 import numpy as np
 from rclpy.publisher import Publisher
-from rclpy.timer import Timer
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 import yaml
@@ -139,14 +138,8 @@ class OnlineIdentifierNode(ListeningNode):
         self.listen()
         self.offer('~/reset', self.reset)
         self.offer('~/save', self.save)
-        self._timer: Timer | None = None
-        self._restart_timer()
-
-    def _restart_timer(self) -> None:
-        # a new period of a timer takes effect only after the old one has passed
-        if self._timer is not None:
-            self.destroy_timer(self._timer)
-        self._timer = self.create_timer(1.0 / self.value('estimate_rate'), self.publish_estimate)
+        period = 1.0 / self.value('estimate_rate')
+        self._timer = self.create_timer(period, self.publish_estimate)
 
     def reset(self) -> str:
         """Delete the estimate and restart."""
@@ -273,7 +266,8 @@ class OnlineIdentifierNode(ListeningNode):
     def changed(self, names: frozenset[str]) -> None:
         """Apply changed settings."""
         if 'estimate_rate' in names:
-            self._restart_timer()
+            self._timer.timer_period_ns = round(1e9 / self.value('estimate_rate'))
+            self._timer.reset()  # otherwise the old period has to pass first
         if self.identifier is not None:
             self.identifier.use(self._settings({}))
 
