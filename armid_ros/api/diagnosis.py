@@ -189,7 +189,7 @@ class DiagnosisResult(ShownModel):
             everything=self.settings.everything,
             forward=self.forward,
             learned=None if learned is None else learned.section(),
-            gains={} if learned is None else learned.gains,
+            learned_joints=() if learned is None else [one.joint for one in learned.joints],
             origin=origin.of(source_of(self.description.robot)),
         )
 

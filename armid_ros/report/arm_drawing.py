@@ -10,7 +10,7 @@ beyond its centre of mass.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -53,23 +53,18 @@ class ArmDrawing(Templated):
         [px].
     bodies : tuple of (str, str)
         Outline of each body as coordinates of SVG, far ones first, and its colour.
-    paths : tuple of str
-        Path of the last body, for each pose.
     dots : tuple of (float, float, str, str)
         Position [px], colour and name of joints, or of the last body in each pose.
+    paths : tuple of str
+        Path of the last body, for each pose.
     captions : tuple of (float, str)
         Position [px] and text of each caption.
-    labels : tuple of (float, float, float, float, str)
-        Ends of a line from a joint to its name [px], and the name.
-    gravity : bool
-        Whether an arrow shows gravity.
     label : str
         Description of the drawing, for screen readers.
 
     """
 
     template: ClassVar[str] = 'arm_drawing.html'
-    short_names: ClassVar[bool] = True
 
     width: float
     height: float
@@ -77,8 +72,6 @@ class ArmDrawing(Templated):
     dots: tuple[tuple[float, float, str, str], ...]
     paths: tuple[str, ...] = ()
     captions: tuple[tuple[float, str], ...] = ()
-    labels: tuple[tuple[float, float, float, float, str], ...] = ()
-    gravity: bool = False
     label: str = 'Poses of the arm'
 
 
@@ -100,27 +93,31 @@ def draw_poses(
         Poses between which the last body moves.
 
     """
-    solids, model = _solids(collision), collision.robot.model
-    frames = [_frames(model, q) for q in map(collision.robot.positions, poses)]
+    robot, solids = collision.robot, _solids(collision)
     last = max(solids, key=lambda solid: solid.joint)
-    middle = last.points.mean(axis=0)
-    places = collision.robot.positions(path)
-    track = np.array([_flat(_frames(model, q)[last.joint].act(middle)) for q in places])
-    strip = Strip.of(solids, frames, (190.0, 230.0), track)
-    bodies = []
-    for solid, points in _outlines(solids, frames, strip):
-        share = round(100.0 * solid.joint / len(collision.robot.links))
-        colour = f'color-mix(in srgb, var(--residual) {share}%, var(--measured))'
-        bodies.append((points, colour if solid.of_arm else OBSTACLE))
-    tips = [_flat(frame[last.joint].act(middle)) for frame in frames]
+    frames, along = (
+        [_frames(robot.model, q) for q in robot.positions(some)] for some in (poses, path)
+    )
+    tips, track = (
+        np.array([_flat(frame[last.joint].act(last.points.mean(axis=0))) for frame in some])
+        for some in (frames, along)
+    )
+    strip = _Strip.of(solids, frames, (190.0, 230.0), track)
+
+    def colour(solid: _Solid) -> str:
+        share = round(100.0 * solid.joint / len(robot.links))
+        along_arm = f'color-mix(in srgb, var(--residual) {share}%, var(--measured))'
+        return along_arm if solid.of_arm else OBSTACLE
+
     return ArmDrawing(
-        *strip.size,
-        tuple(bodies),
+        round(strip.pitch * len(poses), 1),
+        round(strip.height + 30.0, 1),  # with a line of captions
+        strip.bodies(colour),
         tuple(
             (*strip.place(tip, k).tolist(), 'var(--predicted)', '') for k, tip in enumerate(tips)
         ),
         tuple(svg_points(strip.place(track, pose)) for pose in range(len(poses))),
-        strip.captions(captions),
+        tuple((round((k + 0.5) * strip.pitch, 1), text) for k, text in enumerate(captions)),
     )
 
 
@@ -135,46 +132,36 @@ def draw_arm(
     robot : Robot
         The arm.
     marked : sequence of str
-        Joints that are coloured, with their bodies, and named.
+        Joints that are coloured, with their bodies.
     q : ndarray, shape (N, n), optional
         Recorded poses [rad or m]; by default the middle of the range.
     label : str
         Description of the drawing, for screen readers.
 
     """
-    solids, model = _solids(collision_model(robot)), robot.model
     poses = [robot.positions(robot.middle_pose)]
     if q is not None and len(q):
         # candidate poses of a single drawing
         kept = np.linspace(0, len(q) - 1, min(12, len(q))).astype(np.intp)
         poses = list(robot.positions(q[kept]))
-    tried = [[_frames(model, pose)] for pose in poses]
-    seen = [np.array([_flat(one.translation) for one in frames]) for (frames,) in tried]
+    tried = [_frames(robot.model, pose) for pose in poses]
+    seen = [np.array([_flat(one.translation) for one in frames]) for frames in tried]
     frames = tried[int(np.argmax([np.prod(np.ptp(one, axis=0) + _MIN_SIZE) for one in seen]))]
-    strip = Strip.of(solids, frames, (300.0, 240.0))
-    bodies = []
-    for solid, points in _outlines(solids, frames, strip):
-        chosen = solid.joint > 0 and robot.moving[solid.joint - 1] in marked
-        bodies.append((points, 'var(--predicted)' if chosen else 'var(--faint)'))
-    dots = [
-        (*strip.place(_flat(frames[0][k].translation), 0).tolist(), name)
-        for k, name in enumerate(robot.moving, start=1)
-    ]
-    labels, y, line = [], 0.0, 16.0  # height of a line of text [px]
-    for x, top, name in sorted((dot for dot in dots if dot[2] in marked), key=lambda dot: dot[1]):
-        y = max(top, y + line)
-        labels.append((x, top, round(strip.pitch, 1), round(y, 1), name))
-    letters = max((len(name) for *_, name in labels), default=0)
+    strip = _Strip.of(_solids(collision_model(robot)), [frames], (300.0, 240.0))
+
+    def colour(joint: int, other: str) -> str:
+        chosen = joint > 0 and robot.moving[joint - 1] in marked
+        return 'var(--predicted)' if chosen else other
+
     return ArmDrawing(
-        round(strip.pitch + 9.5 * letters, 1),  # a letter is 9.5 px wide
-        round(max(strip.height, y + line), 1),
-        tuple(bodies),
+        round(strip.pitch, 1),
+        round(strip.height, 1),
+        strip.bodies(lambda solid: colour(solid.joint, 'var(--faint)')),
         tuple(
-            (x, top, 'var(--predicted)' if name in marked else 'var(--measured)', name)
-            for x, top, name in sorted(dots, key=lambda dot: dot[2] in marked)
+            (*strip.place(_flat(frames[k].translation), 0).tolist(), dot, name)
+            for k, name in enumerate(robot.moving, start=1)
+            for dot in [colour(k, 'var(--measured)')]
         ),
-        labels=tuple(labels),
-        gravity=bool(np.any(robot.gravity)),
         label=label,
     )
 
@@ -197,16 +184,6 @@ class _Solid:
         seen = seen[ConvexHull(seen).vertices] if len(seen) > _CIRCLE_CORNERS else seen
         cloud = (seen[:, np.newaxis] + ring).reshape(-1, 2)
         return cloud[ConvexHull(cloud).vertices], float((points @ _VIEW[2]).mean())
-
-
-def _outlines(
-    solids: Sequence[_Solid], frames: Sequence[list[pin.SE3]], strip: Strip
-) -> Iterator[tuple[_Solid, str]]:
-    """Yield each body with its projected outline, far bodies of each pose first."""
-    for pose, frame in enumerate(frames):
-        seen = [(solid, *solid.seen(frame[solid.joint])) for solid in solids]
-        for solid, hull, _ in sorted(seen, key=lambda one: one[2]):
-            yield solid, svg_points(strip.place(hull, pose))
 
 
 def _solids(collision: CollisionModel) -> list[_Solid]:
@@ -247,29 +224,16 @@ def _flat(points: FloatArray) -> FloatArray:
 
 
 @dataclass(frozen=True)
-class Strip:
-    """
-    Equal frames, one for each pose.
+class _Strip:
+    """Equal frames side by side, one for each pose, around all bodies in all poses."""
 
-    Attributes
-    ----------
-    left, top : float
-        Edges of every frame [m].
-    pitch, height : float
-        Size of a frame [px].
-    scale : float
-        [px/m].
-    count : int
-        Number of poses.
-
-    """
-
-    left: float
-    top: float
-    pitch: float
-    height: float
-    scale: float
-    count: int
+    solids: Sequence[_Solid]
+    frames: Sequence[list[pin.SE3]]
+    left: float  # [m]
+    top: float  # [m]
+    pitch: float  # width of a frame [px]
+    height: float  # [px]
+    scale: float  # [px/m]
 
     @classmethod
     def of(
@@ -278,21 +242,15 @@ class Strip:
         frames: Sequence[list[pin.SE3]],
         room: tuple[float, float],
         *others: FloatArray,
-    ) -> Strip:
-        """Return frames, at most as large as a room [px], that hold all bodies in all poses."""
+    ) -> _Strip:
+        """Return frames, each at most as large as a room [px]; `others` are in them as well."""
         hulls = [solid.seen(frame[solid.joint])[0] for frame in frames for solid in solids]
         points, margin = np.concatenate([*others, *hulls]), 0.03  # around a drawing [m]
         left, low = (points.min(axis=0) - margin).tolist()
         right, high = (points.max(axis=0) + margin).tolist()
         width, height = right - left, high - low
         scale = min(room[0] / width, room[1] / height)
-        return cls(left, high, width * scale, height * scale, scale, len(frames))
-
-    @property
-    def size(self) -> tuple[float, float]:
-        """Width and height with captions [px]."""
-        # height of the line of captions [px]
-        return round(self.pitch * self.count, 1), round(self.height + 30.0, 1)
+        return cls(solids, frames, left, high, width * scale, height * scale, scale)
 
     def place(self, points: FloatArray, pose: int) -> FloatArray:
         """Convert flat points, shape (..., 2) [m], to the frame of a pose [px]."""
@@ -300,9 +258,16 @@ class Strip:
         down = self.scale * (self.top - points[..., 1])
         return np.asarray(np.round(np.stack([right, down], axis=-1), 1))
 
-    def captions(self, texts: Sequence[str]) -> tuple[tuple[float, str], ...]:
-        """Return texts with the middle of their frames [px]."""
-        return tuple((round((k + 0.5) * self.pitch, 1), text) for k, text in enumerate(texts))
+    def bodies(self, colour: Callable[[_Solid], str]) -> tuple[tuple[str, str], ...]:
+        """Return the outline of each body and its colour, far bodies of each pose first."""
+        found = []
+        for pose, frame in enumerate(self.frames):
+            seen = [(solid, *solid.seen(frame[solid.joint])) for solid in self.solids]
+            found += [
+                (svg_points(self.place(hull, pose)), colour(solid))
+                for solid, hull, _ in sorted(seen, key=lambda one: one[2])
+            ]
+        return tuple(found)
 
 
 def svg_points(points: FloatArray) -> str:

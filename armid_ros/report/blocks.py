@@ -67,15 +67,12 @@ class TableCell:
         Class of the style sheet, such as 'telling', 'changed' or 'unknown'.
     note : str
         Small print below it.
-    shade : int
-        Strength of its background [%].
 
     """
 
     text: str
     kind: str = ''
     note: str = ''
-    shade: int = 0
 
 
 @dataclass(frozen=True)
@@ -143,7 +140,6 @@ class DataTable(Templated):
     """
 
     template: ClassVar[str] = 'table.html'
-    short_names: ClassVar[bool] = True
 
     heads: Sequence[str]
     rows: Sequence[Cells]
@@ -226,7 +222,6 @@ class Panels(Templated):
     """
 
     template: ClassVar[str] = 'panels.html'
-    short_names: ClassVar[bool] = True
 
     panels: Sequence[tuple[str, str, Sequence[Templated]]]
     three: bool = False
@@ -262,7 +257,6 @@ class SmallMultiples(Templated):
     """
 
     template: ClassVar[str] = 'small_multiples.html'
-    short_names: ClassVar[bool] = True
 
     figures: Sequence[tuple[str, str, Markup, str]]
 
@@ -305,7 +299,6 @@ class BarChart(Templated):
     """
 
     template: ClassVar[str] = 'bars.html'
-    short_names: ClassVar[bool] = True
 
     rows: Sequence[tuple[str, Sequence[Bar]]]
     roles: Sequence[tuple[Role, str]] = ()

@@ -86,7 +86,6 @@ class Chart(Templated):
     """
 
     template: ClassVar[str] = 'chart.html'
-    short_names: ClassVar[bool] = True
 
     x: FloatArray
     series: Sequence[Series]

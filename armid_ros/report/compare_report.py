@@ -76,8 +76,7 @@ def compare_report(comparison: Comparison, origin: ResultOrigin) -> str:
     robot = robot_label(comparison.after.robot)
     title = f'Comparison of two identifications of {robot}'
     subtitle = f'{comparison.before.source} · {comparison.after.source}'
-    joints = dict.fromkeys(one.parameter.joint for one in comparison.changes)
-    return Page(title, subtitle, sections, names=[*filter(None, joints)]).html()
+    return Page(title, subtitle, sections).html()
 
 
 def verdict(comparison: Comparison) -> tuple[str, str]:

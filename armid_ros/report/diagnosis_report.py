@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 import re
 from typing import ClassVar
 
@@ -30,13 +30,10 @@ from armid_ros.report.blocks import (
 from armid_ros.report.charts import Chart, joined, joined_time, Series, thinned
 from armid_ros.report.notation import (
     counted,
-    digits,
     percent,
     pretty,
     probability,
     robot_label,
-    short_names,
-    with_names,
 )
 from armid_ros.report.page import Page, Section
 from armid_ros.report.provenance import DEFAULT_ORIGIN, ResultOrigin
@@ -49,17 +46,13 @@ from armid_ros.report.sections.diagnosed import (
     gap_section,
     minor_section,
     named_section,
-    pattern_of,
     share_bars,
-    share_of,
 )
 from armid_ros.report.sections.fit import forward_section, ZOOM
 import numpy as np
 
 #: Colour of each verdict; the others are bad. A named change needs attention.
 _TONES = {'consistent': 'good', 'named': 'fair', 'ambiguous': 'fair', 'partial': 'fair'}
-#: Largest number of joints with a gap that are listed one by one.
-_MAX_LISTED_JOINTS = 2
 
 
 def tone_of(diagnosis: Diagnosis) -> str:
@@ -101,7 +94,7 @@ def diagnosis_report(
     everything: bool = False,
     forward: Sequence[ForwardValidation] = (),
     learned: Section | None = None,
-    gains: Mapping[str, float] | None = None,
+    learned_joints: Sequence[str] = (),
     origin: ResultOrigin = DEFAULT_ORIGIN,
 ) -> str:
     """
@@ -121,8 +114,8 @@ def diagnosis_report(
         Held-out recordings simulated with the given and with the patched model.
     learned : Section, optional
         Section on the learned residual.
-    gains : mapping of str to float, optional
-        Share of the residual that the learned map of each joint predicts.
+    learned_joints : sequence of str
+        Joints with a learned residual.
     origin : ResultOrigin
         Robot, files, versions, settings, seed.
 
@@ -134,14 +127,13 @@ def diagnosis_report(
     """
     arm = diagnosis.arm
     recordings = [(one, role) for role, several in read.items() for one in several]
-    names = short_names([one.source for one, _ in recordings])
     worse = tuple(dict.fromkeys(joint for pair in forward for joint in pair.worse))
-    sections: list[Section] = [_verdict(diagnosis, names, worse, ''.join(steps[:1]))]
+    sections: list[Section] = [_verdict(diagnosis, worse, ''.join(steps[:1]))]
     curves = whole_overlays(diagnosis, [one for one, _ in recordings])
     if curves is not None and diagnosis.gap is not None:
         sections += [
-            overlay_section(diagnosis, curves, names),
-            Story(diagnosis, gains or {}),
+            overlay_section(diagnosis, curves),
+            Story(diagnosis, learned_joints),
         ]
         if diagnosis.findings:
             sections += [
@@ -159,15 +151,10 @@ def diagnosis_report(
         sizes = detectable(diagnosis.explanation)
         sections += [candidates_section(diagnosis), detectable_section(sizes)]
     if forward:
-        sources = [names.get(pair.after.source, pair.after.source) for pair in forward]
-        pairs = [
-            replace(pair, after=replace(pair.after, source=source))
-            for pair, source in zip(forward, sources, strict=True)
-        ]
-        sections.append(forward_section(arm.robot, pairs, ('given model', 'patched model')))
+        labels = ('given model', 'patched model')
+        sections.append(forward_section(arm.robot, forward, labels))
     quality = [(one, role, ()) for one, role in recordings]
-    at_fault = _at_fault(diagnosis, read, names)
-    sections.append(data_quality_section(quality, at_fault=at_fault, names=names))
+    sections.append(data_quality_section(quality, at_fault=_at_fault(diagnosis, read)))
     sections.append(Origin(origin.provenance))
     used = [
         kind.format(counted(len(read[role]), noun))
@@ -175,43 +162,33 @@ def diagnosis_report(
         if read.get(role)
     ]
     subtitle = ' · '.join([robot_label(origin.robot), *used])
-    joints = (*arm.robot.joints, *arm.robot.links)
-    return Page(f'Diagnosis of {arm.robot.name}', subtitle, sections, names=joints).html()
+    return Page(f'Diagnosis of {arm.robot.name}', subtitle, sections).html()
 
 
-def _at_fault(
-    diagnosis: Diagnosis, read: Mapping[str, Sequence[Recording]], names: Mapping[str, str]
-) -> list[str]:
+def _at_fault(diagnosis: Diagnosis, read: Mapping[str, Sequence[Recording]]) -> list[str]:
     """Return the recordings that a BAD DATA verdict names, or all; [] for other verdicts."""
     if diagnosis.verdict != 'bad_data':
         return []
     sources = [one.source for several in read.values() for one in several if one.source]
     whole = r'(?<![\w/]){}(?![\w/])'
     named = [x for x in sources if re.search(whole.format(re.escape(x)), diagnosis.summary)]
-    found = named or [one.source for one in read['training']]
-    return [names.get(source, source) or 'in memory' for source in found]
+    return named or [one.source for one in read['training']]
 
 
-def _verdict(
-    diagnosis: Diagnosis, names: Mapping[str, str], worse: Sequence[str], step: str
-) -> VerdictSection:
-    notes = [
-        with_names(f'{note[0].upper()}{note[1:].rstrip(".")}.', names) for note in diagnosis.notes
-    ]
+def _verdict(diagnosis: Diagnosis, worse: Sequence[str], step: str) -> VerdictSection:
+    notes = [f'{note[0].upper()}{note[1:].rstrip(".")}.' for note in diagnosis.notes]
     if worse:
         notes.append(
             f'Driven by the recorded torques, the patched model has larger position errors than '
             f'before in {", ".join(worse)}; see Forward validation.'
         )
-    first, stop, more = pretty(with_names(diagnosis.summary, names)).partition('. ')
+    first, stop, more = pretty(diagnosis.summary).partition('. ')
     badge = {'named': 'cause named'}.get(diagnosis.verdict, diagnosis.verdict.replace('_', ' '))
     bars = None
     if diagnosis.gap is not None and diagnosis.verdict != 'bad_data':
         bars = share_bars(diagnosis) if diagnosis.findings else gap_bars(diagnosis, diagnosis.gap)
     sentences = [first + stop.rstrip(), *filter(None, [more])]
-    return VerdictSection(
-        badge, tone_of(diagnosis), sentences, notes, bars, with_names(step, names)
-    )
+    return VerdictSection(badge, tone_of(diagnosis), sentences, notes, bars, step)
 
 
 @dataclass(frozen=True)
@@ -223,8 +200,8 @@ class Story(Section):
     ----------
     diagnosis : Diagnosis
         The diagnosis.
-    gains : mapping of str to float
-        Share of the residual that the learned map of each joint predicts.
+    learned : sequence of str
+        Joints with a learned residual.
 
     """
 
@@ -232,7 +209,7 @@ class Story(Section):
     template: ClassVar[str] = 'story.html'
 
     diagnosis: Diagnosis
-    gains: Mapping[str, float] = field(default_factory=dict)
+    learned: Sequence[str] = ()
 
     @property
     def drawing(self) -> ArmDrawing:
@@ -254,78 +231,36 @@ class Story(Section):
     @property
     def rows(self) -> list[tuple[str, list[str]]]:
         """Questions and answers."""
-        spans = [
-            f'{one.source} from {one.start:.1f} to {one.stop:.1f} s'
-            for one in self.diagnosis.spans
-        ]
-        unexplained = [
-            f'{w.joint}: {w.signature}' for w in self.diagnosis.left[:_MAX_LISTED_JOINTS]
-        ]
+        diagnosis, patched = self.diagnosis, not self.diagnosis.harmful
+        meaning = {effect.name: effect.summary for effect in diagnosis.arm.effects}
+        names = list(dict.fromkeys(one.name for one in diagnosis.findings if patched))
+        added = [name_in_words(name) for name in names]
+        if self.learned:
+            added.append(f'the learned residual of {", ".join(self.learned)}')
+        more = ', with rigid body and friction refitted' * (diagnosis.refitted and patched)
+        patch = f'model.yaml is the model with {" and ".join(added)}{more}.'
+        unexplained = [f'{w.joint}: {w.signature}' for w in diagnosis.left[:2]]
         answers = [
-            ('When', spans),
-            ('Where', self._where()),
-            ('Patch', self._patch()),
-            ('Error', self._errors()),
-            ('Unexplained', unexplained if self.diagnosis.findings else []),
+            (
+                'When',
+                [
+                    f'{one.source} from {one.start:.1f} to {one.stop:.1f} s'
+                    for one in diagnosis.spans
+                ],
+            ),
+            ('Patch', [patch if added else 'The model is unchanged.']),
+            *(
+                (words[:1].upper() + words[1:], [f'{meaning[name]}.'])
+                for name, words in zip(names, added, strict=False)
+                if name in meaning
+            ),
+            ('Unexplained', unexplained if diagnosis.findings else []),
+            ('Not checked', list(diagnosis.not_checked)),
         ]
         return [(question, answer) for question, answer in answers if answer]
 
-    def _where(self) -> list[str]:
-        places, whole = self.diagnosis.where, share_of(self.diagnosis)
-        lines = [
-            f'{place.joint}: {percent(place.share_of_gap)} of {whole}, '
-            f'{pattern_of(self.diagnosis, place)}'
-            for place in places[:_MAX_LISTED_JOINTS]
-        ]
-        if len(places) > _MAX_LISTED_JOINTS:
-            rest = sum(place.share_of_gap for place in places[_MAX_LISTED_JOINTS:])
-            others = ', '.join(place.joint for place in places[_MAX_LISTED_JOINTS:])
-            lines.append(f'{others}: {percent(rest)}')
-        if not lines and self.diagnosis.verdict != 'consistent':
-            return ['No joint is far above its usual error.']
-        unseen = self.diagnosis.not_checked
-        none = f'No joint{" that was checked" * bool(unseen)} exceeds its usual error.'
-        return [*(lines or [none]), *([f'Not checked: {", ".join(unseen)}.'] if unseen else [])]
 
-    def _patch(self) -> list[str]:
-        diagnosis = self.diagnosis
-        patched = not diagnosis.harmful
-        meaning = {effect.name: effect.summary for effect in diagnosis.arm.effects}
-        names = dict.fromkeys(one.name for one in diagnosis.findings if patched)
-        added = [name_in_words(name) for name in names]
-        explained = [
-            f'{words[0].upper()}{words[1:]}: {meaning[name]}.'
-            for name, words in zip(names, added, strict=True)
-            if name in meaning
-        ]
-        if self.gains:
-            added.append(f'the learned residual of {", ".join(self.gains)}')
-        if not added:
-            return ['The model is unchanged.']
-        more = ', with rigid body and friction refitted' * (diagnosis.refitted and patched)
-        return [f'model.yaml is the model with {" and ".join(added)}{more}.', *explained]
-
-    def _errors(self) -> list[str]:
-        gap, robot = self.diagnosis.gap, self.diagnosis.arm.robot
-        assert gap is not None
-        j = int(np.argmax(gap.chi2_before))
-        before, after, floor = (
-            f'{digits(float(x[j]))} {robot.torque_units[j]}'
-            for x in (gap.before, gap.after, gap.floor)
-        )
-        where = 'on recordings not used for the fit' if gap.predicted else f'on {gap.data}'
-        change = f'{before} before, {after} after' if self.diagnosis.findings else after
-        return [
-            f'{robot.joints[j]}: {change}, {where}.',
-            f'Usual error: {floor} ({self.diagnosis.baseline}).',
-            *(
-                f'{joint}: the map predicts {percent(gain)} of the residual without a known cause.'
-                for joint, gain in self.gains.items()
-            ),
-        ]
-
-
-def overlay_section(diagnosis: Diagnosis, gap: Gap, names: Mapping[str, str]) -> ContentSection:
+def overlay_section(diagnosis: Diagnosis, gap: Gap) -> ContentSection:
     """
     Return measured and modelled torque, in the joint and recording where the gap was largest.
 
@@ -335,8 +270,6 @@ def overlay_section(diagnosis: Diagnosis, gap: Gap, names: Mapping[str, str]) ->
         The diagnosis, with the seconds in which the causes act.
     gap : Gap
         The curves.
-    names : mapping of str to str
-        Names of the recordings.
 
     """
     robot, patched = diagnosis.arm.robot, bool(diagnosis.findings)
@@ -347,7 +280,6 @@ def overlay_section(diagnosis: Diagnosis, gap: Gap, names: Mapping[str, str]) ->
         return float(np.mean(residual**2))
 
     shown = max(gap.overlays, key=size)
-    source = names.get(shown.source, shown.source) or 'the recording'
     t, measured, before, after = _of_recording(gap, shown, j)
     unit = robot.torque_units[j]
     acting = [one for one in diagnosis.spans if one.source == shown.source and not one.whole]
@@ -366,7 +298,7 @@ def overlay_section(diagnosis: Diagnosis, gap: Gap, names: Mapping[str, str]) ->
     return ContentSection(
         'Measured and modelled',
         [
-            Paragraph(f'Joint {robot.joints[j]} in recording {source}: the largest error.'),
+            Paragraph(f'Joint {robot.joints[j]} in recording {shown.source}: the largest error.'),
             Chart(
                 t[kept],
                 [Series('measured', measured[kept], 'measured'), *models(before, after)],

@@ -9,13 +9,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from armid_ros.arm import ArmModel
-from armid_ros.estimate import Estimate
 from armid_ros.identification import Fit, Grade, Identification, PhysicalCertificate, Verification
 from armid_ros.identification import grade as graded
-from armid_ros.identification.fitting.identifiability import HALF_WIDTH
 from armid_ros.identification.fitting.instruments import NoiseCheck
 from armid_ros.identification.fitting.least_squares import IN_WORDS
-from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording
 from armid_ros.report.blocks import (
     BulletList,
@@ -25,12 +22,10 @@ from armid_ros.report.blocks import (
     Fold,
     next_steps_section,
     Origin,
-    Panels,
     Paragraph,
     TableCell,
     VerdictSection,
 )
-from armid_ros.report.charts import Chart, Series
 from armid_ros.report.judgement import judge
 from armid_ros.report.notation import counted, digits, plain, pretty, robot_label
 from armid_ros.report.page import Page, Section
@@ -64,18 +59,12 @@ class Assessment:
         Grade; computed if it is None.
     exports : mapping of str to sequence of str
         Exported files, and the values that each cannot contain.
-    reference : str
-        Reference of the parameters: the 'description', or in a simulation the 'truth'.
-    sections : sequence of Section
-        Further sections, shown before the next steps.
 
     """
 
     verification: Verification | None = None
     grade: Grade | None = None
     exports: Mapping[str, Sequence[str]] = field(default_factory=dict)
-    reference: str = 'description'
-    sections: Sequence[Section] = ()
 
 
 def identification_report(
@@ -124,7 +113,6 @@ def identification_report(
         grade = graded(result, description, recordings, validation, validation_recordings)
     every = [*recordings, *validation_recordings]
     judgement = judge(result, validation, every, verification, grade.word == 'unusable')
-    urdf = assessment.reference == 'description'
     read = [
         *((one, 'training', training.get(one.source, ())) for one in recordings),
         *((one, 'held-out', validation.get(one.source, ())) for one in validation_recordings),
@@ -134,7 +122,7 @@ def identification_report(
         VerdictSection(
             grade.word,
             TONES[grade.word],
-            (*grade.reasons, *_contradictions(result, description) * urdf, *judgement.sentences),
+            (*grade.reasons, *_contradictions(result, description), *judgement.sentences),
             judgement.beware,
             error_bars(described, training, validation, result.halves),
             ''.join(judgement.next_steps[:1]),
@@ -149,12 +137,10 @@ def identification_report(
             result.base.values(description.theta),
             result.unidentified,
             described.links,
-            assessment.reference,
         ),
         *([_physical_section(result.physical, assessment.exports)] if result.physical else []),
         whiteness_section(described, shown, role),
         *([] if noise is None else [_noise_section(described, noise)]),
-        *assessment.sections,
         data_quality_section(read, described),
         _input_section(result, origin.robot, list(training), list(validation)),
         Origin(origin.provenance),
@@ -162,8 +148,7 @@ def identification_report(
     subtitle = f'{robot_label(origin.robot)} · {counted(len(training), "training recording")}'
     if validation:
         subtitle += f' · {counted(len(validation), "recording")} not used for the fit'
-    names = (*described.joints, *described.links)
-    return Page(f'Identification of {described.name}', subtitle, sections, names=names).html()
+    return Page(f'Identification of {described.name}', subtitle, sections).html()
 
 
 def _contradictions(result: Identification, description: ArmModel) -> list[str]:
@@ -296,56 +281,3 @@ def _physical_section(
             *homeless,
         ],
     )
-
-
-def convergence_section(
-    history: Sequence[tuple[float, Estimate]], truth: FloatArray
-) -> ContentSection:
-    """
-    Return online estimates over time with their 95 % intervals and the true values.
-
-    Parameters
-    ----------
-    history : sequence of (float, Estimate)
-        Times since the start [s], and estimates of P parameters.
-    truth : ndarray, shape (P,)
-        True values.
-
-    """
-    t, parameters = np.array([at for at, _ in history]), history[-1][1].parameters
-    values = np.array([estimate.values for _, estimate in history])
-    std = np.array([estimate.std for _, estimate in history])
-    certainty = np.abs(truth) / np.maximum(std[-1], 1e-300)
-    ranked = sorted(range(len(parameters)), key=lambda k: -certainty[k])
-    units = dict.fromkeys(one.unit for one in parameters)
-    kinds = [[k for k in ranked if parameters[k].unit == unit] for unit in units]
-    longest = max(map(len, kinds))
-    turns = [kind[turn] for turn in range(longest) for kind in kinds if turn < len(kind)]
-    panels = []
-    for k in sorted(turns[:6]):
-        reach = HALF_WIDTH * std[:, k]
-        known = np.isfinite(reach) & (reach < 3.0 * (abs(truth[k]) + reach[-1]))
-        lower, upper, drawn = (
-            np.where(known, x, np.nan)
-            for x in (values[:, k] - reach, values[:, k] + reach, values[:, k])
-        )
-        chart = Chart(
-            t,
-            [
-                Series('95 % interval', lower, 'floor', 'band', upper),
-                Series('online estimate', drawn, 'residual'),
-            ],
-            'time [s]',
-            f'estimate [{pretty(parameters[k].unit)}]',
-            height=170,
-            link='convergence',
-            levels=[(float(truth[k]), 'truth')],
-            legend=False,
-        )
-        panels.append((full_label(parameters[k]), '', [chart]))
-    text = (
-        'Six parameters over time, the best-determined one of each unit first. The band is the '
-        '95 % interval of the online estimate; the line is the true value.'
-    )
-    title = 'Convergence of the online estimate'
-    return ContentSection(title, [Paragraph(text), Panels(panels, three=True)])

@@ -81,7 +81,7 @@ def inspection_report(found: Inspection, origin: ResultOrigin = DEFAULT_ORIGIN) 
             None, (Path(origin.robot).name, recording.topic, counted(recording.n_joints, 'joint'))
         )
     )
-    return Page(f'Inspection of {name}', subtitle, sections, names=recording.joints).html()
+    return Page(f'Inspection of {name}', subtitle, sections).html()
 
 
 def inspection_word(found: Inspection) -> str:
@@ -192,9 +192,8 @@ def description_check_report(
         table = DataTable(HEADS, link_rows(links), kind='tight')
         sections.append(ContentSection('Links', [table, Paragraph(hint, 'hint')]))
     sections.append(Origin(origin.provenance))
-    names = () if links is None else (*links.joints, *links.links)
     title = f'Check of {robot_label(origin.robot)}'
-    return Page(title, '', sections, charts=False, names=names).html()
+    return Page(title, '', sections, charts=False).html()
 
 
 def recording_facts(found: Inspection) -> list[tuple[str, str]]:

@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
 import math
 from pathlib import PurePath
 import re
@@ -103,70 +102,6 @@ def robot_label(source: str) -> str:
     return PurePath(path).name or path
 
 
-def short_names(sources: Sequence[str]) -> dict[str, str]:
-    """
-    Return the shortest unique end of each path.
-
-    Parameters
-    ----------
-    sources : sequence of str
-        Paths, or any other names.
-
-    """
-    every = list(dict.fromkeys(source for source in sources if source))
-    parts = {source: PurePath(source).parts for source in every}
-    names = {}
-    for source in every:
-        own = parts[source]
-        for count in range(1, len(own) + 1):
-            end = own[-count:]
-            if sum(other[-count:] == end for other in parts.values()) == 1:
-                break
-        names[source] = '/'.join(part.strip('/') for part in own[-count:])
-    return names
-
-
-def common_prefix(names: Sequence[str]) -> str:
-    """
-    Return the common prefix of all joints and links if it is long, such as 'panda_'.
-
-    Parameters
-    ----------
-    names : sequence of str
-        Joints and links.
-
-    Returns
-    -------
-    str
-        Five letters or more and a separator, after which each name goes on with a letter; or ''.
-
-    """
-    first = names[0] if len(names) > 1 else ''
-    ends = [first[: found.end()] for found in re.finditer(r'[_/.:-]', first)]
-    # shortest prefix that is omitted from names [letters]
-    rests = {end: [name.removeprefix(end) for name in names] for end in ends if len(end) > 5}
-    shared = [end for end in rests if all(name.startswith(end) for name in names)]
-    return max((end for end in shared if all(r[:1].isalpha() for r in rests[end])), default='')
-
-
-def without_prefix(text: str, names: Sequence[str]) -> str:
-    """Remove the common prefix from the names in a label."""
-    prefix = common_prefix(names)
-    if not prefix:
-        return text
-    rests = '|'.join(re.escape(name.removeprefix(prefix)) for name in names)
-    return re.sub(rf'(?<![\w/.-]){re.escape(prefix)}(?=(?:{rests})(?!\w))', '', text)
-
-
-def many_counted(text: str, names: Sequence[str]) -> str:
-    """Replace four or more names in a row by their number: '7 joints'."""
-    if not names:
-        return text
-    one = f'(?:{"|".join(map(re.escape, names))})(?!\\w)'
-    run = rf'(?<![\w/.-]){one}(?:, {one}){{3,}}'
-    return re.sub(run, lambda found: f'{found[0].count(",") + 1} joints', text)
-
-
 def explained(text: str) -> Markup:
     """Return HTML in which the first use of each of the `TERMS` has a tooltip."""
     html = str(escape(text))
@@ -174,10 +109,3 @@ def explained(text: str) -> Markup:
         words = rf'(?<!>)\b({term.replace(" ", "[ -]")})\b'
         html = re.sub(words, rf'<abbr title="{meaning}">\1</abbr>', html, count=1, flags=re.I)
     return Markup(html)
-
-
-def with_names(text: str, names: Mapping[str, str]) -> str:
-    """Replace sources by names, longest first."""
-    for source in sorted(names, key=len, reverse=True):
-        text = text.replace(source, names[source])
-    return text

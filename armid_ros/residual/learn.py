@@ -120,11 +120,6 @@ class Residual:
             )
         return tuple(lines)
 
-    @property
-    def gains(self) -> dict[str, float]:
-        """Share of the squared residual that the map of each joint predicts in held-out data."""
-        return {one.joint: one.gain for one in self.joints}
-
     def steps(self) -> list[str]:
         """Return the next step for each joint."""
         return [

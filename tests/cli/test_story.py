@@ -3,7 +3,7 @@
 """What the demo hides in the arm shows in the torque, is possible, and is revealed in the end."""
 
 from armid_ros.api.diagnosis import diagnose
-from armid_ros.cli.demo.steps import hidden_change, HiddenChange, ROBOT, show_hidden, true_arm
+from armid_ros.cli.demo.steps import hidden_change, outcome, ROBOT, story, true_arm
 from armid_ros.effects import parse_effect
 from armid_ros.errors import ModelError
 from armid_ros.excitation import ClearanceModel, Limits, random_feasible
@@ -25,30 +25,31 @@ def test_every_change_shows_in_the_torque_and_is_possible(robot):
     drawn = random_feasible(arm, Limits.of(robot), 8.0, 5, rng, clearance=bodies)
     motion = drawn.one_period(400)
     whole = arm.torque(motion)
-    every = {str(one.effect): one for one in (hidden_change(robot, rng) for _ in range(100))}
+    drawn = (hidden_change(arm, rng) for _ in range(100))
+    every = {str(one.effects[-1]): one for one in drawn}
     assert len(every) > 10
-    for hidden in every.values():
-        lower, upper = hidden.effect.bounds()
-        assert np.all((hidden.values >= lower) & (hidden.values <= upper))
-        difference = arm.with_effect(hidden.effect, hidden.values).torque(motion) - whole
+    for effect, changed in every.items():
+        lower, upper = changed.effects[-1].bounds()
+        assert np.all((changed.values[-1] >= lower) & (changed.values[-1] <= upper))
+        difference = changed.torque(motion) - whole
         share = np.sqrt(np.mean(difference**2, axis=0) / np.mean(whole**2, axis=0))
-        assert 0.1 < share.max() < 1.0, hidden.effect
+        assert 0.1 < share.max() < 1.0, effect
 
 
 def test_what_is_asked_for_is_hidden(robot):
-    rng = np.random.default_rng(0)
-    joints = {hidden_change(robot, rng, 'viscous_friction').effect.joints for _ in range(20)}
-    assert joints == {('upper_arm_yaw',), ('elbow_pitch',)}
+    arm, rng = true_arm(robot), np.random.default_rng(0)
+    drawn = (hidden_change(arm, rng, 'viscous_friction') for _ in range(20))
+    assert {one.effects[-1].joints for one in drawn} == {('upper_arm_yaw',), ('elbow_pitch',)}
     asked = 'stribeck_friction@wrist_pitch:stribeck_torque=0.1'
-    assert hidden_change(robot, rng, asked).values.tolist() == [0.1]
+    assert hidden_change(arm, rng, asked).values[-1].tolist() == [0.1]
     with pytest.raises(ModelError, match='stribeck_friction@elbow_pitch'):
-        hidden_change(robot, rng, 'torque_gain@wrist')
+        hidden_change(arm, rng, 'torque_gain@wrist')
 
 
-def test_it_is_revealed_in_the_end(capsys):
+def test_it_is_revealed_in_the_end():
     bench = Bench()
-    hidden = HiddenChange(*parse_effect('joint_spring@elbow:spring_stiffness=2', bench.robot))
-    changed = bench.arm.with_effect(hidden.effect, hidden.values)
+    spring_at_elbow = parse_effect('joint_spring@elbow:spring_stiffness=2', bench.robot)
+    changed = bench.arm.with_effect(*spring_at_elbow)
 
     def spring(motion, _):
         return changed.torque(motion) - bench.arm.torque(motion)
@@ -61,8 +62,8 @@ def test_it_is_revealed_in_the_end(capsys):
         baseline=bench.recordings(seed=3),
         rng=0,
     )
-    show_hidden(hidden, found)
-    lines = capsys.readouterr().out.splitlines()
-    assert 'spring' in lines[-1] and 'elbow' in lines[-1] and 'found' in lines[-1]
-    gap = hidden.document(found)['gap']
+    assert 'joint spring in elbow' in outcome(changed, found)
+    told = story(changed, found)
+    assert told['found']
+    gap = told['gap']
     assert gap['after']['elbow'] < 0.2 * gap['before']['elbow']

@@ -6,18 +6,11 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, TYPE_CHECKING
+from typing import Any
 
 from armid_ros.cli import parameters
 from armid_ros.cli.terminal import progress, say
 import click
-
-if TYPE_CHECKING:
-    from armid_ros.api.identification import IdentificationResult
-    from armid_ros.arm import ArmModel
-    from armid_ros.estimate import Estimate
-    from armid_ros.motion import FloatArray
-    from armid_ros.nodes.lockstep import Progress
 
 #: Files of an earlier demo, which the output folder may contain.
 OUTPUTS = ('bag', 'excitation.yaml', 'model.yaml', 'identification.json', 'report.html', 'story')
@@ -45,16 +38,18 @@ OUTPUTS = ('bag', 'excitation.yaml', 'model.yaml', 'identification.json', 'repor
 def demo(gravity: str, rate: float, hide: str, out: Path, seed: int, as_json: bool) -> None:
     """Excite, move, identify online and offline; then find a hidden change of the arm."""
     from armid_ros.api.identification import IdentificationResult, identify
-    from armid_ros.arm import ArmModel, save_model
+    from armid_ros.arm import ArmModel
     from armid_ros.cli import options
     from armid_ros.cli.demo import steps
     from armid_ros.excitation import design, DesignSettings, save_excitation
-    from armid_ros.files import json_text, settled, write_file
+    from armid_ros.files import json_text, settled
     from armid_ros.identification import write_document
     from armid_ros.identification.assess.agreement import Agreement
     from armid_ros.identification.online.identifier import OnlineIdentifier
     from armid_ros.nodes.lockstep import run_lockstep
     from armid_ros.recording import read_recording
+    from armid_ros.report.notation import pretty
+    from armid_ros.report.provenance import ResultOrigin
     from armid_ros.robots import collision_model, load_robot
     from armid_ros.simulation import SimulatedArm
     import numpy as np
@@ -63,7 +58,7 @@ def demo(gravity: str, rate: float, hide: str, out: Path, seed: int, as_json: bo
     robot = load_robot(steps.ROBOT, gravity=gravity)
     truth = steps.true_arm(robot)
     nominal = ArmModel(robot, truth.effects)
-    hidden = steps.hidden_change(robot, np.random.default_rng([seed, 1]), hide)
+    changed = steps.hidden_change(truth, np.random.default_rng([seed, 1]), hide)
     staged = options.stage(out, IdentificationResult.schema, steps.ROBOT, [*OUTPUTS, '*.png'])
     new, bag = staged.folder, staged.folder / 'bag'
     settings = DesignSettings(period=10.0, harmonics=5, starts=2, candidates=20, iterations=40)
@@ -78,34 +73,31 @@ def demo(gravity: str, rate: float, hide: str, out: Path, seed: int, as_json: bo
         save_excitation(excitation, new / 'excitation.yaml')
         tick(0.0, 'moving, and identifying online')
         identifier = OnlineIdentifier(nominal, rng=np.random.default_rng(seed))
-        target = identifier.base.values(truth.theta)
         plant = SimulatedArm(truth, rng=rng, sensors=steps.SENSORS)
-        history: list[tuple[float, Estimate]] = []
-
-        def watch(now: Progress) -> None:
-            history.append((now.t, identifier.estimate()))
-            tick(now.t / now.duration)
-
-        end = run_lockstep(plant, excitation, bag, identifier, rate=rate, on_progress=watch)
+        end = run_lockstep(
+            plant,
+            excitation,
+            bag,
+            identifier,
+            rate=rate,
+            on_progress=lambda now: tick(now.t / now.duration),
+        )
         tick(0.0, 'identifying offline')
         recording = replace(read_recording(bag, joints=robot.joints), source=str(settled(bag)))
         found = identify(nominal, recording, physical=False, rng=rng, progress=tick)
     offline = Agreement.of(found.estimate, found.core.base.values(truth.theta))
-    online = Agreement.of(identifier.estimate(), target)
+    online = Agreement.of(identifier.estimate(), identifier.base.values(truth.theta))
+    found.fill(new, ResultOrigin(steps.ROBOT, steps.ROBOT))
+    rng = np.random.default_rng([seed, 1])
+    diagnosed = steps.diagnose_hidden(new / 'story', changed, found.arm, recording, rng, rate)
     document: dict[str, Any] = {
         **found.document(),
         'robot': steps.ROBOT,
         'truth': offline.document(),
         'online': online.document(),
         'real_time_factor': end.real_time_factor,
+        'story': steps.story(changed, diagnosed),
     }
-    save_model(new / 'model.yaml', found.arm, steps.ROBOT, found.estimate)
-    write_file(new / 'report.html', _page(found, truth, history, target))
-    rng = np.random.default_rng([seed, 1])
-    diagnosed = steps.diagnose_hidden(
-        new / 'story', hidden, truth, found.arm, recording, rng, rate
-    )
-    document['story'] = hidden.document(diagnosed)
     write_document(new / 'identification.json', document)
     staged.keep()
     if as_json:
@@ -114,30 +106,7 @@ def demo(gravity: str, rate: float, hide: str, out: Path, seed: int, as_json: bo
     say(f'{found.grade.upper()}: {found.graded.reasons[0]}')
     say(f'online:  {online.sentence()}')
     say(f'offline: {offline.sentence()}')
-    steps.show_hidden(hidden, diagnosed)
+    say('Then a change was hidden in the arm, and three runs were recorded. Diagnosis of two:')
+    say(pretty(f'{diagnosed.verdict.replace("_", " ").upper()}: {diagnosed.core.summary}'))
+    say(steps.outcome(changed, diagnosed))
     say(f'Open {out / "report.html"} (model) and {out / "story" / "report.html"} (diagnosis).')
-
-
-def _page(
-    found: IdentificationResult,
-    truth: ArmModel,
-    history: list[tuple[float, Estimate]],
-    target: FloatArray,
-) -> str:
-    """Return report.html with true values and the convergence of the online estimate."""
-    from armid_ros.report.identification_report import (
-        Assessment,
-        convergence_section,
-        identification_report,
-    )
-    from armid_ros.report.provenance import ResultOrigin
-
-    convergence = convergence_section(history, target)
-    return identification_report(
-        found.core,
-        description=truth,
-        origin=ResultOrigin(truth.robot.name),
-        recordings=found.recordings,
-        validation={},
-        assessment=Assessment(grade=found.graded, reference='truth', sections=[convergence]),
-    )

@@ -4,18 +4,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from armid_ros.api.diagnosis import diagnose, DiagnosisResult
 from armid_ros.arm import ArmModel
-from armid_ros.cli.terminal import progress, say
+from armid_ros.cli.terminal import progress
 from armid_ros.effects import Effect, make_effect, parse_effect
 from armid_ros.errors import ModelError
 from armid_ros.excitation import ClearanceModel, Excitation, Limits, random_feasible
 from armid_ros.files import load_yaml, read_text, settled
-from armid_ros.motion import FloatArray
 from armid_ros.nodes.lockstep import run_lockstep
 from armid_ros.recording import read_recording, Recording
 from armid_ros.report.notation import digits, pretty
@@ -29,7 +28,6 @@ ROBOT = 'humanoid_arm'
 SENSORS = Sensors(
     torque_noise=np.array([0.02, 0.02, 0.01, 0.01, 0.004, 0.004]), resolution=2.0 * np.pi / 2**18
 )
-_RUNS = ('after_1', 'after_2', 'held_out')
 
 
 def _facts() -> dict[str, Any]:
@@ -50,14 +48,14 @@ def true_arm(robot: Robot) -> ArmModel:
     return arm
 
 
-def hidden_change(robot: Robot, rng: np.random.Generator, hide: str = '') -> HiddenChange:
+def hidden_change(arm: ArmModel, rng: np.random.Generator, hide: str = '') -> ArmModel:
     """
-    Return the hidden effect.
+    Return an arm with a further effect, its last one, that a diagnosis has to find.
 
     Parameters
     ----------
-    robot : Robot
-        The shipped arm.
+    arm : ArmModel
+        The arm without it.
     rng : numpy.random.Generator
         Draws one of the changes that are shipped.
     hide : str
@@ -71,70 +69,18 @@ def hidden_change(robot: Robot, rng: np.random.Generator, hide: str = '') -> Hid
 
     """
     if ':' in hide:
-        return HiddenChange(*parse_effect(hide, robot))
+        return arm.with_effect(*parse_effect(hide, arm.robot))
     known = [''.join(text.split()) for text in _facts()['hidden']]
     fitting = [text for text in known if text.startswith(hide)]
     if not fitting:
         names = ', '.join(text.partition(':')[0] for text in known)
         raise ModelError(f'--hide {hide}: give an effect as E@joint:k=v, or one of {names}')
-    return HiddenChange(*parse_effect(str(rng.choice(fitting)), robot))
-
-
-@dataclass(frozen=True)
-class HiddenChange:
-    """
-    Effect of the arm that its model lacks.
-
-    Attributes
-    ----------
-    effect : Effect
-        The effect, with its joint.
-    values : ndarray, shape (P,)
-        Its parameters.
-
-    """
-
-    effect: Effect
-    values: FloatArray
-
-    def found_by(self, diagnosed: DiagnosisResult) -> bool:
-        """Return whether the first finding is the hidden effect, on the same joints."""
-        first = diagnosed.core.findings[:1]
-        named = self.effect.name, self.effect.joints
-        return any((one.name, one.joints) == named for one in first)
-
-    def outcome(self, diagnosed: DiagnosisResult) -> str:
-        """Return a sentence on the hidden change, and whether it was found."""
-        parameters = self.effect.parameters(diagnosed.arm.robot)
-        shown = [
-            f'{name.name.replace("_", " ")} {digits(float(value), 3)} {pretty(name.unit)}'.rstrip()
-            for name, value in zip(parameters, self.values, strict=True)
-            if value
-        ]
-        where = ', '.join(self.effect.joints) or 'the whole arm'
-        hidden = f'{self.effect.name.replace("_", " ")} in {where} ({", ".join(shown[:4])})'
-        rank = 'found it' if self.found_by(diagnosed) else 'did not rank it first'
-        return f'Hidden effect: {hidden}. The diagnosis {rank}.'
-
-    def document(self, diagnosed: DiagnosisResult) -> dict[str, Any]:
-        """Return the hidden effect, the verdict and whether it was found, for JSON."""
-        return {
-            'hidden': {
-                'name': self.effect.name,
-                'joints': list(self.effect.joints),
-                'values': self.values.tolist(),
-            },
-            'verdict': diagnosed.verdict,
-            'summary': diagnosed.core.summary,
-            'found': self.found_by(diagnosed),
-            'gap': diagnosed.document()['gap'],
-        }
+    return arm.with_effect(*parse_effect(str(rng.choice(fitting)), arm.robot))
 
 
 def diagnose_hidden(
     out: Path,
-    hidden: HiddenChange,
-    truth: ArmModel,
+    changed: ArmModel,
     known: ArmModel,
     baseline: Recording,
     rng: np.random.Generator,
@@ -147,10 +93,8 @@ def diagnose_hidden(
     ----------
     out : Path
         Folder to fill.
-    hidden : HiddenChange
-        The hidden effect, which the page shows as well.
-    truth : ArmModel
-        The arm without it.
+    changed : ArmModel
+        The arm with the hidden effect, which the page shows as well.
     known : ArmModel
         The model that was identified.
     baseline : Recording
@@ -163,9 +107,8 @@ def diagnose_hidden(
     """
     limits = Limits.of(known.robot)
     bodies = ClearanceModel.of(collision_model(known.robot))
-    changed = truth.with_effect(hidden.effect, hidden.values)
-
-    def recorded(name: str) -> Recording:
+    recordings = []
+    for name in ('after_1', 'after_2', 'held_out'):
         # a period of 8 s with 5 harmonics
         drawn = random_feasible(known, limits, 8.0, 5, rng, clearance=bodies)
         plant = SimulatedArm(changed, rng=rng, sensors=SENSORS)
@@ -178,9 +121,7 @@ def diagnose_hidden(
                 on_progress=lambda now: tick(now.t / now.duration),
             )
         recording = read_recording(out / name, joints=known.robot.joints)
-        return replace(recording, source=str(settled(out / name)))
-
-    recordings = [recorded(name) for name in _RUNS]
+        recordings.append(replace(recording, source=str(settled(out / name))))
     with progress('diagnosing') as tick:
         found = diagnose(
             known,
@@ -190,21 +131,43 @@ def diagnose_hidden(
             rng=rng,
             progress=tick,
         )
-        core = replace(found.core, summary=f'{found.core.summary} {hidden.outcome(found)}')
+        core = replace(found.core, summary=f'{found.core.summary} {outcome(changed, found)}')
         replace(found, core=core).fill(out, ResultOrigin(known.robot.name, known.robot.name))
     return found
 
 
-def show_hidden(hidden: HiddenChange, found: DiagnosisResult) -> None:
-    """Print the diagnosis, the held-out error before and after, and the hidden effect."""
-    say('Then a change was hidden in the arm, and three runs were recorded. Diagnosis of two:')
-    say(pretty(f'{found.verdict.replace("_", " ").upper()}: {found.core.summary}'))
-    gap = found.core.gap
-    if gap is not None:
-        worst = int(np.argmax(gap.chi2_before))
-        say(
-            f'Held-out run: the error of {found.arm.robot.joints[worst]} is '
-            f'{digits(float(gap.before[worst]))} N m, and {digits(float(gap.after[worst]))} N m '
-            'with the named effect.'
-        )
-    say(hidden.outcome(found))
+def outcome(changed: ArmModel, diagnosed: DiagnosisResult) -> str:
+    """Return a sentence on the hidden effect, and whether the diagnosis ranked it first."""
+    effect = changed.effects[-1]
+    parameters = effect.parameters(changed.robot)
+    shown = [
+        f'{name.name.replace("_", " ")} {digits(float(value), 3)} {pretty(name.unit)}'.rstrip()
+        for name, value in zip(parameters, changed.values[-1], strict=True)
+        if value
+    ]
+    where = ', '.join(effect.joints) or 'the whole arm'
+    hidden = f'{effect.name.replace("_", " ")} in {where} ({", ".join(shown[:4])})'
+    rank = 'found it' if _found(effect, diagnosed) else 'did not rank it first'
+    return f'Hidden effect: {hidden}. The diagnosis {rank}.'
+
+
+def story(changed: ArmModel, diagnosed: DiagnosisResult) -> dict[str, Any]:
+    """Return the hidden effect, the verdict and whether it was found, for JSON."""
+    effect = changed.effects[-1]
+    return {
+        'hidden': {
+            'name': effect.name,
+            'joints': list(effect.joints),
+            'values': changed.values[-1].tolist(),
+        },
+        'verdict': diagnosed.verdict,
+        'summary': diagnosed.core.summary,
+        'found': _found(effect, diagnosed),
+        'gap': diagnosed.document()['gap'],
+    }
+
+
+def _found(effect: Effect, diagnosed: DiagnosisResult) -> bool:
+    """Return whether the first finding is an effect, on the same joints."""
+    first = diagnosed.core.findings[:1]
+    return any((one.name, one.joints) == (effect.name, effect.joints) for one in first)

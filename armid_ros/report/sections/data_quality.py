@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Sequence
 
 from armid_ros.identification import Fit
 from armid_ros.identification.rows.period import find_period, refined_period
@@ -19,7 +19,7 @@ from armid_ros.report.blocks import (
     Paragraph,
     TableCell,
 )
-from armid_ros.report.notation import digits, plain, with_names
+from armid_ros.report.notation import digits, plain
 from armid_ros.report.page import Templated
 from armid_ros.robots import Robot
 import numpy as np
@@ -29,7 +29,6 @@ def data_quality_section(
     read: Sequence[tuple[Recording, str, Sequence[Fit]]],
     robot: Robot | None = None,
     at_fault: Collection[str] = (),
-    names: Mapping[str, str] | None = None,
 ) -> ContentSection:
     """
     Return rate, gaps and repairs of every recording.
@@ -42,14 +41,11 @@ def data_quality_section(
         Joints and units; without a robot, repeatability is not shown.
     at_fault : collection of str
         Names of recordings that the verdict calls faulty, however well they were read.
-    names : mapping of str to str, optional
-        Names of recordings by source.
 
     """
-    names = names or {}
     rows, notes = [], []
     for recording, role, _ in read:
-        source = names.get(recording.source, recording.source) or 'in memory'
+        source = recording.source or 'in memory'
         steps = np.diff(recording.t) if len(recording) > 1 else np.zeros(1)
         period = recording.period or 1.0
         ordinary = steps[steps < GAP_PERIODS * period]
@@ -64,8 +60,8 @@ def data_quality_section(
                 recording.clock,
             )
         )
-        text = with_names(recording.report.describe(), names)
-        clean, faulty = recording.report.unharmed, source in at_fault
+        text = recording.report.describe()
+        clean, faulty = recording.report.unharmed, recording.source in at_fault
         if clean:
             text += ' The recorded signals are at fault: see the verdict.' * faulty or (
                 ' Nothing dropped, nothing repaired.'

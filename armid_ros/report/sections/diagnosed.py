@@ -13,7 +13,6 @@ from armid_ros.diagnosis.search.cause import room
 from armid_ros.diagnosis.search.trial import Trial
 from armid_ros.diagnosis.verdict.document import Detectable
 from armid_ros.diagnosis.verdict.finding import Gap
-from armid_ros.diagnosis.verdict.where import Where
 from armid_ros.diagnosis.verdict.words import by_cause, share_interval_in_words
 from armid_ros.estimate import name_in_words
 from armid_ros.identification.fitting.identifiability import excludes_zero, HALF_WIDTH
@@ -50,23 +49,14 @@ _DETECTABLE = (
 )
 
 
-def share_of(diagnosis: Diagnosis) -> str:
-    """Return the reference of the shares of joints: the gap, or its explained part."""
-    return 'the explained part' if diagnosis.findings else 'the difference'
-
-
-def pattern_of(diagnosis: Diagnosis, place: Where) -> str:
-    """Return the named effects of a joint, or otherwise the pattern of its residual."""
-    named = [name_in_words(one.name) for one in diagnosis.findings if place.joint in one.joints]
-    return ' and '.join(named) or place.signature
-
-
 def share_bars(diagnosis: Diagnosis) -> BarChart:
     """Return the share of the gap that each cause explains, and the rest."""
     rows, taken = [], 0.0
     for group in by_cause(diagnosis.findings):
         one = group[0]
         where = ', '.join(one.place_of(joint) for joint in one.joints) or 'whole arm'
+        if len(one.joints) > 3:
+            where = f'{len(one.joints)} joints'
         names = ' and '.join(name_in_words(other.name) for other in group)
         share = max(one.share, 0.0)
         taken += share
@@ -134,6 +124,7 @@ def named_section(findings: Sequence[Finding]) -> ContentSection:
 def evidence_section(diagnosis: Diagnosis) -> ContentSection:
     """Return the residuals without the named effects, in the worst joints."""
     folds = []
+    whole = 'the explained part' if diagnosis.findings else 'the difference'
     for number, place in enumerate(diagnosis.where[:3]):
         blocks: list[Templated] = []
         if place.axes and place.mean_share >= 0.005:
@@ -158,14 +149,12 @@ def evidence_section(diagnosis: Diagnosis) -> ContentSection:
                 legend=False,
             )
             panels.append((f'{axis.name}: {share} of the mean square', '', [chart]))
-        share = f'{100 * place.share_of_gap:.0f} % of {share_of(diagnosis)}'
-        folds.append(
-            Fold(
-                f'{place.joint}: {share}, {pattern_of(diagnosis, place)}',
-                [*blocks, Panels(panels)],
-                opened=number == 0,
-            )
-        )
+        named = [
+            name_in_words(one.name) for one in diagnosis.findings if place.joint in one.joints
+        ]
+        line = f'{place.joint}: {100 * place.share_of_gap:.0f} % of {whole}, '
+        line += ' and '.join(named) or place.signature
+        folds.append(Fold(line, [*blocks, Panels(panels)], opened=number == 0))
     return ContentSection('Where it shows', folds)
 
 
@@ -223,16 +212,6 @@ def isolability_section(isolability: Isolability) -> ContentSection:
         others = np.flatnonzero(near[kinds.index(name)]) if name in kinds else ()
         alike = ', '.join(names[k] for k in others)
         rows.append((*_detectable_row(name, isolability.effects), alike))
-    shares: list[Cells] = [
-        (
-            f'{k + 1} {name}',
-            *(
-                TableCell('=' if near[k, j] else '', shade=round(55.0 * (1.0 - apart[k, j])))
-                for j in range(len(kinds))
-            ),
-        )
-        for k, name in enumerate(names)
-    ]
     heads = (*_DETECTABLE, 'Not distinguishable from')
     return ContentSection(
         'Isolability',
@@ -243,11 +222,6 @@ def isolability_section(isolability: Isolability) -> ContentSection:
                 'not distinguishable from an effect that reproduces its torque to 10 % (rms).'
             ),
             DataTable(heads, rows, tuple(range(len(heads)))),
-            Paragraph(
-                'Similarity of two effects, by number: the darker, the more similar. "=" marks '
-                'an effect in a row that the effect in the column can reproduce.'
-            ),
-            DataTable(('Effect', *(str(k + 1) for k in range(len(kinds)))), shares),
         ],
     )
 
