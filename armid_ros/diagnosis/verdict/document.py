@@ -41,6 +41,15 @@ def diagnosis_document(diagnosis: Diagnosis, model: str = 'model.yaml') -> dict[
         Path of the patched model, relative to the document.
 
     """
+    explanation = diagnosis.explanation
+    filters = None  # of bad data
+    if diagnosis.data:
+        used = diagnosis.data[0].used
+        filters = {
+            'cutoff_hz': used.cutoff_hz,
+            'rows_hz': used.rate_hz / used.decimation,
+            'kept_hz': used.kept_hz,
+        }
     return {
         'schema': SCHEMA,
         'verdict': diagnosis.verdict,
@@ -53,8 +62,8 @@ def diagnosis_document(diagnosis: Diagnosis, model: str = 'model.yaml') -> dict[
             for w in diagnosis.where
         ],
         'gap': _gap(diagnosis),
-        'filters': _filters(diagnosis),
-        'candidates': _candidates(diagnosis),
+        'filters': filters,
+        'candidates': [] if explanation is None else _candidates(explanation),
         'not_visible': list(diagnosis.not_visible),
         'detectable': [
             {
@@ -65,7 +74,7 @@ def diagnosis_document(diagnosis: Diagnosis, model: str = 'model.yaml') -> dict[
                 'unit': '' if row.parameter is None else row.parameter.unit,
                 'visible_fraction': row.visible,
             }
-            for row in detectable(diagnosis.explanation)
+            for row in detectable(explanation)
         ],
         'model': model,
         'spans': [
@@ -143,23 +152,8 @@ def _gap(diagnosis: Diagnosis) -> dict[str, Any]:
     }
 
 
-def _filters(diagnosis: Diagnosis) -> dict[str, float] | None:
-    """Return the filters of the recordings, rates and frequencies in Hz; None for bad data."""
-    if not diagnosis.data:
-        return None
-    used = diagnosis.data[0].used
-    return {
-        'cutoff_hz': used.cutoff_hz,
-        'rows_hz': used.rate_hz / used.decimation,
-        'kept_hz': used.kept_hz,
-    }
-
-
-def _candidates(diagnosis: Diagnosis) -> list[dict[str, Any]]:
+def _candidates(explanation: Explanation) -> list[dict[str, Any]]:
     """Return the first candidates of the survey: named causes, then the likeliest others."""
-    explanation = diagnosis.explanation
-    if explanation is None:
-        return []
     return [
         {
             'name': trial.effect.said_as,
