@@ -21,7 +21,7 @@ from armid_ros.diagnosis.data.trajectory import trajectories, Trajectory
 from armid_ros.diagnosis.prepare import choose_filters, mended, prepare, with_friction
 from armid_ros.diagnosis.search.explainer import Explainer
 from armid_ros.diagnosis.search.explanation import Explanation, NOISE
-from armid_ros.diagnosis.search.spans import acting_spans, Span
+from armid_ros.diagnosis.search.spans import acting_spans
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.diagnosis.ties import diagnose_ties
 from armid_ros.diagnosis.verdict.attribution import Attribution, headline
@@ -144,7 +144,7 @@ def diagnose(
             return _as_diagnosis(tied, notes, explainer, doubt, given)
     explanation = explainer.explanation()
     result = _as_diagnosis(explanation, notes, explainer, doubt, given)
-    if _hardly_explained(result, settings):
+    if result.verdict != 'consistent' and _hardly_explained(result, settings):
         timed = _of_spans(explanation, explainer, recordings, validate, notes, doubt)
         result = timed or result
     if (result.verdict in OPEN or result.doubt) and settings.partner is None:
@@ -175,13 +175,15 @@ def _of_spans(
     spans = () if look is None else acting_spans(look, settings.thresholds)
     if all(one.whole for one in spans):
         return None
-    timed = [*recordings, *validate][: len(spans)]
-    cut = [_cropped(*each) for each in zip(spans, timed, strict=True)]
-    count = len(recordings)
-    shorter, held_out = ([x for x in part if x is not None] for part in (cut[:count], cut[count:]))
+    shorter, held_out = list[Recording](), list[Recording]()
+    for k, (span, one) in enumerate(zip(spans, [*recordings, *validate], strict=False)):
+        margin = 0.25  # s: uncertainty of the start and of the end
+        inside = (one.t >= span.start + margin) & (one.t <= span.stop - margin) | span.whole
+        if span.stop > span.start:
+            (shorter if k < len(recordings) else held_out).append(one.select(inside))
     if not shorter:
         return None
-    if len(timed) < len(recordings) + len(validate):
+    if len(spans) < len(recordings) + len(validate):
         notes = (*notes, _NOT_TIMED)
     by_misfit = explainer.baseline is not None and settings.partner is None
     try:
@@ -197,15 +199,6 @@ def _of_spans(
     if _hardly_explained(found, settings):
         return None
     return found.acting_in([one for one in spans if one.stop > one.start])
-
-
-def _cropped(span: Span, recording: Recording) -> Recording | None:
-    """Return the time span of a recording in which a cause acts."""
-    if span.whole:
-        return recording
-    margin = 0.25  # s: uncertainty of the start and of the end
-    inside = (recording.t >= span.start + margin) & (recording.t <= span.stop - margin)
-    return recording.select(inside) if span.stop > span.start else None
 
 
 def _with_unfitted_joints(
