@@ -234,9 +234,9 @@ def _as_diagnosis(
     evidence, patched = explanation.evidence, explanation.fitted.arm
     found, minor = findings(explanation, shares, arm, explainer.rng), small_print(explanation)
     worse, of_residual = excess.worse_joints(), excess.of_residual()
-    floors = tuple(noise_floor(part, patched) for part in evidence.data)
     resting, laws = excess.at_rest(), excess.of_laws()
-    different = not_repeating(floors, settings.thresholds, settings.material * evidence.torque_rms)
+    least = settings.material * evidence.torque_rms
+    different = not_repeating(explainer.prepared.floors, settings.thresholds, least)
     explanation = explanation if found else replace(explanation, reference=explanation.fitted)
     gap = Gap.of(explanation, unseen)
     word = decide(
@@ -258,8 +258,8 @@ def _as_diagnosis(
     explained = unseen or evidence
     places = locate_explained(explanation, explained, settings) if found else left
     explainer.tell(1.0, word.word)
-    least = settings.thresholds.headline
-    small = [one for one in found if settings.everything and one.share < least]
+    share = settings.thresholds.headline
+    small = [one for one in found if settings.everything and one.share < share]
     remarks = _remarks(found, worse, explanation, word.word, doubt, explainer)
     return Diagnosis(
         verdict=word.word,

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.data.baseline import excited, refitted
-from armid_ros.diagnosis.data.evidence import Evidence, noise_floor, NoiseFloor
+from armid_ros.diagnosis.data.evidence import noise_floor, NoiseFloor
 from armid_ros.diagnosis.data.trajectory import MAX_UNCERTAIN_SHARE, thinnable, Trajectory
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.effects import CATALOGUE, Effect
@@ -44,25 +44,17 @@ class Prepared:
         Stretches of the recordings in rows.
     floors : tuple of NoiseFloor
         Noise of each trajectory in the residual of the arm as fitted to the data.
-    as_described : tuple of ndarray, shape (n,)
-        Noise in the residual of the arm as described [N m]; without equal periods as in `floors`.
 
     """
 
     used: Conditioning
     data: tuple[Trajectory, ...]
     floors: tuple[NoiseFloor, ...]
-    as_described: tuple[FloatArray, ...]
 
     @property
     def allowed(self) -> FloatArray:
         """Largest uncertain share of an informative row, shape (n,); see `Trajectory`."""
         return self.data[0].allowed
-
-    @property
-    def described(self) -> Evidence:
-        """Return the data weighted by the noise in the residual of the given arm."""
-        return Evidence.over_noise(self.data, self.as_described)
 
     @property
     def sigma(self) -> list[FloatArray]:
@@ -148,11 +140,8 @@ def _measured(
 ) -> Prepared:
     """Measure the noise in the residual of the arm as given, and as fitted to the data."""
     base, _ = excited(arm, theory, data)
-    first = [noise_floor(part, arm) for part in data]
-    refit = refitted(arm, base, data, [floor.sigma for floor in first])
-    floors = tuple(noise_floor(part, refit) for part in data)
-    as_described = tuple((a if a.period else b).sigma for a, b in zip(first, floors, strict=True))
-    return Prepared(used, tuple(data), floors, as_described)
+    refit = refitted(arm, base, data, [noise_floor(part, arm).sigma for part in data])
+    return Prepared(used, tuple(data), tuple(noise_floor(part, refit) for part in data))
 
 
 def mended(

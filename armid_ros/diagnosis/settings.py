@@ -104,11 +104,6 @@ class Thresholds:
     one_period: float = 8.0
     one_period_on_average: float = 3.5
 
-    @property
-    def other_motion(self) -> float:
-        """Factor by which the squared misfit may be larger in a motion that was not used."""
-        return self.predicted * self.same_fit
-
 
 @dataclass(frozen=True)
 class DiagnosisSettings:

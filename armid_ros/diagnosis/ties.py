@@ -58,13 +58,13 @@ def diagnose_ties(
     arm, prepared, settings = explainer.arm, explainer.prepared, explainer.settings
     explainer = replace(explainer, baseline=None, misfit=None)
     ties = _Ties(explainer, tuple(recordings), partner)
+    evidence = Evidence.over_noise(prepared.data, prepared.sigma)
     named = ties.significant()
     if not named:
-        problem = JointFit.over_noise(arm, prepared.described, explainer.rng).as_described()
+        problem = JointFit.over_noise(arm, evidence, explainer.rng).as_described()
         described = problem.fit()
-        found = Explanation(arm, described, described, (), prepared.described, problem)
+        found = Explanation(arm, described, described, (), evidence, problem)
         return found if at_floor(found, settings) else None
-    evidence = Evidence.over_noise(prepared.data, prepared.sigma)
     for _ in range(2):  # the noise of spring angles is estimated only with fitted ties
         problem = JointFit.over_noise(arm, evidence, explainer.rng)
         fitted = problem.fit(named)

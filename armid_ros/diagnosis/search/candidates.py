@@ -206,9 +206,9 @@ class Causes:
         rows, robot = self.nuisance.rows, self.nuisance.arm.robot
         torque = _torque_of(columns, rows)
         seen = torque.any(axis=0)
-        if not seen.any() or (
-            effect.traits.rests and _at_rest(columns, rows) < _MIN_SHARE_AT_REST
-        ):
+        resting = [~columns[k].any(axis=(1, 2)) for k in rows.today_parts]
+        taut = float(np.mean(np.concatenate(resting))) < _MIN_SHARE_AT_REST
+        if not seen.any() or (effect.traits.rests and taut):
             return None
         return cause_of(
             self.nuisance,
@@ -229,12 +229,6 @@ def _torque_of(columns: Sequence[FloatArray], rows: Rows) -> FloatArray:
         moving = rows.weight[k][:, :, np.newaxis] > 0.0
         squares += np.sum(columns[k] ** 2, axis=0, where=moving)
     return np.asarray(np.sqrt(squares / rows.informative[:, np.newaxis]))
-
-
-def _at_rest(columns: Sequence[FloatArray], rows: Rows) -> float:
-    """Return the share of the samples of the diagnosed day in which all columns are zero."""
-    zero = [~columns[k].any(axis=(1, 2)) for k in rows.today_parts]
-    return float(np.mean(np.concatenate(zero)))
 
 
 def _unit(

@@ -245,22 +245,26 @@ class CauseComparison:
     def look(self, nuisance: Nuisance) -> Look:
         """Compare every cause that is not accepted yet, and refine the shapes of the best."""
         settings, likeliest = self._settings(nuisance), self._likeliest(nuisance)
-        tried = settings if len(settings) == 1 else _leading_settings(settings)
+        tried = dict[int, Marginal]()  # the best one, and noise only, of each size of link errors
+        for body in dict.fromkeys(one.setting.body for one in settings):
+            own = [one for one in settings if one.setting.body == body]
+            best = max(own, key=lambda one: one.evidence)
+            tried |= {id(one): one for one in (best, own[0])}
         causes = self._causes_of(nuisance)
         first: dict[object, tuple[float, Cause, Marginal]] = {}
-        for one in tried:
+        for one in tried.values():
             for cause, fit in all_odds(causes, nuisance, one):
                 worth = fit.factor + one.evidence + cause.prior
                 if cause.key not in first or worth > first[cause.key][0]:
                     first[cause.key] = worth, cause, one
-        best = sorted(first.values(), key=lambda one: -one[0])
+        order = sorted(first.values(), key=lambda one: -one[0])
         result = []
-        for n, (_, cause, under) in enumerate(best[:_COMPARED]):
+        for n, (_, cause, under) in enumerate(order[:_COMPARED]):
             if n < _REFINED and cause.effect.shapes:
                 cause = self._in_best_shape(cause, nuisance, under)
             result.append(self.ranked(cause, nuisance))
         ranking = tuple(sorted(result, key=lambda one: -one.worth))
-        others = tuple(cause for _, cause, _ in best[_COMPARED:])
+        others = tuple(cause for _, cause, _ in order[_COMPARED:])
         return Look(ranking, others, nuisance, likeliest, self.usual)
 
     def ranked(self, cause: Cause, nuisance: Nuisance) -> Ranked:
@@ -341,12 +345,3 @@ def settings_of_misfit(body: float) -> tuple[Setting, ...]:
     return tuple(
         Setting(body, share, share, noise, LASTING) for share, noise in product(_OWN, (0.5, 1.1))
     )
-
-
-def _leading_settings(settings: Sequence[Marginal]) -> list[Marginal]:
-    """Return the best setting, and the one with noise only, for each size of link errors."""
-    found = []
-    for body in dict.fromkeys(one.setting.body for one in settings):
-        own = [one for one in settings if one.setting.body == body]
-        found += [max(own, key=lambda one: one.evidence), own[0]] if own else []
-    return found

@@ -135,8 +135,6 @@ class Explainer:
             accepted = [one.effect for one in result.nuisance.accepted]
             changed = [p for effect in accepted for p in effect.parameters(self.arm.robot)]
             constant = [k for k, p in enumerate(self.arm.parameters) if p in changed]
-        else:
-            evidence = prepared.described
         nuisance = Nuisance.of(
             rows, memoized_arm(self.arm), self.rng, constant=constant, gravity=gravity
         )
@@ -331,5 +329,5 @@ def _noise_within(
     more = [np.maximum(floor.rough**2 - contained**2, 0.0) for floor in prepared.floors]
     return tuple(
         np.minimum(sigma, np.sqrt(misfit**2 + excess))
-        for sigma, excess in zip(prepared.as_described, more, strict=True)
+        for sigma, excess in zip(prepared.sigma, more, strict=True)
     )

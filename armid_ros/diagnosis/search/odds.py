@@ -231,8 +231,12 @@ def posteriors(
     """
     count, p, acts = len(causes), known.size, causes[0].acts(known.today)
     there = [known.there()] if not np.all(acts) else []
-    if nuisance.rows.unseen:
-        largest = np.array([_unseen(cause, nuisance) for cause in causes])
+    if nuisance.rows.unseen:  # the largest values that a misfit of known size allows
+        misfit, largest = nuisance.rows.amplitude[-1], np.empty((count, p))
+        for k, cause in enumerate(causes):
+            joints = list(cause.joints)
+            torque = np.maximum(cause.torque[joints] * cause.unit, 1e-300)
+            largest[k] = THERE * np.min(misfit[joints, np.newaxis] / torque, axis=0)
         there = [np.tile(np.eye(p) * largest[:, np.newaxis], (len(known.today), 1))]
     asked = np.kron(acts.astype(float)[:, np.newaxis], np.eye(p))
     prior = -0.5 * np.log((spreads + 1.0) / (usual + 1.0)) ** 2
@@ -275,13 +279,6 @@ def posteriors(
         replace(fit, factor=fit.factor + allowed(cause, fit, nuisance))
         for cause, fit in zip(causes, fits, strict=True)
     ]
-
-
-def _unseen(cause: Cause, nuisance: Nuisance) -> FloatArray:
-    """Return the largest values that a misfit of known size allows, in their unit, (p,)."""
-    torque = cause.torque[list(cause.joints)] * cause.unit
-    misfit = nuisance.rows.amplitude[-1][list(cause.joints), np.newaxis]
-    return np.asarray(THERE * np.min(misfit / np.maximum(torque, 1e-300), axis=0))
 
 
 def allowed(cause: Cause, fit: CauseFit, nuisance: Nuisance) -> float:

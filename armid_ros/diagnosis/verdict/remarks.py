@@ -114,7 +114,7 @@ def _changed(
 
     def compared(known: Baseline) -> tuple[FloatArray, FloatArray]:
         times = known.misfit / np.maximum(misfit.of(arm.robot, torque_rms(known.data)), 1e-300)
-        most = np.sqrt(thresholds.other_motion * np.maximum(known.varies, 1.0))
+        most = np.sqrt(thresholds.predicted * thresholds.same_fit * np.maximum(known.varies, 1.0))
         return times, times / most
 
     times, beyond = compared(baseline)
