@@ -3,8 +3,10 @@
 """The share of a gap that names explain of data that they were not fitted to."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 from armid_ros.diagnosis.data.evidence import Evidence, noise_floor
+from armid_ros.diagnosis.data.trajectory import block_rows
 from armid_ros.diagnosis.search.cause import NamedEffect
 from armid_ros.diagnosis.search.explanation import Explanation
 from armid_ros.diagnosis.search.posterior import JointFit
@@ -64,3 +66,12 @@ def test_folds_that_were_not_fitted_show_it_as_well(sprung):
     sprung = replace(sprung, steps=('spring',))
     folds, whole = left_out(sprung), predicted(sprung, sprung.evidence)
     assert folds.share([0]) == pytest.approx(whole.share([0]), abs=0.01)
+
+
+@pytest.mark.parametrize('rows', [1, 2, 7, 13, 60, 200])
+def test_every_block_has_rows(rows):
+    """A short stretch makes folds of a row or two."""
+    parts = [SimpleNamespace(fold=k, rows=np.arange(count)) for k, count in enumerate((rows, 90))]
+    block, fold = block_rows(parts)
+    assert np.all(np.bincount(block, minlength=len(fold)) > 0)
+    assert len(block) == rows + 90

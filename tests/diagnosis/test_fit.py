@@ -1,11 +1,16 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The fit of what was named."""
+"""The fit of what was named, and the columns that it is fitted by."""
+
+from dataclasses import replace
 
 from armid_ros.diagnosis.data.evidence import Evidence, noise_floor
+from armid_ros.diagnosis.data.trajectory import trajectories
+from armid_ros.diagnosis.search.candidates import without_measurement
 from armid_ros.diagnosis.search.cause import NamedEffect
 from armid_ros.diagnosis.search.posterior import JointFit, patch_columns
 from armid_ros.effects import CATALOGUE
+from armid_ros.identification.rows.signals import Conditioning
 import numpy as np
 import pytest
 
@@ -50,3 +55,26 @@ def test_columns_of_a_shape_are_the_derivative_of_the_torque(bench, name, shape,
         slope = (behind - ahead) / (2.0 * step[index])
         np.testing.assert_allclose(columns[:, :, index], slope, atol=2e-3 * np.abs(slope).max())
         assert np.any(slope)
+
+
+@pytest.fixture(scope='module')
+def parts(bench):
+    """Return a recording, and the same with another measured torque."""
+    one = bench.recordings()[0]
+    louder = replace(one, tau=one.tau + np.sin(one.t)[:, np.newaxis])
+    return [trajectories([each], Conditioning(200.0, 20.0, 5))[0] for each in (one, louder)]
+
+
+@pytest.mark.parametrize('name', CATALOGUE)
+def test_what_is_measured_changes_no_column(bench, parts, name):
+    """A prediction that contained the measurement would explain everything."""
+    effect = CATALOGUE[name].on(bench.robot)
+    reads = name == 'actuator_saturation'
+    if reads:
+        effect = effect.with_shape((0.5 * np.abs(parts[0].motion.tau).max(),))
+    one, other = (
+        without_measurement(part, bench.arm).columns(bench.arm, effect) for part in parts
+    )
+    np.testing.assert_array_equal(one, other)
+    read, changed = (part.columns(bench.arm, effect) for part in parts)
+    assert np.array_equal(read, changed) != reads

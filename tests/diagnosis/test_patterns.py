@@ -1,11 +1,18 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Which described value is wrong, by the pattern of what has changed."""
+"""Which described value is wrong, by the pattern of what has changed, and what a user knows."""
 
-from armid_ros.diagnosis import diagnose
+from armid_ros.arm import ArmModel
+from armid_ros.diagnosis import diagnose, DiagnosisSettings
+from armid_ros.errors import ModelError
 from armid_ros.model import inverse_dynamics
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
+
+from tests.diagnosis.test_payload import held_by
+
+EARTH, MOON = 9.81, 1.62
 
 
 def names(found):
@@ -54,9 +61,67 @@ def test_what_gravity_alone_enters_is_gravity(bench, other):
     assert not names(found) & {'payload', 'link_inertia', 'torque_gain'}
 
 
-def test_one_direction_of_ten_parameters_is_a_link(bench, other):
-    found = other(links(bench.robot, 1.0, 1.1))
-    (finding,) = found.findings
-    assert 'link_inertia' in names(found)
-    assert finding.joints == ('elbow',)
-    assert not names(found) & {'gravity_magnitude', 'torque_gain', 'base_tilt'}
+def gravity_of(arm):
+    """Return gravity as a patched arm has it [m/s^2]."""
+    bare = ArmModel(arm.robot)
+    for effect in arm.effects:
+        if effect.name in ('base_tilt', 'gravity_magnitude', 'gravity_vector'):
+            changed = effect.action(arm.values_of(effect), bare).robot
+            bare = ArmModel(changed)
+    return np.array(bare.robot.gravity)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(
+    ('axis', 'angle', 'size'),
+    [
+        ('y', 37.0, EARTH),
+        ('x', 180.0, EARTH),
+        ('x', 60.0, MOON),
+    ],
+)
+def test_any_mounting_is_found_with_friction_that_only_has_names(upright, axis, angle, size):
+    """An arm is on a wall, a ceiling, a slope or another planet."""
+    robot = upright.robot
+    turned = Rotation.from_euler(axis, angle, degrees=True).inv()
+    gravity = turned.apply([0.0, 0.0, -size])
+    true = robot.with_gravity(gravity)
+    hidden = upright.recordings(
+        lambda m, tau: inverse_dynamics(true, m) - inverse_dynamics(robot, m)
+    )
+    found = diagnose(upright.named_friction(), hidden, rng=np.random.default_rng(0))
+    assert found.verdict in ('named', 'ambiguous'), found.summary
+    names = {finding.name for finding in found.findings}
+    assert ('base_tilt' in names) == (angle > 0.0)
+    assert ('gravity_magnitude' in names) == (size != EARTH)
+    seen = gravity_of(found.arm)
+    length = np.linalg.norm(seen)
+    assert length == pytest.approx(size, rel=0.02)
+    assert np.rad2deg(np.arccos(min(1.0, seen @ gravity / length / size))) < 1.0
+
+
+@pytest.mark.parametrize(
+    ('never', 'named'),
+    [
+        ('payload', 'link_inertia'),
+        pytest.param('link_inertia', 'payload', marks=pytest.mark.long),
+    ],
+)
+def test_what_never_happens_is_not_named_where_something_else_explains_as_much(
+    upright, never, named
+):
+    """A load of an inner link has the same ten values as that link."""
+    hidden = upright.recordings(held_by(upright.robot, link=1))
+    settings = DiagnosisSettings(prior={never: 'never'})
+    found = diagnose(upright.arm, hidden, settings=settings, rng=np.random.default_rng(0))
+    (one,) = found.findings
+    assert one.name == named and not one.rivals
+    assert any(never in note and 'never' in note for note in found.notes)
+
+
+@pytest.mark.parametrize(
+    'prior', [{'paylaod': 'often'}, {'payload': 'sometimes'}, {'payload': ''}]
+)
+def test_an_unknown_word_is_named(prior):
+    with pytest.raises(ModelError, match='prior'):
+        DiagnosisSettings(prior=prior)
