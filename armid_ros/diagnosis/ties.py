@@ -22,7 +22,7 @@ from armid_ros.diagnosis.search.cause import NamedEffect
 from armid_ros.diagnosis.search.comparison import settings_alone
 from armid_ros.diagnosis.search.explainer import Explainer
 from armid_ros.diagnosis.search.explanation import at_floor, explain, Explanation, survey
-from armid_ros.diagnosis.search.posterior import Fitted, JointFit, places
+from armid_ros.diagnosis.search.posterior import Fitted, JointFit, patched_arm, places
 from armid_ros.diagnosis.search.trial import Trial
 from armid_ros.effects.tied import Partner, Tied, TiedInteraction, TiedSlack
 from armid_ros.errors import IdentificationError
@@ -222,9 +222,11 @@ def _with_springs(explanation: Explanation, found: Interaction) -> Fitted:
         replaced = own.values.copy()
         replaced[list(own.kept)] = values[list(place[0])]
         named.append(replace(own, values=replaced))
+    nuisance = problem.with_model(patched_arm(problem.arm, named))
+    means = nuisance.means(nuisance.marginal(problem.setting, problem.recordings))
     return replace(
         fitted,
-        arm=problem.with_names_at(named),
+        arm=problem.arm_at(named, means),
         named=tuple(named),
         estimate=Estimate(fitted.estimate.parameters, values, covariance * np.outer(wider, wider)),
     )

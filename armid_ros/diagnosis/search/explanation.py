@@ -175,10 +175,11 @@ def explain(
             steps.append(trial)
         else:
             small.append(trial)
+    reference = problem.fit()
     return Explanation(
         problem.arm,
-        problem.fit(named),
-        problem.fit(),
+        problem.fit(named) if named else reference,
+        reference,
         tuple(steps),
         evidence,
         problem,

@@ -167,20 +167,15 @@ class JointFit:
         covariance[undetermined], covariance[:, undetermined] = 0.0, 0.0
         covariance[undetermined, undetermined] = np.inf
         estimate = Estimate(*fitted_parameters(self.arm.robot, named), covariance)
-        return Fitted(self._arm(named, means), named, estimate, means[:size])
+        return Fitted(self.arm_at(named, means), named, estimate, means[:size])
 
-    def _arm(self, named: Sequence[NamedEffect], means: FloatArray) -> ArmModel:
+    def arm_at(self, named: Sequence[NamedEffect], means: FloatArray) -> ArmModel:
         """Return the arm with the named causes, and with fitted body and friction if stated."""
         change = self.nuisance.transform @ means[: self.nuisance.rank]
         arm, base, theta = self.arm, self.nuisance.base, self.arm.theta
         if self.stated and np.any(change):
             arm = arm.with_theta(base.lift(base.values(theta) + change, theta))
         return patched_arm(arm, named)
-
-    def with_names_at(self, named: Sequence[NamedEffect]) -> ArmModel:
-        """Return the arm with named causes at given values, all other parameters fitted."""
-        nuisance = self.with_model(patched_arm(self.arm, named))
-        return self._arm(named, nuisance.means(nuisance.marginal(self.setting, self.recordings)))
 
     def as_described(self) -> JointFit:
         """Return the fit with the body fixed to the description."""

@@ -79,6 +79,8 @@ def headline(
         Limits of a residual without gap.
 
     """
+    if not explanation.steps:
+        return explanation, Attribution(np.ones(1), np.zeros((0, 1)))
     fitted = left_out(explanation)
     held_out = None if unseen is None else predicted(explanation, unseen)
     causes = range(len(explanation.steps))
