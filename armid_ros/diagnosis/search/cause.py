@@ -6,7 +6,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 from armid_ros.arm import ArmModel
 from armid_ros.effects import Effect
@@ -46,9 +45,6 @@ class Cause:
         Standard deviation of the prior of its values, over their unit, once it is accepted.
     always : bool
         Whether it acts on both days, once it is accepted.
-    known : (ndarray, shape (p,), float, float), optional
-        Direction among its values along which their sum is known, the sum, and its standard
-        deviation.
 
     """
 
@@ -65,7 +61,6 @@ class Cause:
     shapes: int = 1
     size: float = 1.0
     always: bool = False
-    known: tuple[FloatArray, float, float] | None = None
 
     @property
     def key(self) -> tuple[str, tuple[str, ...], tuple[int, ...]]:
@@ -75,16 +70,6 @@ class Cause:
     def acts(self, today: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
         """Return whether the cause acts in each recording or group: today, or on both days."""
         return np.ones_like(today) if self.always or self.effect.lasting else today
-
-    @cached_property
-    def density(self) -> tuple[FloatArray, FloatArray, float]:
-        """Return the prior precision (p, p), its product with the mean, and half of its loss."""
-        precision = np.diag((self.size * self.unit) ** -2.0)
-        if self.known is None:
-            return precision, np.zeros(len(precision)), 0.0
-        direction, total, std = self.known
-        aim = direction * total / std**2
-        return precision + np.outer(direction, direction) / std**2, aim, 0.5 * (total / std) ** 2
 
     def at(self, values: FloatArray, robot: Robot) -> NamedEffect:
         """Return the effect with its fitted values; its other parameters are zero."""

@@ -39,19 +39,19 @@ from armid_ros.diagnosis.search.explanation import (
     WRITTEN_MISFIT,
 )
 from armid_ros.diagnosis.search.nuisance import Nuisance
-from armid_ros.diagnosis.search.posterior import JointFit, SAME_GRAVITY
+from armid_ros.diagnosis.search.posterior import JointFit
 from armid_ros.diagnosis.search.setting import Setting
 from armid_ros.diagnosis.settings import DiagnosisSettings
-from armid_ros.effects.gravity import GravityVector
 from armid_ros.identification.rows.temperature import mean_temperatures
 from armid_ros.motion import FloatArray
-from armid_ros.robots import GRAVITIES
 import numpy as np
 
 Progress = Callable[[float, str], None]
 #: Smallest share of a misfit that is not noise; the estimate of noise varies by 5 %. Of 20
 #: effects that appeared in a running arm, 20 were named, and only 15 with a share of 1.
 _MIN_MISFIT_SHARE = 0.3
+#: Relative difference of two gravities for which columns of the body are alike.
+_SAME_GRAVITY = 0.003
 #: Note on a model without covariance of its identification.
 _AS_EXACT = (
     'the values of the model are taken as exact because its identification.json is missing: '
@@ -122,14 +122,13 @@ class Explainer:
         # 20 mountings is within 1 degree and 2 %.
         for _ in range(5):
             before, gravity = gravity, self._gravity(result)
-            if np.linalg.norm(gravity - before) <= SAME_GRAVITY * np.linalg.norm(before):
+            if np.linalg.norm(gravity - before) <= _SAME_GRAVITY * np.linalg.norm(before):
                 break
             grid = [x for x in settings_alone() if x.body == result.under.setting.body]
             comparison = self.comparison(rows, grid, gravity=gravity)
             result = comparison.begun(result)
         if result is not first:
             result = comparison.found(result)
-        magnitude, notes = self._magnitude(result)
         setting, constant = result.under.setting, list[int]()
         if setting.body:
             accepted = [one.effect for one in result.nuisance.accepted]
@@ -139,8 +138,8 @@ class Explainer:
             rows, memoized_arm(self.arm), self.rng, constant=constant, gravity=gravity
         )
         every = tuple(range(len(rows.today)))
-        problem = JointFit(nuisance.arm, nuisance, setting, every, True, gravity=magnitude)
-        found = replace(explain(problem, evidence, result, settings, unknown), notes=notes)
+        problem = JointFit(nuisance.arm, nuisance, setting, every, stated=True)
+        found = explain(problem, evidence, result, settings, unknown)
         if at_floor(found, settings):
             return found
         misfit = np.sqrt(evidence.power(found.residual))
@@ -157,28 +156,6 @@ class Explainer:
                 named = one.at(means[span], arm.robot)
                 arm = with_named(arm, named.effect, named.values)
         return arm.body.gravity
-
-    def _magnitude(self, result: Result) -> tuple[float | None, tuple[str, ...]]:
-        """
-        Return the gravity of a celestial body unless the data contradict it, with a note.
-
-        The odds of a magnitude are its posterior density over its prior density (Dickey 1971).
-
-        """
-        nuisance, gravity = result.nuisance, self._gravity(result)
-        _, covariance = nuisance.whole(result.under)
-        for one, span in zip(nuisance.accepted, nuisance.spans, strict=True):
-            if isinstance(one.effect, GravityVector):
-                size = float(np.linalg.norm(gravity))
-                along = gravity[list(one.kept)] / size
-                std = float(np.sqrt(along @ covariance[span, span] @ along))
-                sizes = {float(np.linalg.norm(g)): name for name, g in GRAVITIES.items()}
-                known = min(sizes, key=lambda other: abs(other - size))
-                odds = np.log(size / std) - 0.5 * ((known - size) / std) ** 2
-                if odds > -self.settings.thresholds.alarm:
-                    note = f'the magnitude of gravity is taken as that of the {sizes[known]}'
-                    return known, (f'{note}, {known:g} m/s^2',)
-        return None, ()
 
     def _explain_change(self, written: Misfit) -> Explanation:
         """

@@ -260,35 +260,22 @@ class Nuisance:
             more = np.sqrt(np.where(now > 0.0, now / then, 1.0))
         return np.asarray(np.clip(more, 1.0, most[:, np.newaxis]))
 
-    def prior(
-        self, setting: Setting
-    ) -> tuple[npt.NDArray[np.intp], FloatArray, FloatArray, float]:
-        """
-        Return the indices of the fitted parameters, and their prior.
-
-        The prior is its precision, precision times mean, and log density at zero.
-
-        """
+    def prior(self, setting: Setting) -> tuple[npt.NDArray[np.intp], FloatArray]:
+        """Return the indices of the fitted parameters, and the precision of their prior."""
         unit = self.rows.amplitude[0]
         rigid = self.base.independent < len(self.arm.robot.rigid_parameters)
         scale = np.where(rigid, setting.body or 1.0, 1.0)
         body = self.transform.T @ (self.prior_precision / np.outer(scale, scale)) @ self.transform
         body += _MIN_PRECISION * np.eye(self.rank)
         size = max(setting.shared, _MIN_PRECISION) * unit[:, np.newaxis] * self.reach
-        shared = size.ravel() ** -2.0
-        more = [one.density[0] for one in self.accepted]
-        whole = linalg.block_diag(body, np.diag(shared), *more)
+        of_causes = [one.size * one.unit for one in self.accepted]
+        others = np.concatenate([size.ravel(), *of_causes]) ** -2.0
+        whole = linalg.block_diag(body, np.diag(others))
         fitted = np.ones(len(whole), dtype=bool)
         fitted[: self.rank] = (setting.body > 0.0) | self.unset
         fitted[self.discrepancy.ravel()] = setting.shared > 0.0
         used = np.flatnonzero(fitted)
-        matrix = whole[np.ix_(used, used)]
-        means = np.zeros(len(whole))
-        for one, span in zip(self.accepted, self.spans, strict=True):
-            means[span] = one.density[1]
-        density = 0.5 * float(np.linalg.slogdet(matrix)[1]) + setting.prior
-        density -= sum(one.density[2] for one in self.accepted)
-        return used, matrix, means[used], density
+        return used, whole[np.ix_(used, used)]
 
     def rows_of(self, k: int) -> FloatArray:
         """Return the weighted columns of all parameters in a recording, (M, n, q + a)."""
@@ -328,9 +315,10 @@ class Nuisance:
             square[fitted.index(k)] -= x.T @ x
             cross[fitted.index(k)] -= x.T @ y
             count, power = count - len(y), power - float(y @ y)
-        used, matrix, vector, evidence = self.prior(setting)
+        used, matrix = self.prior(setting)
+        evidence = 0.5 * float(np.linalg.slogdet(matrix)[1]) + setting.prior
         matrix += square.sum(axis=0)[np.ix_(used, used)] * scale
-        vector += cross.sum(axis=0)[used] * scale
+        vector = cross.sum(axis=0)[used] * scale
         loss, motion = 0.5 * power * scale, None
         if setting.own:
             place, functions = self.discrepancy, self.discrepancy.shape[1]

@@ -26,14 +26,10 @@ from armid_ros.diagnosis.search.cause import Cause, NamedEffect, room
 from armid_ros.diagnosis.search.nuisance import Nuisance
 from armid_ros.diagnosis.search.setting import LASTING, Setting
 from armid_ros.effects import Effect, TorqueReading
-from armid_ros.effects.gravity import GravityVector
 from armid_ros.estimate import Estimate, ParameterName
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.robots import Robot
 import numpy as np
-
-#: Relative standard deviation of gravity on one celestial body: Earth has 9.78 to 9.83 m/s^2.
-SAME_GRAVITY = 0.003
 
 
 @dataclass(frozen=True)
@@ -80,8 +76,6 @@ class JointFit:
         Whether the fitted arm includes the fitted change of body and friction.
     spread : float
         Variance of values between recordings, over their variance for white noise.
-    gravity : float or None
-        Magnitude of gravity, if it is known [m/s^2].
 
     """
 
@@ -91,7 +85,6 @@ class JointFit:
     recordings: tuple[int, ...]
     stated: bool
     spread: float = 0.0
-    gravity: float | None = None
 
     @classmethod
     def over_noise(
@@ -277,13 +270,7 @@ class JointFit:
             for total, x in zip(torque, only, strict=True):
                 total[:, :, 0] += x @ own.values[kept]
         for cause in made:
-            known = None
-            if self.gravity is not None and isinstance(cause.effect, GravityVector):
-                now = model.body.gravity
-                along = now / np.linalg.norm(now)
-                more = self.gravity - float(along @ self.arm.body.gravity)
-                known = along, more, SAME_GRAVITY * self.gravity
-            result = result.and_cause(replace(cause, known=known))
+            result = result.and_cause(cause)
         present = rows.weighted(torque, range(len(rows.torque)))
         return result.with_residual(
             [
