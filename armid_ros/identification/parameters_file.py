@@ -12,18 +12,17 @@ from typing import Any
 
 from armid_ros.arm import ArmModel, load_misfit, Misfit
 from armid_ros.arm.misfit import misfit_of_block
-from armid_ros.arm.model_file import checked_model, read_model
+from armid_ros.arm.model_file import checked_model
 from armid_ros.arm.model_file import SCHEMA as MODEL
-from armid_ros.errors import ArmidError, ModelError
+from armid_ros.errors import ModelError
 from armid_ros.estimate import ParameterName
 from armid_ros.files import finite, is_file, load_yaml, read_text, reading
 from armid_ros.identification.assess.grade_limits import by_error
 from armid_ros.identification.fitting.identifiability import NOT_SHOWN
 from armid_ros.identification.fitting.least_squares import scaled_inverse
-from armid_ros.identification.output import kinematics_digest, SCHEMA
+from armid_ros.identification.output import SCHEMA
 from armid_ros.model.base_parameters import symbol
 from armid_ros.motion import FloatArray
-from armid_ros.robots import load_robot
 import numpy as np
 import yaml
 
@@ -47,8 +46,6 @@ class KnownFit:
         Residual of each joint; empty if unknown.
     recordings : int
         Number of recordings with this residual, at least one.
-    as_diagnosed : bool
-        Whether it is the misfit of model.yaml, which excludes rows at rest.
 
     """
 
@@ -56,18 +53,11 @@ class KnownFit:
     reason: str
     misfit: Misfit
     recordings: int = 1
-    as_diagnosed: bool = False
 
     @property
     def unusable(self) -> bool:
         """Whether the model does not describe the arm."""
         return self.grade == 'unusable'
-
-    @property
-    def errors(self) -> dict[str, float]:
-        """Residual of each joint over its torque [%], where the torque is known."""
-        torque = self.misfit.torque_rms or {}
-        return {j: 100.0 * rms / torque[j] for j, rms in self.misfit.rms.items() if torque.get(j)}
 
 
 @dataclass(frozen=True)
@@ -86,7 +76,7 @@ class ParameterFile:
     error_percent : float or None
         Relative torque error on held-out data, or on training data where there is none.
     covariance : ndarray, shape (P, P), or None
-        Covariance of the values in their order; None if the file does not have it.
+        Covariance of the values in their order; None in model.yaml.
     terms : mapping of ParameterName to (mapping of str to float)
         Factors of the standard parameters in each value, if the file has them.
     joints : tuple of str
@@ -96,12 +86,10 @@ class ParameterFile:
     scatter : ndarray, shape (K, P)
         Jackknife changes of the values without each of K recordings, whose sum of squares is a
         variance; K is zero if the file does not have them.
-    without_std : mapping of ParameterName to float
-        Values of the parameters without a standard deviation in the file.
     not_shown : frozenset of (name, joint)
         Parameters that the motion did not identify.
     fit : KnownFit or None
-        Torque error and grade of the model, if the file has them.
+        Torque error and grade of the model, if the file is identification.json.
 
     """
 
@@ -114,20 +102,13 @@ class ParameterFile:
     joints: tuple[str, ...] = ()
     kinematics: str = ''
     scatter: FloatArray = field(default_factory=lambda: np.zeros((0, 0)))
-    without_std: Mapping[ParameterName, float] = field(default_factory=dict)
     not_shown: frozenset[tuple[str, str]] = frozenset()
     fit: KnownFit | None = None
 
-    @property
-    def std(self) -> FloatArray:
-        """Return the standard deviations of the values, shape (P,)."""
-        return np.array([std for _, std in self.values.values()])
-
     def covariance_of(self, names: Sequence[ParameterName]) -> FloatArray:
-        """Return the covariance of some values; diagonal if only std is stored."""
+        """Return the covariance of some values."""
+        assert self.covariance is not None
         chosen = self._positions(names)
-        if self.covariance is None:
-            return np.asarray(np.diag(self.std[chosen] ** 2))
         return np.asarray(self.covariance[np.ix_(chosen, chosen)])
 
     def scatter_of(self, names: Sequence[ParameterName]) -> FloatArray:
@@ -235,16 +216,7 @@ def read_parameters(path: str | Path) -> ParameterFile:
         read = parameters_of(str(path), document)
     if document['schema'] != MODEL:
         return read
-    known = _identification_of(path, document)
-    if known is not None:
-        return known
-    described = path.parent / read.robot
-    try:
-        robot = load_robot(str(described) if is_file(described) else read.robot)
-    except ArmidError:
-        return read
-    read_model(text, robot, str(path))  # the file must contain all parameters of the robot
-    return replace(read, joints=robot.joints, kinematics=kinematics_digest(robot))
+    return _identification_of(path, document) or read
 
 
 def _identification_of(path: Path, model: Mapping[str, Any]) -> ParameterFile | None:
@@ -315,17 +287,15 @@ def parameters_of(source: str, document: dict[str, Any]) -> ParameterFile:
     for effect in document.get('effects', []):
         rows += effect['parameters']
     values: dict[ParameterName, tuple[float, float]] = {}
-    without_std: dict[ParameterName, float] = {}
     for row in rows:
         if 'unit' not in row:
             raise ValueError(f"parameter '{row['name']}' of joint '{row['joint']}': no unit")
         name = ParameterName(str(row['name']), str(row['joint']), str(row['unit']))
         which = f'{name.name} of joint {name.joint}'
-        if name in values or name in without_std:
+        if name in values:
             raise ValueError(f'{which} is given twice')
         value = finite(row['value'], which)
         if row.get('std') is None:
-            without_std[name] = value
             continue
         values[name] = value, finite(row['std'], f'the std of {which}')
         if values[name][1] < 0.0:
@@ -336,7 +306,7 @@ def parameters_of(source: str, document: dict[str, Any]) -> ParameterFile:
         for row in document.get('grouping', [])
     ]
     terms = dict(zip(values, grouping, strict=False))
-    scores = [*document.get('validation', []), document.get('training'), document.get('misfit')]
+    scores = [*document.get('validation', []), document.get('training')]
     score = next((score for score in scores if score), None)
     error = None
     if score is not None:
@@ -355,7 +325,6 @@ def parameters_of(source: str, document: dict[str, Any]) -> ParameterFile:
         tuple(str(joint) for joint in about.get('joints', ())),
         str(about.get('kinematics', '')),
         np.array(scatter).reshape(len(scatter), len(values)),
-        without_std,
         frozenset(
             (str(row['name']), str(row['joint']))
             for row in document.get('not_identified', ())
@@ -371,7 +340,7 @@ def _matrix(rows: Sequence[Mapping[str, float]], keys: Sequence[str]) -> FloatAr
 
 def known_fit(document: Mapping[str, Any]) -> KnownFit | None:
     """
-    Read the fit from identification.json or model.yaml; None if absent.
+    Read the fit from identification.json; None if absent.
 
     Raises
     ------
@@ -379,29 +348,20 @@ def known_fit(document: Mapping[str, Any]) -> KnownFit | None:
         If a key or value is missing or wrong.
 
     """
-    block, training = document.get('misfit'), document.get('training')
-    as_diagnosed = block is not None
-    if not as_diagnosed:
-        if not training:
-            return None
-        rms, shares = (
-            {joint: finite(value, f'{key} of {joint}') for joint, value in rows.items()}
-            for key in ('rms', 'joint_relative_error_percent')
-            for rows in [training.get(key) or {}]
-        )
-        torque = {j: 100.0 * left / shares[j] if shares.get(j) else 0.0 for j, left in rms.items()}
-        block = {**training, 'data': 'training', 'rms': rms, 'torque_rms': torque}
-    misfit = misfit_of_block(block)
-    recordings = 1 if as_diagnosed else max(len(training.get('bags', ())), 1)
-    known = KnownFit('', '', misfit, recordings, as_diagnosed)
-    worst = max(known.errors, key=known.errors.__getitem__, default='')
-    error = known.errors.get(worst, misfit.relative_error_percent)
-    where = f' (worst joint: {worst})' if len(known.errors) > 1 else ''
-    reasons = document.get('reasons') or [
-        f'Torque error on {misfit.data} data: {error:.3g} %{where}.'
-    ]
+    training = document.get('training')
+    if not training:
+        return None
+    rms, shares = (
+        {joint: finite(value, f'{key} of {joint}') for joint, value in rows.items()}
+        for key in ('rms', 'joint_relative_error_percent')
+        for rows in [training.get(key) or {}]
+    )
+    torque = {j: 100.0 * left / shares[j] if shares.get(j) else 0.0 for j, left in rms.items()}
+    misfit = misfit_of_block({**training, 'data': 'training', 'rms': rms, 'torque_rms': torque})
+    error = max(shares.values(), default=misfit.relative_error_percent)
     grade = document.get('grade', by_error(error))
-    return replace(known, grade=str(grade), reason=str(reasons[0]))
+    reason = (document.get('reasons') or [f'Torque error on training data: {error:.3g} %.'])[0]
+    return KnownFit(str(grade), str(reason), misfit, max(len(training.get('bags', ())), 1))
 
 
 def _covariance(rows: list[list[float]] | None, size: int) -> FloatArray | None:

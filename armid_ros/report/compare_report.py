@@ -32,7 +32,6 @@ HEADS = ('parameter', 'before', 'after', 'difference, 95 %')
 _WHY = {
     'motion': 'the motion of the {other} does not identify {them}',
     'effect': 'the model of the {other} does not have {them}',
-    'deviation': 'the {other} lacks the standard deviations that {them} need',
     'grouping': 'the data of the {other} group parameters differently',
 }
 
@@ -249,16 +248,6 @@ def _least_visible(changes: Sequence[ParameterChange]) -> str:
 def _not_compared(comparison: Comparison) -> tuple[str, ...]:
     """Return a sentence for each reason why parameters of a side are not compared."""
     lines = []
-    if comparison.left_out:
-        files = ' and '.join(
-            one.source for one in (comparison.before, comparison.after) if one.without_std
-        )
-        verb = 'has' if len(comparison.left_out) == 1 else 'have'
-        lines.append(
-            f'{counted(len(comparison.left_out), "parameter")} {verb} no standard deviation in '
-            f'{files}; '
-            'identification.json of that run has it.'
-        )
     sides = ('first', 'second', comparison.only_before), ('second', 'first', comparison.only_after)
     for side, other, found in sides:
         for why, template in _WHY.items():
@@ -278,16 +267,9 @@ def _beware(comparison: Comparison) -> tuple[str, ...]:
     for given in (comparison.before, comparison.after):
         if given.fit is None:
             lines.append(f'{given.source} has no fit error.')
-        if given.covariance is None:
-            lines.append(
-                f'{given.source} has standard deviations without covariance. Parameters are '
-                'compared one by one, so changes of several parameters together are missed.'
-            )
     fits = comparison.before.fit, comparison.after.fit
     if all(fits) and not comparison.residuals:
-        lines.append(
-            'Residuals are not compared: those of the files are of other rows, or not by joint.'
-        )
+        lines.append('Residuals are not compared: those of the files are not by joint.')
     known = comparison.before.kinematics and comparison.after.kinematics  # one robot, then
     if not known and comparison.before.robot != comparison.after.robot:
         lines.append(

@@ -57,16 +57,6 @@ def score(rms, errors, **others):
     } | others
 
 
-def misfit(rms, torque):
-    return {
-        'unit': 'N m',
-        'data': 'held-out',
-        'rms': {'a': rms},
-        'relative_error_percent': 3.0,
-        'torque_rms': {'a': torque},
-    }
-
-
 def test_what_was_fitted_counts_as_what_was_held_out_may_be_of_a_changed_arm():
     training = score([0.1, 0.2], [1.0, 2.0], bags=['x', 'y', 'z'])
     held_out = [score([0.3, 0.4], [30.0, 40.0], bag='v')]
@@ -80,13 +70,6 @@ def test_a_grade_that_is_written_is_kept_with_its_reason():
     document = {'grade': 'unusable', 'reasons': ['Because.', 'So.']}
     found = known_fit(document | {'training': score([0.1, 0.1], [1.0, 1.0])})
     assert found.unusable and found.reason == 'Because.'
-
-
-@pytest.mark.parametrize(('rms', 'grade'), [(0.1, 'good'), (0.3, 'poor'), (0.6, 'unusable')])
-def test_a_model_alone_is_graded_by_what_it_leaves_of_a_joint(rms, grade):
-    found = known_fit({'misfit': misfit(rms, 1.0)})
-    assert (found.grade, found.as_diagnosed) == (grade, True)
-    assert f'{100.0 * rms:g} %' in found.reason
 
 
 def test_a_file_without_a_score_says_nothing():

@@ -11,8 +11,8 @@ A model has errors in every motion, and other motions give other values. The sca
 between recordings widens the deviations of each joint, if the files contain it. Few recordings
 determine the scatter badly, so tests use Student's distribution, and Fisher's for groups.
 
-If both files have a covariance, the effects of each joint and the links are tested as groups too:
-strongly correlated parameters can differ significantly as a group although no single one does. The
+The effects of each joint and the links are tested as groups too: strongly correlated parameters
+can differ significantly as a group although no single one does. The
 residuals of the two models in each joint are compared (Fisher's F), because a change that
 neither model describes appears in no parameter.
 
@@ -72,19 +72,12 @@ def compare(before: ParameterFile, after: ParameterFile) -> Comparison:
     )
     shared = [name for name in first.values if name in second.values]
     if not shared:
-        for one in (before, after):
-            if not one.values and one.without_std:
-                raise ModelError(
-                    f'{one.source} has no standard deviation of any parameter, so changes cannot '
-                    'be tested; name a result of identify'
-                )
         raise ModelError(
             f'{before.source} and {after.source} have no identified parameter in common; '
             'are they of one robot, with one gravity?'
         )
-    joint = before.covariance is not None and after.covariance is not None
     grouped: dict[tuple[bool, str], list[ParameterName]] = {}
-    for name in shared if joint else ():
+    for name in shared:
         grouped.setdefault((name.rigid, '' if name.rigid else name.joint), []).append(name)
     members = {group: tuple(own) for group, own in grouped.items() if len(own) > 1}
     residuals = residual_changes(before.fit, after.fit)
@@ -99,7 +92,7 @@ def compare(before: ParameterFile, after: ParameterFile) -> Comparison:
     load = None
     rigid = [change for change in changes if change.parameter.rigid]
     body_changed = any(one.changed for one in rigid)
-    if joint and (body_changed or any(one.changed for one in groups if not one.joint)):
+    if body_changed or any(one.changed for one in groups if not one.joint):
         names = [change.parameter for change in rigid]
         terms = [first.terms.get(name, {}) for name in names]
         load = _find_load(terms, *_common_change(first, second, names)[:2])
@@ -113,15 +106,17 @@ def compare(before: ParameterFile, after: ParameterFile) -> Comparison:
         groups,
         load,
         tuple(replace(one, changed=so) for one, so in zip(residuals, significant, strict=True)),
-        tuple(
-            NotCompared(name, 'deviation')
-            for name in dict.fromkeys((*before.without_std, *after.without_std))
-        ),
     )
 
 
 def _require_two_of_one_robot(before: ParameterFile, after: ParameterFile) -> None:
-    """Raise an error if the joints differ, or if both results are the same."""
+    """Raise an error if a covariance lacks, the joints differ, or both results are the same."""
+    for one in (before, after):
+        if one.covariance is None:
+            raise ModelError(
+                f'{one.source} has no covariance of its parameters, so changes cannot be tested; '
+                'name the folder that armid identify wrote'
+            )
     if before.kinematics and after.kinematics and before.kinematics != after.kinematics:
         apart = set(before.joints).symmetric_difference(after.joints)
         how = (
@@ -133,8 +128,7 @@ def _require_two_of_one_robot(before: ParameterFile, after: ParameterFile) -> No
             f'{before.source} and {after.source} are of different robots, {before.robot} and '
             f'{after.robot}: {how}; name two results of one robot'
         )
-    same = before.values == after.values and before.without_std == after.without_std
-    if same and (before.values or before.without_std):
+    if before.values == after.values and before.values:
         copy = '' if before.source == after.source else f' (is {before.source})'
         raise ModelError(
             f'given twice: {after.source}{copy}; name results of two different recordings'
@@ -144,14 +138,12 @@ def _require_two_of_one_robot(before: ParameterFile, after: ParameterFile) -> No
 def _only_in(one: ParameterFile, other: ParameterFile) -> Iterator[NotCompared]:
     """Yield the parameters that only one of two results has."""
     for name in one.values:
-        if name in other.values or name in other.without_std:
+        if name in other.values:
             continue
         if (name.name, name.joint) in other.not_shown:
             yield NotCompared(name, 'motion')
-        elif not name.rigid:
-            yield NotCompared(name, 'effect')
         else:
-            yield NotCompared(name, 'deviation' if other.without_std else 'grouping')
+            yield NotCompared(name, 'grouping' if name.rigid else 'effect')
 
 
 def _single_changes(
@@ -269,12 +261,11 @@ def residual_changes(
     """
     Compare the residuals of two models for each joint.
 
-    Empty if the residuals are not comparable: the misfit of model.yaml and the residual of
-    identification.json come from different rows. Model errors vary slowly, so even many rows
-    contain few independent values of them.
+    Empty if unknown. Model errors vary slowly, so even many rows contain few independent values of
+    them.
 
     """
-    if before is None or after is None or before.as_diagnosed != after.as_diagnosed:
+    if before is None or after is None:
         return ()
     freedoms = FREEDOM * after.recordings, FREEDOM * before.recordings
     found = []
@@ -293,6 +284,13 @@ def residual_changes(
         with np.errstate(over='ignore'):
             square = np.square(ratio)
         p_value = 2.0 * min(stats.f.sf(square, *freedoms), stats.f.cdf(square, *freedoms))
-        errors = before.errors.get(joint), after.errors.get(joint)
-        found.append(ResidualChange(joint, *left, *errors, ratio, min(float(p_value), 1.0)))
+        before_error, after_error = (
+            100.0 * rms / torque if torque else None
+            for rms, torque in zip(left, torques, strict=True)
+        )
+        found.append(
+            ResidualChange(
+                joint, left[0], left[1], before_error, after_error, ratio, min(float(p_value), 1.0)
+            )
+        )
     return tuple(found)

@@ -145,15 +145,14 @@ class NotCompared:
     Attributes
     ----------
     parameter : ParameterName
-    why : {'deviation', 'motion', 'effect', 'grouping'}
-        'deviation': a file has no standard deviation of it, or of a parameter in its group;
+    why : {'motion', 'effect', 'grouping'}
         'motion': the other motion does not identify it; 'effect': the other model lacks the
         effect; 'grouping': the other data group the parameters of links differently.
 
     """
 
     parameter: ParameterName
-    why: Literal['deviation', 'motion', 'effect', 'grouping']
+    why: Literal['motion', 'effect', 'grouping']
 
 
 @dataclass(frozen=True)
@@ -167,10 +166,10 @@ class Comparison:
         The compared results.
     changes : tuple of ParameterChange
         Every parameter of both results, in the order of the first.
-    only_before, only_after, left_out : tuple of NotCompared
-        Parameters missing in the other result, and parameters without a standard deviation.
+    only_before, only_after : tuple of NotCompared
+        Parameters missing in the other result.
     groups : tuple of GroupChange
-        Tests of the effects of every joint and of the rigid body; empty without covariances.
+        Tests of the effects of every joint and of the rigid body.
     load : LoadChange or None
         The load on one link that explains all changes of the rigid body.
     residuals : tuple of ResidualChange
@@ -186,7 +185,6 @@ class Comparison:
     groups: tuple[GroupChange, ...] = ()
     load: LoadChange | None = None
     residuals: tuple[ResidualChange, ...] = ()
-    left_out: tuple[NotCompared, ...] = ()
 
     @property
     def anything(self) -> bool:
@@ -232,7 +230,7 @@ class Comparison:
     @property
     def not_compared(self) -> tuple[NotCompared, ...]:
         """Return every parameter of either result that was not compared."""
-        return (*self.left_out, *self.only_before, *self.only_after)
+        return (*self.only_before, *self.only_after)
 
     @property
     def changed_residuals(self) -> tuple[ResidualChange, ...]:
@@ -287,6 +285,6 @@ class Comparison:
                     {'name': one.parameter.name, 'joint': one.parameter.joint, 'why': one.why}
                     for one in getattr(self, name)
                 ]
-                for name in ('left_out', 'only_before', 'only_after')
+                for name in ('only_before', 'only_after')
             },
         }
