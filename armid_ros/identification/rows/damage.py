@@ -145,19 +145,18 @@ def _suspects(
     """
     dt = np.diff(t)
     period = float(np.median(dt))
-    allowed = quantile(period, x.shape[1])
     gap = dt > MAX_GAP * period
     first = np.where(np.concatenate([[True], gap]), np.arange(len(t)), 0)
     apart = gap[1:] | gap[:-1]
     ratio, (noise, acceleration) = dt[1:] / dt[:-1], growth_over(dt[:-1], dt[1:], period)
-    growth = np.maximum(noise, acceleration)
-    suspect = np.zeros(len(t), dtype=bool)
-    sizes, shares = np.zeros((2, x.shape[1]))
+    growth, allowed = np.maximum(noise, acceleration), quantile(period, x.shape[1])
     # windows of equal length are processed together; the last few samples are in none
     count = max(1, len(ratio) // WINDOW)
     length = len(ratio) // count
-    for signal in range(x.shape[1]):  # the arrays of one signal fit into the cache
-        moves = np.diff(x[:, signal])
+    suspect = np.zeros(len(t), dtype=bool)
+    found = []
+    for signal, least in zip(x.T, floor, strict=True):  # arrays of one signal fit into the cache
+        moves = np.diff(signal)
         error = moves[1:] - ratio * moves[:-1]
         error[apart] = 0.0
         windows = (error / growth)[: count * length].reshape(count, length).T
@@ -167,10 +166,12 @@ def _suspects(
         step = float(smallest_steps(np.abs(moves)[:, np.newaxis])[-1, 0])
         resolution = min(step if np.isfinite(step) else 0.0, float(np.abs(error).max()))
         size = max(scales[loudest], resolution)
-        model = ErrorModel(period, np.array([size]), np.array([white]))
-        limit = np.maximum(model.limits(allowed, noise, acceleration), floor[signal])
+        model = ErrorModel(period, np.array([size]), np.array([white]), allowed)
+        limit = np.maximum(model.limits(noise, acceleration), least)
         # a smooth signal keeps its curvature
         error[1:] -= model.correlation * (error[:-1] / acceleration[:-1]) * acceleration[1:]
         suspect[2:] |= (np.abs(error) > limit) & ~apart
-        sizes[signal], shares[signal] = size, white
-    return np.maximum.accumulate(first), suspect, ErrorModel(period, sizes, shares)
+        found.append((size, white))
+    sizes, shares = np.array(found).T
+    model = ErrorModel(period, sizes, shares, allowed)
+    return np.maximum.accumulate(first), suspect, model

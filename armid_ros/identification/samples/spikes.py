@@ -42,7 +42,6 @@ from armid_ros.identification.samples.straight_line import (
     innovation_of,
     MAX_GAP,
     NoiseLevel,
-    quantile,
     StreamSample,
     unwrapped,
     WINDOW,
@@ -109,7 +108,8 @@ class SpikeGate:
         # second derivative of each signal when an arm at rest begins to move, in these units per
         # second squared: 2 rad/s^2, a jerk of 50 rad/s^3, and a torque at its limit at 1 Hz
         onset = {'q': 2.0, 'v': 50.0, 't': 50.0}
-        self._min_noise = tuple(scale * [least[one] for one in kind] for least in (finest, onset))
+        self._finest = scale * np.array([finest[one] for one in kind])
+        self._onset = scale * np.array([onset[one] for one in kind])
         self._false_alarm_time = false_alarm_time
         self.reset()
 
@@ -123,8 +123,7 @@ class SpikeGate:
         self._last: FloatArray | None = None  # last good sample, also of an earlier stretch
         count = len(self._turn)
         self.lowest, self.highest = np.full(count, np.inf), np.full(count, -np.inf)
-        self._level = NoiseLevel(*self._min_noise)
-        self._min_limits: tuple[ErrorModel, float, FloatArray] | None = None
+        self._level = NoiseLevel(self._finest, self._onset, self._false_alarm_time)
         self._restart([])
 
     def take(self, t: float, x: FloatArray, floor: FloatArray | float = 0.0) -> list[StreamSample]:
@@ -202,7 +201,7 @@ class SpikeGate:
         self._level.set(model)
         self._restart(None if reference else [], reference, curvature)
         if reference:
-            self._set_period(model.period)
+            self._period = model.period
 
     def possible(self, excursion: Excursion, lowest: FloatArray, highest: FloatArray) -> bool:
         """
@@ -233,12 +232,6 @@ class SpikeGate:
         self._jumped: StreamSample | None = None
         self._delayed = None
         self._period = np.inf
-        self._quantile = 0.0
-
-    def _set_period(self, period: float) -> None:
-        """Set the sampling period [s], and the limit of errors that follows from it."""
-        self._period = period
-        self._quantile = quantile(period, len(self._turn), self._false_alarm_time)
 
     @property
     def _tail(self) -> StreamSample | None:
@@ -271,7 +264,7 @@ class SpikeGate:
         """Measure noise and period of the first samples, and check these samples."""
         raw, self._first = self._first or [], None
         first = all_unwrapped(raw, self._turn)
-        self._set_period(float(np.median(np.diff([s.t for s in first]))))
+        self._period = float(np.median(np.diff([s.t for s in first])))
         innovations = self._lines_through(first)
         self._level.begin(innovations, np.diff([s.x for s in first], axis=0), self._period)
         straight = [bool(np.all(self._ratio_to_limit(m) <= 1.0)) for m in innovations]
@@ -373,9 +366,7 @@ class SpikeGate:
 
     def _limits(self, innovation: Innovation) -> FloatArray:
         """Return the largest allowed prediction error of a sample, shape (m,)."""
-        limits = self._level.model.limits(
-            self._quantile, innovation.noise, innovation.acceleration
-        )
+        limits = self._level.model.limits(innovation.noise, innovation.acceleration)
         return np.maximum(limits, self._floor)
 
     def _ratio_to_limit(self, innovation: Innovation) -> FloatArray:
@@ -387,11 +378,8 @@ class SpikeGate:
         """Return whether a sample is within a lower bound of its limits, a fast test."""
         # Limits grow with `noise` and `acceleration`, and in proportion if both grow alike. They
         # are at least the limits over one period times the smaller factor.
-        least, model = self._min_limits, self._level.model
-        if least is None or least[0] is not model or least[1] != self._quantile:
-            over_a_period = model.limits(self._quantile, 1.0, 1.0)
-            self._min_limits = least = model, self._quantile, over_a_period
-        limits = np.maximum(min(innovation.noise, innovation.acceleration) * least[2], self._floor)
+        growth = min(innovation.noise, innovation.acceleration)
+        limits = np.maximum(growth * self._level.model.limits_of_a_period, self._floor)
         return bool((np.abs(innovation.error) <= limits).all())
 
     def _accept(

@@ -90,12 +90,15 @@ class ErrorModel:
         Standard deviation of the errors over a period, in the noisiest window.
     white : ndarray, shape (m,)
         Share of white noise in the squared errors.
+    quantile : float
+        Limit of noise in standard deviations.
 
     """
 
     period: float
     size: FloatArray
     white: FloatArray
+    quantile: float
 
     def growth(self, noise: Factor, acceleration: Factor) -> FloatArray:
         """Return the growth of the errors over other times, shape (m,) or (N, m)."""
@@ -107,9 +110,9 @@ class ErrorModel:
         """Correlation of successive errors, 0 for noise, shape (m,)."""
         return np.clip(1.0 - (1.0 - _NOISE_CORRELATION) * self.white, 0.0, 1.0)
 
-    def limits(self, quantile: float, noise: Factor, acceleration: Factor) -> FloatArray:
+    def limits(self, noise: Factor, acceleration: Factor) -> FloatArray:
         """
-        Return the largest allowed prediction errors, shape (m,) or (N, m).
+        Return the largest allowed prediction errors over other times, shape (m,) or (N, m).
 
         The acceleration of an arm is bounded, unlike noise, which has tails. So the limit of a
         smooth signal is a small multiple of its usual error, not a quantile of the normal
@@ -119,10 +122,15 @@ class ErrorModel:
         # the largest acceleration of an arm is twice its 95 % quantile, which is 1.96 standard
         # deviations of a normal variable
         white, smooth = np.sqrt(self.white), np.sqrt(1.0 - self.white) * (2.0 * 1.96)
-        tails = quantile * self.growth(noise, acceleration)
+        tails = self.quantile * self.growth(noise, acceleration)
         return np.asarray(
-            self.size * np.minimum(tails, quantile * white * noise + smooth * acceleration)
+            self.size * np.minimum(tails, self.quantile * white * noise + smooth * acceleration)
         )
+
+    @cached_property
+    def limits_of_a_period(self) -> FloatArray:
+        """Largest allowed prediction errors over a period, shape (m,)."""
+        return self.limits(1.0, 1.0)
 
 
 class Innovation(NamedTuple):
@@ -219,6 +227,8 @@ class NoiseLevel:
         Best resolution of the signals.
     onset : ndarray, shape (m,)
         Assumed second derivative before the first motion, per second squared.
+    false_alarm_time : float
+        Mean time between two good samples left out by error, in normal noise [s].
 
     Attributes
     ----------
@@ -227,18 +237,15 @@ class NoiseLevel:
 
     """
 
-    def __init__(self, finest: FloatArray, onset: FloatArray) -> None:
-        count = len(finest)
-        self._finest, self._onset = finest, onset
-        self.model = ErrorModel(np.inf, np.zeros(count), np.zeros(count))
+    def __init__(self, finest: FloatArray, onset: FloatArray, false_alarm_time: float) -> None:
+        self._finest, self._onset, self._false_alarm_time = finest, onset, false_alarm_time
+        count = len(self._finest)
+        self.model = ErrorModel(np.inf, np.zeros(count), np.zeros(count), 0.0)
         # a step that occurs three times is the resolution of a signal
         self._min_steps, self._max_error = np.full((3, count), np.inf), np.zeros(count)
         self._sizes, self._shares = np.zeros((2, 600, count))  # windows of a minute at 1 kHz
         self._seen = 0
-        most = WINDOW + MAX_GAP + 1  # held samples are added at once before `settle`
-        self._errors, self._moves = np.empty((2, most, count))
-        self._growths = np.empty((most, 2, 1))
-        self._waiting = 0
+        self._window: list[tuple[Innovation, FloatArray]] = []
 
     def set(self, model: ErrorModel) -> None:
         """Set the usual prediction error."""
@@ -266,37 +273,38 @@ class NoiseLevel:
 
         """
         self.add_steps(moves)
-        self._max_error = np.maximum(
-            self._max_error, np.max(np.abs([m.error for m in innovations]), axis=0)
-        )
+        errors = np.array([one.error for one in innovations])
+        self._max_error = np.maximum(self._max_error, np.abs(errors).max(axis=0))
         if not self._seen:
-            errors = np.array([m.error / max(m.noise, m.acceleration) for m in innovations])
+            errors /= [[max(one.noise, one.acceleration)] for one in innovations]
             # one damaged sample spoils three of the first predictions
-            size = np.maximum(robust_scale(errors, 0.75), self._min_error(period))
-            self.model = ErrorModel(period, size, share_of_noise(errors, size))
+            size = robust_scale(errors, 0.75)
+            self._use(period, size, share_of_noise(errors, np.maximum(size, self._least(period))))
 
     def learn(self, innovation: Innovation, move: FloatArray) -> None:
         """Add the prediction error of an undamaged sample, and its change, shape (m,)."""
-        self._errors[self._waiting] = innovation.error
-        self._growths[self._waiting, :, 0] = innovation.noise, innovation.acceleration
-        self._moves[self._waiting] = move
-        self._waiting += 1
+        self._window.append((innovation, move))
 
     def settle(self, period: float, count: int = WINDOW) -> bool:
         """Update the usual error if a number of errors is known; return whether it was."""
-        if self._waiting < count:
+        if len(self._window) < count:
             return False
-        growths, moves = self._growths[: self._waiting], self._moves[: self._waiting]
-        errors = self._errors[: self._waiting] / self.model.growth(growths[:, 0], growths[:, 1])
-        self._waiting = 0
+        innovations, moves = zip(*self._window, strict=True)
+        self._window = []
+        errors, noise, acceleration = map(np.array, zip(*innovations, strict=True))
+        errors /= self.model.growth(noise[:, np.newaxis], acceleration[:, np.newaxis])
         self._max_error = np.maximum(self._max_error, np.abs(errors).max(axis=0))
         size = robust_scale(errors)
         self._remember(size, share_of_noise(errors, size))
-        self.add_steps(moves)
+        self.add_steps(np.array(moves))
         loudest = np.argmax(self._sizes, axis=0), np.arange(len(size))
-        size = np.maximum(self._sizes[loudest], self._min_error(period))
-        self.model = ErrorModel(period, size, self._shares[loudest])
+        self._use(period, self._sizes[loudest], self._shares[loudest])
         return True
+
+    def _use(self, period: float, size: FloatArray, white: FloatArray) -> None:
+        """Set the usual error, at least the resolution."""
+        allowed = quantile(period, len(size), self._false_alarm_time)
+        self.model = ErrorModel(period, np.maximum(size, self._least(period)), white, allowed)
 
     def _remember(self, size: FloatArray, white: FloatArray) -> None:
         place = self._seen % len(self._sizes)
@@ -309,7 +317,7 @@ class NoiseLevel:
         if ((sizes > 0.0) & (sizes < self._min_steps[-1])).any():  # seldom after the first samples
             self._min_steps = smallest_steps(np.concatenate([self._min_steps, sizes]))
 
-    def _min_error(self, period: float) -> FloatArray:
+    def _least(self, period: float) -> FloatArray:
         """Return the smallest step of every signal, at least the finest and that of an onset."""
         # A fast signal has no small steps, but its resolution causes prediction errors.
         step = np.where(np.isfinite(self._min_steps[-1]), self._min_steps[-1], 0.0)
