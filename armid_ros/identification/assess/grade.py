@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import get_args, NamedTuple
+from typing import NamedTuple
 
 from armid_ros.arm import ArmModel
 from armid_ros.identification.assess.grade_limits import by_error, LIMITS, Word
@@ -29,6 +29,9 @@ from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording
 import numpy as np
 from scipy import stats
+
+#: Order of the reasons of a grade, the worst first.
+_RANK: dict[Word, int] = {'unusable': 0, 'poor': 1, 'good': 2}
 
 
 @dataclass(frozen=True)
@@ -92,15 +95,14 @@ def grade(
         The recordings of `validation`.
 
     """
-    every = [*recordings, *held_out]
+    every, _ = without_damage([*recordings, *held_out], result.used)
     fits = [*result.training, *(fit for part in validation.values() for fit in part)]
     sensors = list(sensor_faults(description, every, fits, result.used))
     # a dead sensor causes other apparent mistakes in its recording
     blind = {fault.source for fault in sensors if fault.word == 'unusable'}
     seeing = [one for one in every if one.source not in blind]
     mistakes = []  # in names, signs, units, encoder zeros, delays or gravity
-    repaired, _ = without_damage(seeing, result.used)
-    for mistake, sources in shared_mistakes(description.body, repaired, result.used):
+    for mistake, sources in shared_mistakes(description.body, seeing, result.used):
         text = mistake.sentence(description.body)
         if len(sources) < len(seeing):
             text = f'in {", ".join(dict.fromkeys(sources))}: {text}'
@@ -122,11 +124,7 @@ def grade(
         *_resting(result, validation),
         *(fault for fault in sensors if fault.word == 'good'),
     ]
-
-    def quality(reason: Fault) -> int:
-        return -get_args(Word).index(reason.word)
-
-    ordered = sorted(reasons, key=quality)
+    ordered = sorted(reasons, key=lambda one: _RANK[one.word])
     error, joint = max((one.measured, one.joint) for one in worst.values())
     return Grade(
         ordered[0].word,
@@ -134,7 +132,7 @@ def grade(
             f'{text[0].upper()}{text[1:]}{"" if text.endswith("?") else "."}'
             for text in (reason.text for reason in ordered)
         ),
-        tuple(fault.text for fault in sorted(faults, key=quality)),
+        tuple(fault.text for fault in ordered if fault in faults),
         error,
         result.arm.robot.joints[joint],
     )

@@ -70,7 +70,7 @@ def sensor_faults(
     arm : ArmModel
         Model to compare the data with.
     recordings : sequence of Recording
-        The unprocessed recordings, with torques.
+        The recordings, with torques and without damaged samples (`damage`).
     rows : sequence of Stretch
         The data in rows.
     used : Conditioning
@@ -101,28 +101,24 @@ def sensor_faults(
 
 
 def _jumps(robot: Robot, recording: Recording) -> Iterator[Fault]:
-    """Yield the first impossible jump of a position that is not reverted."""
+    """Yield the first impossible jump of a position; short excursions are repaired (`damage`)."""
     if len(recording) < 2:
         return
-    # A step is no motion if it is ten times as fast as the limit and as 99 % of all steps. A step
-    # that reverts within ten samples is repaired (`damage`).
+    # a step is no motion if it is ten times as fast as the limit and as 99 % of all steps
     time = np.maximum(np.diff(recording.t), recording.period)[:, np.newaxis]
     steps = np.diff(recording.q, axis=0)
     usual = np.percentile(np.abs(steps) / time, 99.0, axis=0)
     known = np.isfinite(robot.velocity_limit) & (robot.velocity_limit > 0.0)
     limit = np.maximum(usual, np.where(known, robot.velocity_limit, 0.0))
-    jumps = (np.abs(steps) > 10.0 * limit * time) & (limit > 0.0)
-    for row, joint in np.argwhere(jumps).tolist():
-        step, later = steps[row, joint], recording.q[row + 1 :, joint][:11]
-        if abs(later[-1] - recording.q[row, joint]) > 0.5 * abs(step):
-            yield Fault(
-                f'the position of {robot.joints[joint]} jumps by {step:.3g} '
-                f'{robot.position_units[joint]} at {recording.t[row + 1]:.3f} s: leave out the '
-                'faulty part, or record again',
-                'poor',
-                recording.source,
-            )
-            return
+    jumps = np.argwhere((np.abs(steps) > 10.0 * limit * time) & (limit > 0.0))
+    for row, joint in jumps[:1].tolist():
+        yield Fault(
+            f'the position of {robot.joints[joint]} jumps by {steps[row, joint]:.3g} '
+            f'{robot.position_units[joint]} at {recording.t[row + 1]:.3f} s: leave out the '
+            'faulty part, or record again',
+            'poor',
+            recording.source,
+        )
 
 
 def encoder_faults(recording: Recording, units: Sequence[str] | None) -> Iterator[Fault]:

@@ -207,6 +207,17 @@ def test_a_channel_of_torque_that_is_numerically_zero_is_unusable(structure, run
     assert any(f'torque of {run.joints[2]}' in reason for reason in found.reasons)
 
 
+@pytest.mark.parametrize('rows', [slice(500, 501), slice(1000, None)])
+def test_a_position_that_jumps_and_stays_is_a_fault_and_a_damaged_sample_is_none(
+    structure, run, rows
+):
+    q = run.q.copy()
+    q[rows, 1] += 2.0
+    found, _ = graded(structure, [replace(run, q=q)])
+    jumps = [reason for reason in found.reasons if f'{run.joints[1]} jumps' in reason]
+    assert bool(jumps) == (found.word != 'good') == (rows.stop is None)
+
+
 def test_a_clock_that_was_set_back_is_said(structure, run):
     report = ReadReport(messages=3000, samples=2000, restarted=1000)
     found, _ = graded(structure, [replace(run, report=report)])
