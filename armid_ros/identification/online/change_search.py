@@ -64,8 +64,8 @@ class Block:
         Information before the stretch, A = R^T R.
     known_along : ndarray, shape (P, Q)
         A D, with the same D.
-    before, narrow : RecursiveLeastSquares
-        Estimators with and without nuisance parameters at the begin.
+    before : RecursiveLeastSquares
+        Estimator with nuisance parameters at the begin.
     samples : tuple of WeightedSample
         Samples of the stretch, kept to be learned again.
 
@@ -79,7 +79,6 @@ class Block:
     known: FloatArray
     known_along: FloatArray
     before: RecursiveLeastSquares
-    narrow: RecursiveLeastSquares
     samples: tuple[WeightedSample, ...]
 
 
@@ -120,7 +119,7 @@ class ScoreStatistics:
         own = information[sets[:, :, np.newaxis], sets[:, np.newaxis, :]]
         own += _MIN_EIGENVALUE * np.eye(sets.shape[1])
         values = np.linalg.solve(own, score[sets][:, :, np.newaxis])
-        return np.einsum('gp,gp->g', score[sets], values[:, :, 0])
+        return np.asarray(np.einsum('gp,gp->g', score[sets], values[:, :, 0]))
 
     def size(self, some: slice) -> tuple[FloatArray, FloatArray]:
         """

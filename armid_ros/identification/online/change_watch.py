@@ -4,8 +4,9 @@
 Detection of changes during online estimation, such as a load or more friction.
 
 Rows are summed up in blocks of a quarter of a second, which are searched (``change_search``).
-When a change is named, the estimator returns to its state before the change. It removes the
-information on the directions that may have changed, and processes the rows since then again.
+When a change is named, an estimator with nuisance parameters returns to its state before the
+change. It removes the information on the directions that may have changed, and processes the rows
+since then again. The estimator of the arm then has the same state, without nuisance parameters.
 
 Only the update of the estimator runs at once. A change is therefore named some samples after the
 block that made it significant. Until the later rows are processed again, the estimator continues
@@ -17,7 +18,6 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Iterator, Sequence
-from copy import copy
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple, TypeVar
 
@@ -138,7 +138,6 @@ class _Stretch:
     """Rows to be searched; `end` is None before an interruption."""
 
     begin: float
-    narrow: RecursiveLeastSquares
     end: float | None = None
     rows: list[Row] = field(default_factory=list)
 
@@ -220,7 +219,7 @@ class ChangeWatch:
 
     def interrupt(self) -> None:
         """Begin a new stretch of rows after an interruption."""
-        self._open = self._open or _Stretch(0.0, self._estimator.copied())
+        self._open = self._open or _Stretch(0.0)
         self._queue(None)
 
     def update(self, row: Row) -> None:
@@ -228,7 +227,7 @@ class ChangeWatch:
         if self._open is not None and row.t - self._open.begin >= BLOCK_LENGTH:
             self._queue(row.t)
         if self._open is None:
-            self._open = _Stretch(row.t, self._estimator.copied())
+            self._open = _Stretch(row.t)
         self._open.rows.append(row)
         self._estimator.update(*row.sample)
 
@@ -337,7 +336,6 @@ class ChangeWatch:
             known=known,
             known_along=known @ self._search.directions,
             before=before,
-            narrow=stretch.narrow,
             samples=tuple(samples),
         )
 
@@ -345,20 +343,14 @@ class ChangeWatch:
         """Restore the state before a change, reset the changed parameters, report the change."""
         change, before, after = found
         size, reopened = change.size, change.reopened
-        again = copy(self._estimator)
-        for estimator, known, directions in (
-            (self._wider, before.before, self._among_all(reopened)),
-            (again, before.narrow, reopened),
-        ):
-            estimator.restore(known)
-            estimator.reopen(directions)
-            yield
-        later = [sample for block in after for sample in block.samples]
-        yield from self._learn_both(again, later)
+        self._wider.restore(before.before)
+        self._wider.reopen(self._among_all(reopened))
+        yield
+        yield from self._learn(self._wider, [x for block in after for x in block.samples])
         while len(rows := self._unsearched()) > self._at_a_time:
-            yield from self._learn_both(again, (yield from self._widened(rows)))
-        at_once(self._learn_both(again, at_once(self._widened(rows))))
-        self._estimator.restore(again)
+            yield from self._learn(self._wider, (yield from self._widened(rows)))
+        at_once(self._learn(self._wider, at_once(self._widened(rows))))
+        self._estimator.restore(self._wider.restricted(self._count))
         # A change causes unusual motion that no earlier row contains. The covariance is
         # therefore multiplied by the ratio of squared residuals to usual squared residuals.
         squares = count = 0.0
@@ -374,11 +366,6 @@ class ChangeWatch:
         self.changes.append(
             replace(change, size=replace(size, covariance=factor * size.covariance))
         )
-
-    def _learn_both(self, again: RecursiveLeastSquares, samples: Sequence[WeightedSample]) -> Job:
-        yield from self._learn(self._wider, samples)
-        own = [sample._replace(rows=sample.rows[:, : self._count]) for sample in samples]
-        yield from self._learn(again, own)
 
 
 def _parts(items: Sequence[Item], size: int) -> Iterator[Sequence[Item]]:

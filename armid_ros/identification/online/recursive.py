@@ -127,6 +127,16 @@ class RecursiveLeastSquares:
         wider.reset()
         return wider
 
+    def restricted(self, count: int) -> RecursiveLeastSquares:
+        """Return the estimator of the first parameters, with zero for all others."""
+        fewer = copy(self)
+        fewer.parameters, fewer._start = self.parameters[:count], self._start[:count]
+        root, right = self._root[:count, :count].copy('F'), self._root @ self._values
+        fewer._take(root, lapack.dtrtrs(root, right[:count, np.newaxis])[0][:, 0])
+        fewer._squares += float(np.sum(right[count:] ** 2))
+        fewer._freedom += len(self.parameters) - count
+        return fewer
+
     def reset(self) -> None:
         """Reset to the initial state."""
         self.samples = 0

@@ -69,7 +69,7 @@ def learned_and_block(
     products, right = w.T @ w / noise**2, w.T @ tau / noise**2
     known = learned.root.T @ learned.root
     along = products @ directions, known, known @ directions
-    block = Block(0.0, 1.0, products, right, *along, learned, learned, ())
+    block = Block(0.0, 1.0, products, right, *along, learned, ())
     return estimator, block, w, tau
 
 

@@ -163,7 +163,7 @@ def test_resting_arm_neither_forgets_nor_drifts(forgetting, size):
 
 
 def test_with_more_parameters_it_begins_anew_and_equals_batch_of_all():
-    """Whatever it had learned, and its own estimate is not touched."""
+    """Whatever it had learned, and with fewer again it has learned what it had."""
     rows, tau, _ = linear_data(np.random.default_rng(13))
     estimator = feed(RecursiveLeastSquares(names(8)[:5], NOISE), rows[:, :, :5], tau)
     before = estimator.estimate
@@ -172,3 +172,7 @@ def test_with_more_parameters_it_begins_anew_and_equals_batch_of_all():
     w, y = weighted(rows, tau)
     np.testing.assert_allclose(wider.values, np.linalg.lstsq(w, y)[0], rtol=1e-6)
     np.testing.assert_array_equal(estimator.values, before.values)
+    again = wider.restricted(5)
+    np.testing.assert_allclose(again.values, before.values, rtol=1e-6)
+    np.testing.assert_allclose(again.covariance, before.covariance, rtol=1e-6)
+    assert again.variance_factor == pytest.approx(estimator.variance_factor)
