@@ -3,7 +3,6 @@
 """Effects of one's own: registered, named like those that are shipped, and checked."""
 
 from dataclasses import replace
-import doctest
 
 import armid_ros as ar
 from armid_ros.arm import testing
@@ -165,13 +164,3 @@ def test_a_class_without_its_methods_is_refused():
         ar.register(kind)
     with pytest.raises(ar.ArmidError, match='class'):
         ar.register(Hose(('joint1',)))
-
-
-@pytest.mark.parametrize('documented', [ar.register, ar.Quantity, check_effect])
-def test_examples_run(documented):
-    (found,) = doctest.DocTestFinder(recurse=False).find(documented, 'example', globs={})
-    runner = doctest.DocTestRunner()
-    runner.run(found)
-    assert runner.tries > 0
-    assert not runner.failures
-    assert 'hose' not in CATALOGUE
