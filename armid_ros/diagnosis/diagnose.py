@@ -318,7 +318,7 @@ def _not_visible(
 ) -> tuple[str, ...]:
     """Return the effects that are not visible on any joint, in the order of the catalogue."""
     hidden = {name for name, _ in explanation.invisible}
-    hidden -= {one.effect.said_as for one in explanation.candidates}
+    hidden -= {one.effect.name for one in explanation.candidates}
     hidden -= {finding.name for finding in found}
     if explainer.baseline is None:  # effects fitted with every cause have their own values
         hidden -= {one.name for one in with_friction(explainer.arm, explainer.settings.library)[1]}

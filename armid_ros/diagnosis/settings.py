@@ -168,7 +168,7 @@ class DiagnosisSettings:
 
 def log_prior(effect: Effect, robot: Robot, changed: bool) -> float:
     """Return the prior log odds of an effect on certain joints."""
-    names, name = list(CATALOGUE), effect.said_as
+    names, name = list(CATALOGUE), effect.name
     odds = RARER * (names.index(name) if name in CATALOGUE else len(names))
     odds += SHAPE * len(effect.shape)
     if changed and effect.traits.corrects:

@@ -245,11 +245,6 @@ class Effect(ABC):
         return tuple(np.tile(s.grid, (len(self.owners), 1)) for s in self.shapes)
 
     @property
-    def said_as(self) -> str:
-        """Return the name of the effect in the catalogue."""
-        return self.name
-
-    @property
     def owners(self) -> tuple[str, ...]:
         """Joints that each have their own quantities; one empty name for the whole arm."""
         return self.joints or ('',)

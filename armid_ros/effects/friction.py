@@ -193,13 +193,7 @@ class ThermalChange(ThermalFriction):
 
     """
 
-    name = 'thermal_change'
     quantities = (*ThermalFriction.quantities, replace(*ViscousFriction.quantities, lower=-np.inf))
-
-    @property
-    def said_as(self) -> str:
-        """Return the name of the change while the joint warms up."""
-        return ThermalFriction.name
 
     def law(self, x: JointStates) -> tuple[FloatArray, ...]:
         """Return (1 - exp(-t / T)) dq and dq [rad/s]."""

@@ -111,14 +111,9 @@ class GravityVector(_GravityEffect):
 
     """
 
-    name = 'gravity_vector'
+    name = BaseTilt.name
     summary = 'gravity of another direction or size than in the model'
     quantities = tuple(Quantity(f'gravity_difference_{axis}', 'm/s^2') for axis in 'xyz')
-
-    @property
-    def said_as(self) -> str:
-        """Return the name of the effect in the catalogue: tilt of the base."""
-        return BaseTilt.name
 
     def columns(self, motion: Motion, arm: Arm) -> FloatArray:
         """Return dtau/dg of the base's axes [N m per m/s^2], shape (N, n, 3)."""

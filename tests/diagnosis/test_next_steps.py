@@ -96,7 +96,7 @@ def test_a_run_that_tells_the_names_is_the_only_recording_that_is_asked_for():
 
 
 def test_an_effect_of_ones_own_says_it_as_well():
-    hose = SimpleNamespace(said_as='hose', traits=Traits(look_at='the clamps of the hose'))
+    hose = SimpleNamespace(name='hose', traits=Traits(look_at='the clamps of the hose'))
     found = diagnosis('hose', ('elbow',), effects=(hose,))
     assert 'elbow' in next_steps(found)[0] and 'the clamps' in next_steps(found)[0]
     assert len(next_steps(diagnosis('hose', ('elbow',)))) == 1

@@ -65,7 +65,7 @@ def gravity_of(arm):
     """Return gravity as a patched arm has it [m/s^2]."""
     bare = ArmModel(arm.robot)
     for effect in arm.effects:
-        if effect.name in ('base_tilt', 'gravity_magnitude', 'gravity_vector'):
+        if effect.name in ('base_tilt', 'gravity_magnitude'):
             changed = effect.action(arm.values_of(effect), bare).robot
             bare = ArmModel(changed)
     return np.array(bare.robot.gravity)

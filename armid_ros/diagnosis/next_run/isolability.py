@@ -132,5 +132,5 @@ def _detectable(effect: Effect, columns: FloatArray, arm: ArmModel) -> Detectabl
         own = columns[:, k] - others @ (others.T @ columns[:, k])
         size = DETECTABLE_Z / max(float(np.linalg.norm(own)), 1e-300)
         if is_possible(effect, k, size, arm.robot):
-            return Detectable(effect.said_as, effect.joints, parameter, size, 1.0)
-    return Detectable(effect.said_as, effect.joints, None, float('inf'), 0.0)
+            return Detectable(effect.name, effect.joints, parameter, size, 1.0)
+    return Detectable(effect.name, effect.joints, None, float('inf'), 0.0)

@@ -152,7 +152,7 @@ def separation(
     visible = np.linalg.norm(remainder, axis=0) > 1e-6 * np.maximum(scale, 1e-300)
     own = basis_of(remainder[:, visible])
     z = float(np.linalg.norm(residual - own @ (own.T @ residual)))
-    return Separation(named.said_as, rival.said_as, z)
+    return Separation(named.name, rival.name, z)
 
 
 def informative_weight(motion: Motion, rows: float, sigma: FloatArray) -> FloatArray:

@@ -145,11 +145,9 @@ def _look_at(name: str, diagnosis: Diagnosis) -> str:
 
     """
     if name not in CATALOGUE:
-        return next(
-            (own.traits.look_at for own in diagnosis.arm.effects if own.said_as == name), ''
-        )
+        return next((own.traits.look_at for own in diagnosis.arm.effects if own.name == name), '')
     kind, explanation = CATALOGUE[name], diagnosis.explanation
     given = () if explanation is None else explanation.given.effects
-    if kind.traits.usual and name not in {own.said_as for own in given}:
+    if kind.traits.usual and name not in {own.name for own in given}:
         return ''
     return kind.traits.look_at

@@ -217,7 +217,7 @@ class Causes:
             [x[:, :, seen] for x in columns],
             _unit(effect, kept, torque, rows, robot)[seen],
             log_prior(effect, robot, self.changed)
-            + HOW_OFTEN[self.prior.get(effect.said_as, 'usual')],
+            + HOW_OFTEN[self.prior.get(effect.name, 'usual')],
             torque[:, seen],
         )
 

@@ -256,5 +256,5 @@ def survey(
     ]
     seen = tuple(one for one in every if one.visible >= settings.thresholds.least_visible)
     keys = {one.key[:2] for one in seen}
-    places = {(effect.name, effect.joints): effect.said_as for effect in result.effects}
-    return seen, tuple((word, key[1]) for key, word in places.items() if key not in keys)
+    places = dict.fromkeys((effect.name, effect.joints) for effect in result.effects)
+    return seen, tuple(place for place in places if place not in keys)

@@ -156,7 +156,7 @@ def _candidates(explanation: Explanation) -> list[dict[str, Any]]:
     """Return the first candidates of the survey: named causes, then the likeliest others."""
     return [
         {
-            'name': trial.effect.said_as,
+            'name': trial.effect.name,
             'joints': list(trial.effect.joints),
             'share': trial.share,
             'held_out_gain': trial.gain,
@@ -214,13 +214,11 @@ def _detectable_size(trial: Trial, arm: ArmModel) -> tuple[ParameterName, float]
         # two inseparable values have a resolution of at most 0.5 each
         if resolution <= 0.9 or not is_possible(effect, index, size, arm.robot):
             continue
-        if effect.said_as == effect.name:
-            return names[index], size
         values = np.where(np.arange(len(names)) == index, size, 0.0)
         for named, translated in effect.named_as(values, arm):
             largest = int(np.argmax(np.abs(translated)))
             own_size = float(abs(translated[largest]))
-            wanted = named.name == effect.said_as and own_size > 0.0
+            wanted = named.name == effect.name and own_size > 0.0
             if wanted and is_possible(named, largest, own_size, arm.robot):
                 return named.parameters(arm.robot)[largest], own_size
     return names[trial.kept[0]], float('inf')
@@ -248,7 +246,7 @@ def detectable(explanation: Explanation | None) -> tuple[Detectable, ...]:
     for trial in explanation.candidates:
         effect = trial.effect
         parameter, size = _detectable_size(trial, explanation.given)
-        rows.append(Detectable(effect.said_as, effect.joints, parameter, size, trial.visible))
+        rows.append(Detectable(effect.name, effect.joints, parameter, size, trial.visible))
     rows += [
         Detectable(name, joints, None, float('inf'), 0.0) for name, joints in explanation.invisible
     ]

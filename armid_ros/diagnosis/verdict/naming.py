@@ -110,7 +110,7 @@ def small_print(explanation: Explanation) -> tuple[Finding, ...]:
         names = effect.parameters(arm.robot)
         result.append(
             Finding(
-                effect.said_as,
+                effect.name,
                 effect.joints,
                 tuple(names[k] for k in kept),
                 tuple(trial.values.tolist()),
@@ -197,8 +197,8 @@ def _rivals(
         here: dict[str, Trial] = {}
         for rival in sorted(one.rivals, key=lambda rival: -rival.probability):
             effect = rival.effect
-            if not (effect.said_as == own.name and set(effect.joints) <= set(own.joints)):
-                here.setdefault(effect.said_as, rival)
+            if not (effect.name == own.name and set(effect.joints) <= set(own.joints)):
+                here.setdefault(effect.name, rival)
         for name in here.keys() - others:
             best.setdefault(name, []).append(here[name])
     likely = {name: max(trial.probability for trial in found) for name, found in best.items()}

@@ -252,7 +252,7 @@ def candidates_section(diagnosis: Diagnosis) -> ContentSection:
         (
             TableCell(
                 name_in_words(trial.effect.name),
-                'changed' if trial.effect.said_as in names else '',
+                'changed' if trial.effect.name in names else '',
             ),
             ', '.join(trial.effect.joints) or 'whole arm',
             percent(trial.share),
