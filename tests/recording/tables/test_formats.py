@@ -194,59 +194,43 @@ def test_files_side_by_side_hold_columns_of_the_same_rows(motion, tmp_path):
         side_by_side([open_table(tmp_path / f'{n}.csv') for n in ('positions', 'short')])
 
 
-def broken_cell(path, motion):
-    path.write_text(text(motion).replace('\n', '\nx', 1).replace('x0,', 'oops,', 1))
+def edited(lines, row, cell, text):
+    """Return lines of which one has another cell."""
+    cells = lines[row].split(',')
+    cells[cell] = text
+    return [*lines[:row], ','.join(cells), *lines[row + 1 :]]
 
 
-def ragged(path, motion):
-    lines = text(motion).splitlines()
-    lines[7] += ',1'
-    path.write_text('\n'.join(lines))
-
-
-def unnamed(path, motion):
-    lines = text(motion).splitlines()
-    lines[0] = 'time,q1,q2'
-    path.write_text('\n'.join(lines))
-
-
-def holes(path, motion):
-    lines = text(motion).splitlines()
-    lines[50:150] = [line.rsplit(',', 1)[0] + ',' for line in lines[50:150]]
-    path.write_text('\n'.join(lines))
-
-
-def empty_column(path, motion):
-    t, q, *rest = motion
-    path.write_text(text((t, q * [1.0, np.nan], *rest)))
-
-
-def still_clock(path, motion):
-    t, *rest = motion
-    path.write_text(text((0 * t, *rest)))
-
-
-def counter(path, motion):
-    t, *rest = motion
-    path.write_text(text((np.arange(len(t)), *rest)))
+def with_holes(lines):
+    for row in range(50, 150):
+        lines = edited(lines, row, -1, '')
+    return lines
 
 
 @pytest.mark.parametrize(
-    ('write', 'message'),
-    {
-        broken_cell: 'line 2,.* time.*oops',
-        ragged: 'line 8.*8.*7',
-        unnamed: '3.*time, q1, q2.*7.*line 2',
-        holes: '100 of 200.*effort of elbow',
-        empty_column: 'q2',
-        still_clock: 'time',
-        counter: 'time.*--time-unit',
-    }.items(),
-    ids=lambda case: getattr(case, '__name__', ''),
+    ('edit', 'message'),
+    [
+        (lambda lines: edited(lines, 1, 0, 'oops'), 'line 2,.* time.*oops'),
+        (lambda lines: edited(lines, 7, 0, '1,1'), 'line 8.*8.*7'),
+        (lambda lines: ['time,q1,q2', *lines[1:]], '3.*time, q1, q2.*7.*line 2'),
+        (with_holes, '100 of 200.*effort of elbow'),
+    ],
 )
-def test_what_is_wrong_is_named_with_file_line_and_column(write, message, motion, tmp_path):
+def test_what_is_wrong_is_named_with_file_line_and_column(edit, message, motion, tmp_path):
     path = tmp_path / 'run.csv'
-    write(path, motion)
+    path.write_text('\n'.join(edit(text(motion).splitlines())))
+    with pytest.raises(RecordingError, match=f'run.csv: .*{message}'):
+        read_recording(path, joints=JOINTS)
+
+
+@pytest.mark.parametrize(
+    ('time', 'last', 'message'),
+    [(0.005, np.nan, 'q2'), (0.0, 1.0, 'time'), (1.0, 1.0, 'time.*--time-unit')],
+)
+def test_columns_without_a_meaning_are_named(time, last, message, motion, tmp_path):
+    t, q, *rest = motion
+    path = tmp_path / 'run.csv'
+    path.write_text(text((time * np.arange(len(t)), q * [1.0, last], *rest)))
     with pytest.raises(RecordingError, match=f'run.csv: .*{message}'):
         read_recording(path, joints=JOINTS)
 
@@ -268,13 +252,8 @@ def test_a_library_that_is_missing_is_named(motion, tmp_path, monkeypatch):
 
 
 def test_empty_cells_are_counted_and_the_first_is_named_with_its_line(motion, tmp_path):
-    lines = text(motion).splitlines()
-    for row, cell in ((3, 1), (5, 4)):
-        cells = lines[row].split(',')
-        cells[cell] = ''
-        lines[row] = ','.join(cells)
     path = tmp_path / 'run.csv'
-    path.write_text('\n'.join(lines))
+    path.write_text('\n'.join(edited(edited(text(motion).splitlines(), 3, 1, ''), 5, 4, '')))
     (note,) = open_table(path).notes
     assert all(fact in note for fact in ('2 cells', 'line 4', 'q1'))
     lacking = read_recording(path, joints=JOINTS).report.not_finite
