@@ -21,7 +21,7 @@ from __future__ import annotations
 
 from armid_ros.motion import FloatArray
 from armid_ros.simulation.contacts import Contacts, Modes
-from armid_ros.simulation.plant import no_body, NoBodyError, Plant, Rotors, State
+from armid_ros.simulation.plant import no_body, Plant, Rotors, State
 from armid_ros.simulation.springs import ElasticJoints
 import numpy as np
 from scipy.linalg.lapack import dgesv, dposv
@@ -89,7 +89,7 @@ def _end_velocity(
     right[0], right[1:] = force, directions
     _, solution, failed = dposv(inertia, right.T, 0, 0, 1)
     if failed:
-        raise NoBodyError(no_body(plant.robot))
+        raise no_body(plant.robot)
     solution = dt * solution
     dq_free, response = dq + solution[:, 0], solution[:, 1:]
     taken, modes = contacts.torques(directions.dot(response), directions.dot(dq_free), modes)

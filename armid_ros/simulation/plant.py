@@ -24,10 +24,6 @@ import pinocchio as pin
 from scipy.linalg import eigh, LinAlgError
 
 
-class NoBodyError(ModelError):
-    """An arm cannot be simulated because some links are physically impossible."""
-
-
 def require_masses(robot: Robot) -> None:
     """Raise a ModelError that names the links of negative mass, if a robot has any."""
     masses = robot.rigid_parameters[::PER_LINK]
@@ -80,8 +76,8 @@ def require_any_mass(robot: Robot) -> None:
         )
 
 
-def no_body(robot: Robot) -> str:
-    """Return the message on an inertia matrix that is not positive definite."""
+def no_body(robot: Robot) -> ModelError:
+    """Return the error of an inertia matrix that is not positive definite."""
     odd = [
         f"'{name}' ({values[0]:g} kg)"
         for name, values in zip(
@@ -90,7 +86,7 @@ def no_body(robot: Robot) -> str:
         if np.any(values) and np.linalg.eigvalsh(pseudo_inertia(values))[0] < 0.0
     ]
     links = f'links {", ".join(odd)} are not possible bodies; ' if odd else ''
-    return (
+    return ModelError(
         f'{links}the inertia matrix is not positive definite: identify with --physical, or '
         'correct the description'
     )
@@ -207,7 +203,7 @@ class Plant:
     ) -> None:
         if not (math.isfinite(dt) and dt > 0.0):
             raise ModelError(f'the step has to be a positive time, not {dt} s')
-        self.arm, self.dt, self.hard_stops, self.elasticity = arm, dt, hard_stops, elasticity
+        self.arm, self.dt, self.hard_stops = arm, dt, hard_stops
         self.action: Action = arm.action()
         self.robot: Robot = self.action.robot or arm.robot
         robot, n = self.robot, self.robot.n_joints
@@ -349,7 +345,7 @@ def _damping_weight(robot: Robot, inertia: FloatArray, damping: FloatArray, dt: 
     try:
         rates = eigh((damping + damping.T) / 2, inertia, eigvals_only=True)
     except LinAlgError:
-        raise NoBodyError(no_body(robot)) from None
+        raise no_body(robot) from None
     z = dt * float(rates[-1])
     if z < 1e-3:
         return 0.5

@@ -5,7 +5,7 @@
 from armid_ros.arm import ArmModel
 from armid_ros.effects import make_effect
 from armid_ros.errors import TrajectoryError
-from armid_ros.simulation import Plant, Reference, Sensors, simulate, SimulatedArm
+from armid_ros.simulation import Reference, Sensors, simulate, SimulatedArm
 import numpy as np
 import pytest
 
@@ -51,19 +51,6 @@ def test_without_a_trajectory_it_stands_still(arm) -> None:
     assert (sample.steps, sample.t) == (1000, 1.0)
     np.testing.assert_array_equal(arm.state.q, MIDDLE)
     np.testing.assert_array_equal(arm.state.dq, 0.0)
-
-
-@pytest.mark.parametrize('stride', [1, 5, 7])
-def test_it_reads_what_simulate_records(model, stride: int) -> None:
-    reference = there_and_back(model.robot.joints)
-    rng = np.random.default_rng(3)
-    run = simulate(Plant(model, dt=1.0 / 700), reference, rng=rng, sensors=SENSORS, rate=100.0)
-    rng = np.random.default_rng(3)
-    arm = SimulatedArm(Plant(model, dt=1.0 / 700), rng=rng, start=MIDDLE)
-    arm.set_trajectory(reference)
-    for _ in range(0, 700, stride):
-        arm.advance(stride)
-    np.testing.assert_allclose(arm.state.q, run.truth.q[100], atol=1e-8)
 
 
 def test_noise_and_delay_are_those_of_simulate_sample_by_sample(model) -> None:
@@ -120,15 +107,6 @@ def test_it_goes_to_a_first_point_that_is_later(arm) -> None:
     np.testing.assert_allclose(arm.state.q, MIDDLE + 0.15, atol=5e-3)
     arm.advance(2000)
     np.testing.assert_allclose(arm.state.q, MIDDLE + 0.3, atol=5e-3)
-
-
-def test_a_new_trajectory_takes_the_place_of_the_old_one(arm) -> None:
-    arm.set_trajectory(there_and_back(arm.joints, first=0.1))
-    arm.advance(700)
-    end = Reference(arm.joints, np.array([1.0]), MIDDLE[np.newaxis], np.zeros((1, 6)))
-    arm.set_trajectory(end)
-    arm.advance(1500)
-    np.testing.assert_allclose(arm.state.q, MIDDLE, atol=5e-3)
 
 
 def bad_trajectories(joints):
