@@ -14,7 +14,7 @@ from armid_ros.errors import ArmidError, RecordingError
 from armid_ros.excitation.supervision import jump_fault, MeasuredPose
 from armid_ros.nodes.base import ArmidNode
 from armid_ros.nodes.messages.classes import message_class
-from armid_ros.nodes.parameters.table import NodeParameter
+from armid_ros.nodes.parameters.table import NodeParameter, setting
 from armid_ros.nodes.qos import offered
 from armid_ros.nodes.running.process import run
 from armid_ros.recording.bag import Bag
@@ -111,48 +111,34 @@ class BagPlayerNode(ArmidNode):
     table = (
         NodeParameter('bag', '', 'Bag to play: a rosbag2 directory, or a .mcap or .db3 file.'),
         NodeParameter('topics', [''], 'Topics to play; all if empty.'),
-        NodeParameter(
-            'rate',
-            1.0,
-            'Bag time per real time; no effect with use_sim_time.',
-            limits=(0.001, 1000.0),
-            read_only=False,
+        setting(
+            'rate', 1.0, 'Bag time per real time, without use_sim_time.', limits=(0.001, 1000.0)
         ),
-        NodeParameter(
-            'loop', False, 'Play again from the beginning at the end of the bag.', read_only=False
+        setting('loop', False, 'Play again from the beginning at the end of the bag.'),
+        setting(
+            'clock_rate', 0.0, 'Rate of bag time on /clock; 0: never.', 'Hz', limits=(0.0, 10000.0)
         ),
-        NodeParameter(
-            'clock_rate',
-            0.0,
-            'Rate at which bag time is published on /clock; 0: never.',
-            'Hz',
-            limits=(0.0, 10000.0),
-            read_only=False,
-        ),
-        NodeParameter(
+        setting(
             'subscriber_timeout',
             2.0,
             'How long to wait for a subscriber of every topic, and for joint states of the arm '
             'that follows a trajectory.',
             's',
             limits=(0.0, 3600.0),
-            read_only=False,
         ),
-        NodeParameter(
+        setting(
             'start_tolerance',
             0.01,
             'Largest distance of a joint from the first point of a trajectory.',
             'rad or m',
             limits=(0.0001, 1.0),
-            read_only=False,
         ),
-        NodeParameter(
+        setting(
             'state_timeout',
             0.5,
-            'Age at which a joint state is out of date.',
+            'Age of a joint state that is out of date.',
             's',
             limits=(0.01, 60.0),
-            read_only=False,
         ),
     )
 

@@ -60,14 +60,10 @@ class IdentificationRunNode(ArmidNode):
             'joints', [''], 'Driven joints; if empty, all joints except those of grippers.'
         ),
         NodeParameter(
-            'effects',
-            [''],
-            'Effects added to the rigid body; without names, the default of armid.',
+            'effects', [''], 'Effects added to the rigid body; empty: the default of armid.'
         ),
         NodeParameter(
-            'save_to',
-            'identification',
-            'Folder for the subfolders identification and diagnosis.',
+            'save_to', 'identification', 'Folder for the subfolders identification and diagnosis.'
         ),
         NodeParameter('runs', 2, 'Number of runs of the excitation.', limits=(1, 20)),
         NodeParameter(

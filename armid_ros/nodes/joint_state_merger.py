@@ -49,9 +49,7 @@ class JointStateMergerNode(ArmidNode):
             'Joints to publish, in this order; empty: the driven joints of robot_description.',
         ),
         NodeParameter(
-            'position_topics',
-            ['joint_states'],
-            'JointState topics with positions of some or all joints.',
+            'position_topics', ['joint_states'], 'JointState topics with positions of joints.'
         ),
         NodeParameter(
             'effort_topic',
@@ -61,9 +59,7 @@ class JointStateMergerNode(ArmidNode):
             'the effort of the position topics.',
         ),
         NodeParameter(
-            'effort_interface',
-            'effort',
-            'Interface of a DynamicJointState to read, such as effort or current.',
+            'effort_interface', 'effort', 'DynamicJointState interface, such as effort or current.'
         ),
         NodeParameter(
             'effort_joints',

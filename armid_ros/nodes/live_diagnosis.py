@@ -24,7 +24,7 @@ from armid_ros.nodes.listening import ListeningNode, ROBOT_PARAMETERS
 from armid_ros.nodes.live import Answer, Assistant, LiveDiagnosis, LiveSettings
 from armid_ros.nodes.live.assistant import Plan, Save
 from armid_ros.nodes.messages.joint_states import JointSample
-from armid_ros.nodes.parameters.table import NodeParameter
+from armid_ros.nodes.parameters.table import NodeParameter, setting
 from armid_ros.nodes.qos import LATCHED
 from armid_ros.nodes.running.process import run
 from diagnostic_msgs.msg import DiagnosticStatus
@@ -39,51 +39,25 @@ _LEVELS = {
 
 #: Parameters for the fields of LiveSettings; they can be set at run time.
 LIVE_SETTINGS = (
-    NodeParameter(
-        'window',
-        20.0,
-        'Longest motion that is diagnosed; a change empties the window.',
-        's',
-        limits=(4.0, 600.0),
-        read_only=False,
+    setting(
+        'window', 20.0, 'Longest diagnosed motion; a change empties it.', 's', limits=(4.0, 600.0)
     ),
-    NodeParameter(
-        'shortest',
-        8.0,
-        'Shortest motion after a change of the arm that is diagnosed.',
-        's',
-        limits=(2.0, 600.0),
-        read_only=False,
+    setting(
+        'shortest', 8.0, 'Shortest diagnosed motion after a change.', 's', limits=(2.0, 600.0)
     ),
-    NodeParameter(
-        'every',
-        4.0,
-        'Length of motion between two diagnoses.',
-        's',
-        limits=(0.5, 3600.0),
-        read_only=False,
-    ),
-    NodeParameter(
-        'rate',
-        200.0,
-        'Samples per second that are kept of the joint states.',
-        'Hz',
-        limits=(10.0, 2000.0),
-        read_only=False,
-    ),
-    NodeParameter(
+    setting('every', 4.0, 'Length of motion between two diagnoses.', 's', limits=(0.5, 3600.0)),
+    setting('rate', 200.0, 'Joint states that are kept per second.', 'Hz', limits=(10.0, 2000.0)),
+    setting(
         'confirmations',
         2,
         'Diagnoses in a row that must agree on an effect before it is proposed.',
         limits=(1, 100),
-        read_only=False,
     ),
-    NodeParameter(
+    setting(
         'material',
         0.01,
         "Share of a joint's torque (rms) below which an effect does not matter.",
         limits=(0.0, 1.0),
-        read_only=False,
     ),
 )
 
@@ -107,14 +81,10 @@ class LiveDiagnosisNode(ListeningNode):
     table = (
         *ROBOT_PARAMETERS,
         NodeParameter(
-            'model',
-            '',
-            'model.yaml of the arm; empty: the robot description and the effects.',
+            'model', '', 'model.yaml of the arm; empty: the robot description and the effects.'
         ),
         NodeParameter(
-            'effects',
-            [''],
-            'Known effects of the arm, each as NAME[@joint+joint]:quantity=value.',
+            'effects', [''], 'Known effects of the arm, each as NAME[@joint+joint]:quantity=value.'
         ),
         NodeParameter('baseline', [''], 'Bags of the baseline.'),
         NodeParameter(
@@ -127,11 +97,10 @@ class LiveDiagnosisNode(ListeningNode):
             limits=(0.0, 600.0),
         ),
         *LIVE_SETTINGS,
-        NodeParameter(
+        setting(
             'save_to',
             'live_diagnosis',
-            'Folder that ~/save writes to: diagnosis.json, model.yaml, report.html.',
-            read_only=False,
+            'Folder of ~/save: diagnosis.json, model.yaml, report.html.',
         ),
         NodeParameter('seed', 0, 'Random seed of the diagnoses.', limits=(0, 2**62)),
     )

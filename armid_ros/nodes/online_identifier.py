@@ -28,7 +28,7 @@ from armid_ros.nodes.base import key_values
 from armid_ros.nodes.listening import ListeningNode, ROBOT_PARAMETERS
 from armid_ros.nodes.messages.estimates import estimate_message, estimate_values
 from armid_ros.nodes.messages.joint_states import DISTURBANCES, JointSample
-from armid_ros.nodes.parameters.table import NodeParameter
+from armid_ros.nodes.parameters.table import NodeParameter, setting
 from armid_ros.nodes.qos import LATCHED, STREAM
 from armid_ros.nodes.running.process import run
 from diagnostic_msgs.msg import DiagnosticStatus
@@ -65,18 +65,10 @@ class OnlineIdentifierNode(ListeningNode):
             'Effects to estimate with the rigid body, each as NAME[@joint+joint].',
         ),
         NodeParameter(
-            'cutoff',
-            5.0,
-            'Cut-off of the low-pass filter of torque and regressor.',
-            'Hz',
-            limits=(0.01, 1000.0),
+            'cutoff', 5.0, 'Low-pass cut-off of torque and regressor.', 'Hz', limits=(0.01, 1000.0)
         ),
-        NodeParameter(
-            'forgetting',
-            1.0,
-            'Forgetting factor per used sample; 1: no forgetting.',
-            limits=(0.9, 1.0),
-            read_only=False,
+        setting(
+            'forgetting', 1.0, 'Forgetting factor per used sample; 1: none.', limits=(0.9, 1.0)
         ),
         NodeParameter(
             'torque_noise',
@@ -84,38 +76,25 @@ class OnlineIdentifierNode(ListeningNode):
             'Standard deviation of a torque sample, one per joint; [0.0]: from the residuals.',
             'N m or N',
         ),
-        NodeParameter(
-            'max_gap',
-            10,
-            'Longest gap that is interpolated.',
-            limits=(1, 1000),
-            read_only=False,
-        ),
+        setting('max_gap', 10, 'Longest gap that is interpolated.', limits=(1, 1000)),
         NodeParameter(
             'measured_velocity', False, 'Differentiate the measured velocity, not the position.'
         ),
-        NodeParameter(
+        setting(
             'false_alarm_time',
             360000.0,
             'Mean time between false reports of a change; 0: no search for changes.',
             's',
             limits=(0.0, 1e9),
-            read_only=False,
         ),
-        NodeParameter(
-            'estimate_rate',
-            10.0,
-            'Publishing rate of ~/estimate.',
-            'Hz',
-            limits=(0.1, 1000.0),
-            read_only=False,
+        setting(
+            'estimate_rate', 10.0, 'Publishing rate of ~/estimate.', 'Hz', limits=(0.1, 1000.0)
         ),
-        NodeParameter(
+        setting(
             'save_to',
             '',
             'Folder that ~/save and the end of the node write to: estimate.yaml, model.yaml, '
             f'robot.urdf; empty: ~/save alone writes, to {_FOLDER}.',
-            read_only=False,
         ),
     )
 

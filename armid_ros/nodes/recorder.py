@@ -17,7 +17,7 @@ from armid_ros.errors import ArmidError, RecordingEnded, RecordingError
 from armid_ros.files import size_text
 from armid_ros.nodes.base import ArmidNode, LOOK_PERIOD
 from armid_ros.nodes.messages.classes import message_class
-from armid_ros.nodes.parameters.table import NodeParameter
+from armid_ros.nodes.parameters.table import NodeParameter, setting
 from armid_ros.nodes.qos import MatchedSubscription, recorded
 from armid_ros.nodes.running.process import run
 from armid_ros.recording import BagWriter
@@ -38,42 +38,29 @@ class RecorderNode(ArmidNode):
     """
 
     table = (
-        NodeParameter(
+        setting(
             'bag',
             '',
             'Directory to write; empty: armid_<date>_<time> in the current directory. A '
             'name set while a bag is open applies to the next bag.',
-            read_only=False,
         ),
-        NodeParameter(
-            'topics',
-            [''],
-            'Topics to record; if empty, all published topics.',
-            read_only=False,
-        ),
+        setting('topics', [''], 'Topics to record; if empty, all published topics.'),
         NodeParameter('record', True, 'Record from the start, without waiting for ~/start.'),
-        NodeParameter(
+        setting(
             'compression',
             'zstd',
             'Compression of the chunks; a change applies to the next bag.',
             choices=('zstd', 'lz4', 'none'),
-            read_only=False,
         ),
-        NodeParameter(
+        setting(
             'min_free',
             50.0,
             'Free disk space below which the bag is completed and the node ends.',
             'MB',
             limits=(0.0, 1e6),
-            read_only=False,
         ),
-        NodeParameter(
-            'chunk_age',
-            0.1,
-            'Age at which a chunk is written out.',
-            's',
-            limits=(0.01, 60.0),
-            read_only=False,
+        setting(
+            'chunk_age', 0.1, 'Age at which a chunk is written out.', 's', limits=(0.01, 60.0)
         ),
     )
 

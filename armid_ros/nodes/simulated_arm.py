@@ -20,7 +20,7 @@ from armid_ros.nodes.parameters.arm import (
     sensors_of,
     with_effects,
 )
-from armid_ros.nodes.parameters.table import NodeParameter
+from armid_ros.nodes.parameters.table import setting
 from armid_ros.nodes.qos import LATCHED, SAMPLES, STREAM
 from armid_ros.nodes.running.process import run
 from armid_ros.nodes.running.real_time import RealTime
@@ -100,29 +100,20 @@ class SimulatedArmNode(ArmidNode):
 
     table = (
         *ARM_PARAMETERS,
-        NodeParameter(
-            'rate',
-            1000.0,
-            'Publishing rate of joint_states.',
-            'Hz',
-            limits=(0.1, 100000.0),
-            read_only=False,
-        ),
-        NodeParameter(
+        setting('rate', 1000.0, 'Publishing rate of joint_states.', 'Hz', limits=(0.1, 100000.0)),
+        setting(
             'real_time_factor',
             1.0,
             'Simulated time per real time, if the computer is fast enough; slow subscribers lose '
             'messages. 0: moves only on request.',
             limits=(0.0, 1000.0),
-            read_only=False,
         ),
-        NodeParameter(
+        setting(
             'clock_rate',
             100.0,
             'Rate of /clock in simulated time; at most the rate of joint_states.',
             'Hz',
             limits=(0.1, 100000.0),
-            read_only=False,
         ),
     )
 

@@ -8,7 +8,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 from armid_ros.arm import ArmModel
-from armid_ros.nodes.parameters.table import NodeParameter, Values
+from armid_ros.nodes.parameters.table import NodeParameter, setting, Values
 from armid_ros.recording.columns import per_joint
 from armid_ros.robots import parse_gravity
 from armid_ros.simulation import Sensors
@@ -22,22 +22,17 @@ ARM_PARAMETERS = (
         check=lambda text: text and parse_gravity(text),
     ),
     NodeParameter('model', '', 'Path of a model.yaml; empty: the description and the effects.'),
-    NodeParameter(
+    setting(
         'effects',
         [''],
         'Effects, each as NAME[@joint+joint]:quantity=value,quantity=value; set on the running '
         'node, the arm continues with them.',
-        read_only=False,
     ),
     NodeParameter(
-        'start',
-        '',
-        'Initial position, as q1,q2,...; empty: middle of the position limits [rad or m].',
+        'start', '', 'Initial position q1,q2,...; empty: middle of the limits [rad or m].'
     ),
     *(
-        NodeParameter(
-            name, [0.0], f'{what}, one or one per joint; 0: none.', unit, read_only=False
-        )
+        setting(name, [0.0], f'{what}, one or one per joint; 0: none.', unit)
         for name, what, unit in (
             ('torque_noise', 'Standard deviation', 'N m or N'),
             ('position_noise', 'Standard deviation', 'rad or m'),
@@ -49,10 +44,7 @@ ARM_PARAMETERS = (
         'torque_delay', 0, 'Delay of the torque measurement in time steps.', limits=(0, 100000)
     ),
     NodeParameter(
-        'loop_gain',
-        1.0,
-        'Factor on the gains of the velocity loops of elastic joints.',
-        limits=(0.0, 10.0),
+        'loop_gain', 1.0, 'Factor on the loop gains of elastic joints.', limits=(0.0, 10.0)
     ),
     NodeParameter('seed', 0, 'Random seed of the noise.', limits=(0, 2**62)),
     NodeParameter('time_step', 0.001, 'Time step of the integration.', 's', limits=(1e-5, 0.01)),

@@ -23,7 +23,7 @@ from armid_ros.excitation import (
 from armid_ros.excitation.feasibility import excitation_faults
 from armid_ros.files import reading
 from armid_ros.nodes.parameters.arm import with_effects
-from armid_ros.nodes.parameters.table import NodeParameter, Values
+from armid_ros.nodes.parameters.table import NodeParameter, setting, Values
 from armid_ros.robots import load_arms, load_robot
 import numpy as np
 
@@ -46,12 +46,11 @@ PUBLISHER_PARAMETERS = (
     NodeParameter('joints', [''], 'Driven joints; if empty, the joints of arms.'),
     NodeParameter('joint_limits', '', 'joint_limits.yaml of MoveIt; empty: none.'),
     NodeParameter('velocity', [''], 'Velocity limits, joint:=value [rad/s or m/s].'),
-    NodeParameter(
+    setting(
         'file',
         '',
         'Excitation to use (.yaml); empty: design one. A file set at run time is run by '
         'the next ~/start.',
-        read_only=False,
     ),
     NodeParameter(
         'duration', 44.0, 'Length of the run, from rest to rest.', 's', limits=(1.0, 3600.0)
@@ -66,11 +65,7 @@ PUBLISHER_PARAMETERS = (
         'default in a simulation. A file keeps its own.',
         choices=tuple(SPEED_CLASSES),
     ),
-    NodeParameter(
-        'effects',
-        USUAL.split(','),
-        'Effects to excite, with the rigid body.',
-    ),
+    NodeParameter('effects', USUAL.split(','), 'Effects to excite, with the rigid body.'),
     NodeParameter('clearance', 0.01, 'Distance kept between bodies.', 'm', limits=(0.0, 1.0)),
     NodeParameter(
         'floor',
@@ -87,12 +82,7 @@ PUBLISHER_PARAMETERS = (
     NodeParameter(
         'design_time', 20.0, 'Limit of processor time of the search.', 's', limits=(1.0, 86400.0)
     ),
-    NodeParameter(
-        'seed',
-        0,
-        'Random seed of the search; the same gives the same trajectory.',
-        limits=(0, 2**62),
-    ),
+    NodeParameter('seed', 0, 'Random seed of the search.', limits=(0, 2**62)),
     NodeParameter(
         'interface',
         'auto',
@@ -107,46 +97,41 @@ PUBLISHER_PARAMETERS = (
         'Name of the action; empty: follow_joint_trajectory in the namespace of the topic '
         'joint_trajectory.',
     ),
-    NodeParameter(
+    setting(
         'goal_tolerance',
         0.0,
         'Largest distance of a joint from the end of a goal that is reached; 0: default of the '
         'controller. Its path tolerance is tracking_tolerance.',
         'rad or m',
         limits=(0.0, 10.0),
-        read_only=False,
     ),
-    NodeParameter(
+    setting(
         'goal_time_tolerance',
         0.0,
         'Largest delay of the end of the run; 0: default of the controller.',
         's',
         limits=(0.0, 60.0),
-        read_only=False,
     ),
     NodeParameter('rate', 100.0, 'Waypoints per second.', 'Hz', limits=(1.0, 1000.0)),
-    NodeParameter(
+    setting(
         'approach',
         3.0,
         'Shortest time of the approach to the first point; longer if distance and limits '
         'require it.',
         's',
         limits=(0.1, 60.0),
-        read_only=False,
     ),
-    NodeParameter(
+    setting(
         'speed_scaling',
         1.0,
-        'Share of the planned speed at which ~/start runs the excitation.',
+        'Speed of ~/start as a share of the planned speed.',
         limits=(0.1, 1.0),
-        read_only=False,
     ),
-    NodeParameter(
+    setting(
         'rehearsal_speed',
         0.2,
-        'Share of the planned speed at which ~/rehearse runs the excitation.',
+        'Speed of ~/rehearse as a share of the planned speed.',
         limits=(0.05, 1.0),
-        read_only=False,
     ),
     NodeParameter(
         'zero_stamp',
@@ -154,14 +139,13 @@ PUBLISHER_PARAMETERS = (
         'Stamp the run with zero, so that the controller begins at once: for clocks of this '
         'computer and of the robot that differ. Stops are always stamped with zero.',
     ),
-    NodeParameter(
+    setting(
         'stopping',
         0.5,
         'Time in which the arm is brought to rest; longer if its limits require it. Without '
         'zero_stamp the arm is not started where clocks differ by more than a tenth of it.',
         's',
         limits=(0.1, 10.0),
-        read_only=False,
     ),
     SIMULATION,
     NodeParameter(
@@ -170,30 +154,27 @@ PUBLISHER_PARAMETERS = (
         'Begin without ~/start, as soon as joint states arrive and a controller subscribes; true '
         'by default in a simulation only.',
     ),
-    NodeParameter(
+    setting(
         'tracking_tolerance',
         0.2,
         'The arm is stopped if a joint is further from its planned position.',
         'rad or m',
         limits=(0.001, 10.0),
-        read_only=False,
     ),
-    NodeParameter(
+    setting(
         'effort_factor',
         3.0,
         'Factor over the planned effort of a joint, and over 10 % of its limit, at which the '
         'arm is stopped after three samples. 0: never, the default in a simulation.',
         limits=(0.0, 1000.0),
-        read_only=False,
     ),
-    NodeParameter(
+    setting(
         'state_timeout',
         0.5,
         'The arm is stopped, and not started, without a joint state for so long; 5 s by default '
         'in a simulation.',
         's',
         limits=(0.01, 10.0),
-        read_only=False,
     ),
     NodeParameter(
         'subscriber_timeout',

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
+from functools import partial
 import math
 from typing import Any
 
@@ -127,6 +128,10 @@ class NodeParameter:
             except ArmidError as error:
                 return f"parameter '{self.name}': {error}"
         return ''
+
+
+#: Parameter that can be set while the node runs, with the arguments of `NodeParameter`.
+setting = partial(NodeParameter, read_only=False)
 
 
 class ParameterError(ArmidError):
