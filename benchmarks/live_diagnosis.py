@@ -29,7 +29,7 @@ from armid_ros.arm import ArmModel
 from armid_ros.effects import CATALOGUE, parse_effect
 from armid_ros.motion import Motion
 from armid_ros.nodes.live import LiveDiagnosis, LiveSettings, Worker
-from armid_ros.nodes.live.assistant import Job, Result
+from armid_ros.nodes.live.assistant import Result
 from armid_ros.nodes.live_diagnosis import LiveDiagnosisNode
 from armid_ros.nodes.lockstep import EPOCH_NS, Stage
 from armid_ros.nodes.simulated_arm import SimulatedArmNode
@@ -101,10 +101,10 @@ class Unhurried:
         """Return whether an answer is pending."""
         return self._result is not None
 
-    def ask(self, job: Job) -> None:
-        """Run a diagnosis, and set the time of its answer."""
+    def ask(self, task: str, argument: object) -> None:
+        """Run a task, and set the time of its answer."""
         begun = time.process_time()
-        self._result = self._worker.run(job)
+        self._result = self._worker.run(task, argument)
         self._due = self.now + time.process_time() - begun
 
     def poll(self) -> Result | None:

@@ -15,14 +15,13 @@ from armid_msgs.msg import Diagnosis
 from armid_ros.api.arguments import read_recording, source_of
 from armid_ros.arm import ArmModel, load_misfit, load_model
 from armid_ros.arm.model_file import model_text
-from armid_ros.diagnosis import Finding
 from armid_ros.errors import IdentificationError, ModelError
 from armid_ros.estimate import name_in_words
 from armid_ros.files.output import refuse_replacing
 from armid_ros.nodes.base import key_values
 from armid_ros.nodes.listening import ListeningNode, ROBOT_PARAMETERS
 from armid_ros.nodes.live import Answer, Assistant, LiveDiagnosis, LiveSettings
-from armid_ros.nodes.live.assistant import Plan, Save
+from armid_ros.nodes.live.assistant import FILES
 from armid_ros.nodes.messages.joint_states import JointSample
 from armid_ros.nodes.parameters.table import NodeParameter, setting
 from armid_ros.nodes.qos import LATCHED
@@ -169,14 +168,14 @@ class LiveDiagnosisNode(ListeningNode):
         """Start to write the last diagnosis; its end is logged."""
         self._require_diagnosis()
         folder = self.folder('save_to')
-        refuse_replacing(folder, Save.FILES)
-        self._helper.ask(Save(folder))
-        return f'writing {", ".join(Save.FILES)} to {folder}'
+        refuse_replacing(folder, FILES)
+        self._helper.ask('save', folder)
+        return f'writing {", ".join(FILES)} to {folder}'
 
     def next_run(self) -> str:
         """Start to plan the motion that separates the candidates, for ~/experiment."""
         self._require_diagnosis()
-        self._helper.ask(Plan(self.value('seed')))
+        self._helper.ask('plan', self.value('seed'))
         return f'planning; the motion goes out on {self._runs.topic_name}'
 
     def look(self) -> None:
@@ -195,7 +194,7 @@ class LiveDiagnosisNode(ListeningNode):
         if learning and not live.learning:
             self.tell('the misfit of the model is known; diagnoses begin')
         if live.due and not self._helper.busy:
-            self._helper.ask(live.request())
+            self._helper.ask('diagnose', live.request())
 
     def take_answer(self) -> bool:
         """Handle a result of the process; return whether there was one."""
@@ -204,12 +203,13 @@ class LiveDiagnosisNode(ListeningNode):
             return False
         if isinstance(result, Answer):
             self._take(result)
-        elif not result.success:
-            self.complaints.say('diagnosis', result.text)
+        elif isinstance(result, IdentificationError):
+            self.complaints.say('diagnosis', str(result))
         else:  # result of saving or planning
-            self.tell(result.text)
-            if result.excitation:
-                self._runs.publish(String(data=result.excitation))
+            text, excitation = result
+            self.tell(text)
+            if excitation:
+                self._runs.publish(String(data=excitation))
         return True
 
     def condition(self) -> tuple[str, Mapping[str, object]]:
@@ -257,7 +257,7 @@ class LiveDiagnosisNode(ListeningNode):
                 f'floor {joint} [N m]': floor,
             }
         for finding in answer.findings:
-            for parameter, value, std in _rows(finding):
+            for parameter, value, std, _ in finding.rows:
                 what = ' '.join(filter(None, (finding.name, parameter.joint, parameter.name)))
                 numbers |= {f'{what} [{parameter.unit}]': value, f'{what} std': std}
         status.values = key_values(numbers)
@@ -333,7 +333,7 @@ class LiveDiagnosisNode(ListeningNode):
             message.gap_after.append(after)
             message.gap_floor.append(floor)
         for number, finding in enumerate(answer.findings):
-            for parameter, value, std in _rows(finding):
+            for parameter, value, std, _ in finding.rows:
                 message.name.append(parameter.name)
                 message.joint.append(parameter.joint)
                 message.unit.append(parameter.unit)
@@ -366,10 +366,6 @@ class LiveDiagnosisNode(ListeningNode):
         if self.live is None:
             raise IdentificationError('no robot is known: robot_description was not received')
         return self.live
-
-
-def _rows(finding: Finding) -> list[tuple[object, float, float]]:
-    return list(zip(finding.parameters, finding.values, finding.std, strict=True))
 
 
 def _gaps(answer: Answer) -> list[tuple[str, float, float, float]]:

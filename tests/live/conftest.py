@@ -18,7 +18,7 @@ MORE_FRICTION = 'viscous_friction@elbow_pitch:viscous_coefficient=0.3'
 
 
 class InProcess:
-    """An assistant that runs each job at once, in this process."""
+    """An assistant that runs each task at once, in this process."""
 
     def __init__(self):
         self._worker, self._results = Worker(), []
@@ -27,8 +27,8 @@ class InProcess:
     def busy(self):
         return bool(self._results)
 
-    def ask(self, job):
-        self._results.append(self._worker.run(job))
+    def ask(self, *task):
+        self._results.append(self._worker.run(*task))
 
     def poll(self):
         return self._results.pop(0) if self._results else None
@@ -98,4 +98,4 @@ def asked(known_arm, changed):
 def answered(asked):
     """Return the worker that answered the request, and its answer."""
     worker = Worker()
-    return worker, worker.run(asked)
+    return worker, worker.run('diagnose', asked)

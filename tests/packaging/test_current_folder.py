@@ -17,11 +17,11 @@ STARTS = {
         assert start_program(('--help',)).wait(60) == 0
         """,
     'the assistant of live_diagnosis': """
-        from armid_ros.nodes.live.assistant import Assistant, Plan
+        from armid_ros.nodes.live.assistant import Assistant
         assistant = Assistant()
-        assistant.ask(Plan())
+        assistant.ask('plan', 0)
         assert assistant._pipe.poll(60)
-        assert assistant.poll().text == 'nothing has been diagnosed so far'
+        assert str(assistant.poll()) == 'nothing has been diagnosed so far'
         assistant.close()
         """,
     'the workers of a fleet': """

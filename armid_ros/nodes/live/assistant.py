@@ -3,15 +3,15 @@
 """
 Diagnoses in a separate process, so that joint states at 1 kHz are not delayed.
 
-Jobs are sent to the process and results returned through a pair of sockets. The process ends when
+Tasks are sent to the process and results returned through a pair of sockets. The process ends when
 the other end is closed, so that it never outlives its parent.
 
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import dataclass
 from multiprocessing import Pipe
 from multiprocessing.connection import Connection
 import os
@@ -19,7 +19,7 @@ from pathlib import Path
 import subprocess
 import sys
 import traceback
-from typing import ClassVar
+from typing import Any
 
 from armid_ros.api.diagnosis import DiagnosisResult
 from armid_ros.diagnosis import Diagnosis, next_run
@@ -32,84 +32,56 @@ import numpy as np
 _ONE_THREAD = dict.fromkeys(('OMP_NUM_THREADS', 'OPENBLAS_NUM_THREADS'), '1')
 
 
-@dataclass(frozen=True)
-class Save:
-    """
-    Write the last diagnosis to a folder.
-
-    Attributes
-    ----------
-    folder : Path
-        Folder for `FILES`.
-
-    """
-
-    FILES: ClassVar[tuple[str, ...]] = ('diagnosis.json', 'model.yaml', 'report.html')
-
-    folder: Path
-
-
-@dataclass(frozen=True)
-class Plan:
-    """Plan the motion that separates the candidates of the last diagnosis."""
-
-    seed: int = 0
-
-
-@dataclass(frozen=True)
-class Done:
-    """
-    Result of a job that is no diagnosis.
-
-    Attributes
-    ----------
-    text : str
-        Result, or the reason of the failure.
-    success : bool
-        Whether the job succeeded.
-    excitation : str
-        Planned motion as YAML; empty if none was planned.
-
-    """
-
-    text: str
-    success: bool = True
-    excitation: str = ''
-
-
-Job = DiagnosisRequest | Save | Plan
-Result = Answer | Done
+#: Files of a saved diagnosis.
+FILES = ('diagnosis.json', 'model.yaml', 'report.html')
+#: An answer; the text of another task, with its planned motion as YAML if any; or an error.
+Result = Answer | tuple[str, str] | IdentificationError
 
 
 class Worker:
-    """Runs jobs, and keeps the last diagnosis for later jobs."""
+    """Runs tasks, and keeps the last diagnosis for later tasks."""
 
     def __init__(self) -> None:
         self._last: tuple[DiagnosisRequest, Diagnosis] | None = None
 
-    def run(self, job: Job) -> Result:
-        """Run a job; an error of the data or the disk gives a result without success."""
+    def run(self, task: str, argument: Any) -> Result:
+        """Run 'diagnose', 'save' or 'plan'; errors of the data or the disk are returned."""
+        tasks: dict[str, Callable[[Any], Result]] = {
+            'diagnose': self._diagnose,
+            'save': self._save,
+            'plan': self._plan,
+        }
         try:
-            if isinstance(job, DiagnosisRequest):
-                found, diagnosis = answer(job)
-                if diagnosis is not None:
-                    self._last = job, diagnosis
-                return found
-            if self._last is None:
-                raise IdentificationError('nothing has been diagnosed so far')
-            request, diagnosis = self._last
-            if isinstance(job, Save):
-                result = DiagnosisResult(diagnosis, request.arm, (request.window,), ())
-                return Done(f'wrote {", ".join(Save.FILES)} to {result.save(job.folder)}')
-            run = next_run(diagnosis, np.random.default_rng(job.seed))
-            if run is None:
-                return Done('no candidates are ambiguous: no motion is needed', success=False)
-            return Done(run.sentence, excitation=excitation_text(run.excitation))
+            return tasks[task](argument)
         except ArmidError as error:
-            return Done(str(error), success=False)
+            return IdentificationError(str(error))
         except OSError as error:
-            text = f'{error.filename}: cannot be written: {error.strerror}'
-            return Done(text, success=False)
+            return IdentificationError(f'{error.filename}: cannot be written: {error.strerror}')
+
+    def _diagnose(self, request: DiagnosisRequest) -> Answer:
+        found, diagnosis = answer(request)
+        if diagnosis is not None:
+            self._last = request, diagnosis
+        return found
+
+    def _save(self, folder: Path) -> tuple[str, str]:
+        """Write the last diagnosis to a folder."""
+        request, diagnosis = self._require()
+        result = DiagnosisResult(diagnosis, request.arm, (request.window,), ())
+        return f'wrote {", ".join(FILES)} to {result.save(folder)}', ''
+
+    def _plan(self, seed: int) -> tuple[str, str]:
+        """Plan the motion that separates the candidates of the last diagnosis."""
+        _, diagnosis = self._require()
+        run = next_run(diagnosis, np.random.default_rng(seed))
+        if run is None:
+            raise IdentificationError('no candidates are ambiguous: no motion is needed')
+        return run.sentence, excitation_text(run.excitation)
+
+    def _require(self) -> tuple[DiagnosisRequest, Diagnosis]:
+        if self._last is None:
+            raise IdentificationError('nothing has been diagnosed so far')
+        return self._last
 
 
 class Assistant:
@@ -129,15 +101,22 @@ class Assistant:
 
     @property
     def busy(self) -> bool:
-        """Return whether a job is under way."""
+        """Return whether a task is under way."""
         return self._pending > 0
 
-    def ask(self, job: Job) -> None:
+    def ask(self, task: str, argument: Any) -> None:
         """
-        Send a job, which runs after the pending jobs; start a new process if the old one ended.
+        Send a task, which runs after the pending tasks; start a new process if the old one ended.
 
         A diagnosis request is larger than the buffer of the pipe, and would have to wait for the
-        pending jobs; send it when none is pending.
+        pending tasks; send it when none is pending.
+
+        Parameters
+        ----------
+        task : str
+            'diagnose', 'save' or 'plan'.
+        argument : DiagnosisRequest, Path or int
+            Request of the diagnosis, folder to write to, or random seed of the plan.
 
         Raises
         ------
@@ -151,7 +130,7 @@ class Assistant:
             self.close()
             self._start()
         try:
-            self._pipe.send(job)
+            self._pipe.send((task, argument))
         except OSError as error:
             raise IdentificationError(f'the diagnosis process has ended: {error}') from error
         self._pending += 1
@@ -167,7 +146,7 @@ class Assistant:
             self._pending = 0
             self._pipe.close()
             code = self._process.wait()
-            return Done(f'the process that diagnoses has ended with {code}', success=False)
+            return IdentificationError(f'the process that diagnoses has ended with {code}')
         return result
 
     def close(self) -> None:
@@ -195,18 +174,16 @@ class Assistant:
 
 
 def main(fd: int) -> None:
-    """Run jobs from a socket until its other end is closed."""
+    """Run tasks from a socket until its other end is closed."""
     os.nice(10)  # lower priority than the nodes
     worker = Worker()
     with suppress(EOFError, OSError), Connection(fd) as pipe:
         while True:
-            job = pipe.recv()
+            task, argument = pipe.recv()
             try:
-                result = worker.run(job)
-            except (
-                Exception
-            ) as error:  # an unexpected error of one window must not end the process
+                result = worker.run(task, argument)
+            except Exception as error:  # of one window, which must not end the process
                 traceback.print_exc()
-                what = f'{type(job).__name__.lower()} failed: {type(error).__name__}: {error}'
-                result = Done(what, success=False)
+                what = f'{task} failed: {type(error).__name__}: {error}'
+                result = IdentificationError(what)
             pipe.send(result)
