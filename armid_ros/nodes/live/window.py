@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections import deque
+from itertools import takewhile
 
 from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording
@@ -71,14 +72,13 @@ class SampleWindow:
         an effort varies over half of its range in motion, the positions are not measured.
 
         """
-        if not self._rows:
+        n, latest = len(self.joints), reversed(self._rows)
+        q = self._rows[-1][1 : n + 1] if self._rows else np.empty(n)
+        same = list(takewhile(lambda row: np.array_equal(row[1 : n + 1], q), latest))
+        if not same or same[0][0] - same[-1][0] <= 2.0:  # without a change of positions [s]
             return False
-        t, q, _, tau = self._columns()
-        changes = np.flatnonzero(np.diff(q, axis=0).any(axis=1))
-        first = int(changes[-1]) + 1 if len(changes) else 0
-        if t[-1] - t[first] <= 2.0:  # without a change of positions [s]
-            return False
-        effort, steps = np.ptp(tau[first:], axis=0), np.abs(np.diff(tau[first:], axis=0))
+        tau = np.array(same)[:, 2 * n + 1 :]
+        effort, steps = np.ptp(tau, axis=0), np.abs(np.diff(tau, axis=0))
         # noise of a million samples has a range of 9 mean changes per sample
         varies = effort > 10.0 * steps.mean(axis=0)
         return bool(np.any(varies & (effort > 0.5 * np.ptp(self._efforts, axis=0))))
@@ -135,19 +135,16 @@ class SampleWindow:
             Name of the recording.
 
         """
-        columns = self._columns()
-        t, q, dq, tau = (column[columns[0] >= first] for column in columns)
-        return Recording(
-            joints=self.joints,
-            t=t - (t[0] if len(t) else 0.0),
-            q=q,
-            dq=None if np.isnan(dq).any() else dq,
-            tau=tau,
-            source=source,
-        )
-
-    def _columns(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-        """Return times (N,), and positions, velocities and torques (N, n) of the samples."""
         n = len(self.joints)
         rows = np.array(self._rows).reshape(-1, 1 + 3 * n)
-        return rows[:, 0], rows[:, 1 : n + 1], rows[:, n + 1 : 2 * n + 1], rows[:, 2 * n + 1 :]
+        rows = rows[rows[:, 0] >= first]
+        dq = rows[:, n + 1 : 2 * n + 1]
+        begin = rows[0, 0] if len(rows) else 0.0
+        return Recording(
+            joints=self.joints,
+            t=rows[:, 0] - begin,
+            q=rows[:, 1 : n + 1],
+            dq=None if np.isnan(dq).any() else dq,
+            tau=rows[:, 2 * n + 1 :],
+            source=source,
+        )
