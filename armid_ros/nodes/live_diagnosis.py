@@ -15,7 +15,7 @@ from armid_msgs.msg import Diagnosis
 from armid_ros.api.arguments import read_recording, source_of
 from armid_ros.arm import ArmModel, load_misfit, load_model
 from armid_ros.arm.model_file import model_text
-from armid_ros.errors import IdentificationError, ModelError
+from armid_ros.errors import IdentificationError
 from armid_ros.estimate import name_in_words
 from armid_ros.files.output import refuse_replacing
 from armid_ros.nodes.base import key_values
@@ -26,6 +26,7 @@ from armid_ros.nodes.messages.joint_states import JointSample
 from armid_ros.nodes.parameters.table import NodeParameter, setting
 from armid_ros.nodes.qos import LATCHED
 from armid_ros.nodes.running.process import run
+from armid_ros.simulation.plant import require_any_mass
 from diagnostic_msgs.msg import DiagnosticStatus
 from std_msgs.msg import String
 
@@ -297,11 +298,7 @@ class LiveDiagnosisNode(ListeningNode):
         values = dict(zip(arm.effects, arm.values, strict=True))
         values |= zip(given.effects, given.values, strict=True)
         arm = replace(arm, effects=tuple(values), values=tuple(values.values()))
-        if not arm.robot.rigid_parameters.any():
-            raise ModelError(
-                f'{arm.robot.name}: no link that moves has an <inertial>, so that the model '
-                'predicts no torque to compare with; complete the description, or give a model'
-            )
+        require_any_mass(arm.robot)
         bags = tuple(read_recording(bag, arm) for bag in self.value('baseline'))
         misfit = load_misfit(model) if model and not bags else None
         settings, seed = self._settings({}), self.value('seed')
