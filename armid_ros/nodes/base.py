@@ -12,7 +12,7 @@ from typing import Any, ClassVar
 
 from armid_ros.errors import ArmidError, OutputError
 from armid_ros.nodes.complaints import Complaints, FATAL
-from armid_ros.nodes.parameters.table import declare, is_as, NodeParameter, unknown
+from armid_ros.nodes.parameters.table import declare, NodeParameter, unknown
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.clock import Clock, ClockType
@@ -294,7 +294,7 @@ class ArmidNode(Node):
         except ArmidError as error:
             self.complaints.say('parameter', str(error))
             return SetParametersResult(successful=False, reason=str(error))
-        changed = [p for p in given if not is_as(self, p)]
+        changed = [p for p in given if not self._has(p)]
         if not changed:
             return SetParametersResult(successful=True)
         result = super().set_parameters_atomically(changed)
@@ -303,6 +303,13 @@ class ArmidNode(Node):
             reason = result.reason.removeprefix(f"parameter '{name}': ")
             self.complaints.say('parameter', f"parameter '{name}' refused: {reason}")
         return result
+
+    def _has(self, parameter: Parameter) -> bool:
+        """Return whether a parameter of the node already has a value."""
+        if not self.has_parameter(parameter.name):
+            return False
+        present = self.get_parameter(parameter.name).get_parameter_value()
+        return bool(present == parameter.get_parameter_value())
 
     def publish_diagnostics(self) -> None:
         """Publish the state of the node and its complaints."""

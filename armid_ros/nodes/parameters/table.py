@@ -20,9 +20,6 @@ from rcl_interfaces.msg import (
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
-#: Parameters that ROS declares on every node.
-_ROS = ('use_sim_time', 'start_type_description_service')
-
 Value = bool | int | float | str | list[str] | list[float]
 #: Returns the value of a parameter by its name.
 Values = Callable[[str], Any]
@@ -180,22 +177,10 @@ def overrides(node: Node) -> Mapping[str, Parameter]:
 
 def unknown(node: Node) -> str:
     """Return a message on overrides of unknown parameters; empty if there are none."""
-    mine = {name for name in node.get_parameters_by_prefix('') if not _of_ros(name)}
-    wrong = [name for name in overrides(node) if name not in mine and not _of_ros(name)]
+    known = node.get_parameters_by_prefix('')
+    given = [name for name in overrides(node) if not name.startswith('qos_overrides.')]
+    wrong = [name for name in given if name not in known]
     if not wrong:
         return ''
-    named = '; '.join(f"no parameter is named '{name}'{meant(name, mine)}" for name in wrong)
+    named = '; '.join(f"no parameter is named '{name}'{meant(name, known)}" for name in wrong)
     return f'{named}; left out, see --help'
-
-
-def is_as(node: Node, parameter: Parameter) -> bool:
-    """Return whether a parameter of a node already has a value."""
-    if not node.has_parameter(parameter.name):
-        return False
-    now = node.get_parameter(parameter.name).get_parameter_value()
-    return bool(now == parameter.get_parameter_value())
-
-
-def _of_ros(name: str) -> bool:
-    """Return whether ROS declares a parameter on every node."""
-    return name in _ROS or name.startswith('qos_overrides.')
