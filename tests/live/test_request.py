@@ -83,10 +83,6 @@ def test_what_friction_holds_at_rest_is_no_misfit(known_arm, healthy):
     np.testing.assert_allclose(list(both.values()), list(moving.values()), rtol=0.3)
 
 
-def test_nothing_is_found_where_nothing_changes(known_arm, healthy):
-    assert onset(known_arm, healthy) is None
-
-
 def test_what_came_before_a_change_is_left_out_and_the_change_itself(known_arm, changed):
     """However long ago it was: a window is seldom cut where blocks begin."""
     for end in (8.6, 9.3, 12.2, 17.9):

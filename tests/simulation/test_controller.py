@@ -11,7 +11,6 @@ from armid_ros.simulation import ComputedTorque, Plant, Reference, simulate, ste
 import numpy as np
 import pytest
 
-from tests.simulation.conftest import gravity_pd
 from tests.simulation.test_run import MIDDLE, swinging
 
 
@@ -52,26 +51,6 @@ def test_computed_torque_closes_an_error_like_a_critically_damped_spring(humanoi
         state = step(plant, state, torque)
     left = 0.1 * (1.0 + omega * state.t) * np.exp(-omega * state.t)
     np.testing.assert_allclose(state.q - MIDDLE, left, rtol=0.05)
-
-
-def test_spring_and_damper_sag_under_a_gravity_they_do_not_know(humanoid) -> None:
-    moon = ArmModel(humanoid.with_gravity([0.0, 0.0, -1.62]))
-    hold = Reference(humanoid.joints, np.zeros(1), MIDDLE[np.newaxis])
-    controller = gravity_pd(moon)
-    run = simulate(
-        ArmModel(humanoid),
-        hold,
-        rng=np.random.default_rng(0),
-        controller=controller,
-        duration=6.0,
-    )
-    sag = run.truth.q[-1] - MIDDLE
-    missing = run.truth.select(slice(-1, None))
-    expected = ArmModel(humanoid).torque(missing)[0] - moon.torque(missing)[0]
-    assert np.abs(expected).max() > 1.0
-    np.testing.assert_allclose(
-        controller.feedback.stiffness * sag, -expected, rtol=1e-3, atol=1e-4
-    )
 
 
 def test_drives_give_no_more_torque_than_they_have(humanoid) -> None:
