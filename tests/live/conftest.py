@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Recordings of a moving arm with a known model, with and without a change."""
 
-from __future__ import annotations
-
 from armid_ros.arm import ArmModel
 from armid_ros.effects import parse_effect
 from armid_ros.nodes.live import DiagnosisRequest, Worker

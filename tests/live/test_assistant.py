@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The process that answers says what the same code says here, and ends with who started it."""
 
-from __future__ import annotations
-
 from contextlib import contextmanager
 import json
 import select

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A window is diagnosed from when the arm changed on."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 from armid_ros.diagnosis import known_misfit

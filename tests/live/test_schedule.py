@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Names count when questions agree on them; a person has the last word."""
 
-from __future__ import annotations
-
 from types import SimpleNamespace
 
 from armid_ros.errors import IdentificationError

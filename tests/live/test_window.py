@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The window keeps the latest motion in memory that does not grow."""
 
-from __future__ import annotations
-
 from armid_ros.nodes.live import SampleWindow
 import numpy as np
 

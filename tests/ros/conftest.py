@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A ROS context and an executor for each test, on a separate domain, spun by hand."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 import itertools
 import time

@@ -13,8 +13,6 @@ The arm behind them is where it is commanded to be, and takes the torque of a mo
 
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 import gc
 

@@ -9,8 +9,6 @@ actions/node.py of ros2/launch_ros.
 
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 import runpy
 import sys

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Arguments that a node cannot have are named, with how they are written."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 import gc
 

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The bag player publishes what a bag holds, when it was recorded."""
 
-from __future__ import annotations
-
 from armid_ros.errors import ArmidError
 from armid_ros.motion import Motion
 from armid_ros.nodes.bag_player import BagPlayerNode

@@ -12,8 +12,6 @@ each the identifier has to learn from what comes, and in the end to know the arm
 
 """
 
-from __future__ import annotations
-
 import os
 
 from armid_ros.arm import ArmModel

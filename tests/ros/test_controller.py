@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The excitation publisher in front of a trajectory controller, with what can go wrong there."""
 
-from __future__ import annotations
-
 from armid_ros.arm import ArmModel
 from armid_ros.excitation import (
     Excitation,

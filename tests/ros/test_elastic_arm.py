@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """An arm with elastic joints, live: both sides on topics, recorded, identified from the bag."""
 
-from __future__ import annotations
-
 from armid_ros.robots import load_robot
 import numpy as np
 from sensor_msgs.msg import Imu, JointState

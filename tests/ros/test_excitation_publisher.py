@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The excitation publisher begins where the arm is, watches it, and stops it."""
 
-from __future__ import annotations
-
 import json
 
 from armid_ros.cli.excite import excite

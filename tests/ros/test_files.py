@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Launch files, parameter files and the reference name what nodes really have."""
 
-from __future__ import annotations
-
 from importlib import import_module
 import json
 from pathlib import Path

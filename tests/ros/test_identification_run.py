@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """From the excitation to the report without anybody's help, and what fails is said."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 import json
 from pathlib import Path

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """One launch file has an arm identified, and ends."""
 
-from __future__ import annotations
-
 import json
 import os
 from pathlib import Path

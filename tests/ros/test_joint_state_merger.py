@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Positions and torques of several senders become one joint state, whatever brings them."""
 
-from __future__ import annotations
-
 from armid_ros.errors import RecordingError
 from armid_ros.nodes.joint_state_merger import JointStateMergerNode
 from armid_ros.nodes.qos import LATCHED

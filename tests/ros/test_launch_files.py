@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Launch files: what an argument says overrules the parameter file, and nothing else does."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from armid_ros.nodes.parameters.table import declare

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """An effect that appears in a moving arm is named, and a twin of the arm takes it over."""
 
-from __future__ import annotations
-
 import re
 
 from armid_msgs.msg import Diagnosis

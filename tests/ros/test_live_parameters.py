@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What can change without harm is set on running nodes; a dump of a node can be loaded again."""
 
-from __future__ import annotations
-
 from unittest.mock import Mock
 
 from armid_ros.arm import ArmModel

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """In lock step nothing is lost and the outcome is the same every time."""
 
-from __future__ import annotations
-
 from armid_ros.arm import ArmModel
 from armid_ros.effects import make_effect, parse_effect
 from armid_ros.errors import ArmidError

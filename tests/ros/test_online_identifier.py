@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The online identifier learns what its core learns, whatever else is on the topics."""
 
-from __future__ import annotations
-
 from armid_msgs.msg import ParameterEstimate
 from armid_ros.arm import ArmModel
 from armid_ros.arm.model_file import load_model, model_text

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Every parameter of every node is described, checked, and refused with what to do instead."""
 
-from __future__ import annotations
-
 from armid_ros.nodes.base import ArmidNode
 from armid_ros.nodes.parameters.table import NodeParameter, ParameterError
 from armid_ros.nodes.recorder import RecorderNode

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The nodes as processes of their own, over DDS, ended as `ros2 launch` ends them."""
 
-from __future__ import annotations
-
 from contextlib import suppress
 from itertools import count, islice
 import os

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The recorder keeps what is published, as it is published, and says what it cannot keep."""
 
-from __future__ import annotations
-
 import resource
 import shutil
 

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Whatever comes on joint_states, clocks and services, the commanded set point is safe."""
 
-from __future__ import annotations
-
 from itertools import count
 import os
 

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The simulated arm moves as it is told, in the time it is given, and refuses the rest."""
 
-from __future__ import annotations
-
 import re
 
 from armid_ros.errors import ArmidError

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """No message ends a node: after each it says what it left out, and works on."""
 
-from __future__ import annotations
-
 from armid_ros.nodes.base import ArmidNode
 from armid_ros.nodes.online_identifier import OnlineIdentifierNode
 from armid_ros.nodes.qos import LATCHED

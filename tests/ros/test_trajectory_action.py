@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The excitation as a goal of follow_joint_trajectory: accepted, watched, cancelled, ended."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 import gc
 import sys
