@@ -33,8 +33,6 @@ Progress = Callable[..., None]
 #: One number or one per joint, also as text: '1798/7, 50'.
 _Numbers = float | str | Sequence[float]
 
-#: Suffixes of robot description files.
-_DESCRIPTIONS = ('.urdf', '.xacro', '.xml')
 #: Effects that are fitted with the rigid body by default.
 USUAL = ','.join(USUAL_EFFECTS)
 
@@ -53,14 +51,6 @@ def is_model(path: str | Path) -> bool:
     if not isinstance(path, str | Path):
         raise RobotError(f'a {type(path).__name__} is no robot; a robot comes before recordings')
     return Path(path).suffix in ('.yaml', '.yml')
-
-
-def describes_robot(one: RobotLike | RecordingLike) -> bool:
-    """Return whether an argument is a robot rather than a recording, by its type or its name."""
-    if not isinstance(one, str | Path):
-        return not isinstance(one, Recording)
-    path = Path(str(one).split(' ')[0])
-    return path.suffix in _DESCRIPTIONS or is_model(path) or str(one) in shipped_robots()
 
 
 def source_of(robot: Robot) -> str:

@@ -74,14 +74,13 @@ def inspect(
 
 
 @click.command(epilog='Example: armid check ur10.urdf run.mcap')
-@click.argument('arguments', metavar='[R] [BAG]...', nargs=-1)
-@click.option(
-    '--robot',
+@click.argument(
     'robot_source',
     metavar='R',
+    callback=lambda context, _, source: parameters.with_packages(context, source),
     shell_complete=parameters.completed,
-    help='The description, in place of the first argument.',
 )
+@click.argument('bags', nargs=-1, type=click.Path(path_type=Path))
 @parameters.packages
 @click.option(
     '--out',
@@ -93,8 +92,8 @@ def inspect(
 @parameters.effects
 @columns.recordings
 def check(
-    arguments: tuple[str, ...],
-    robot_source: str | None,
+    robot_source: str,
+    bags: tuple[Path, ...],
     out: Path | None,
     strict: bool,
     effects: str,
@@ -108,32 +107,16 @@ def check(
     Check a URDF: alone, or against recordings.
 
     R is a URDF, MJCF or xacro ('arm.xacro tool:=true' with arguments), a shipped name, or - for
-    the description in the bag. R may be left out if armid.toml names the robot.
+    the description in the bag.
 
     Without recordings: impossible inertias, densities of links with shapes, units of limits. With
     recordings: described and measured mass and centre of each link.
 
     """
-    from armid_ros.api.arguments import describes_robot
     from armid_ros.api.inspection import check as run
     from armid_ros.api.inspection import CheckResult
     from armid_ros.cli import options
 
-    context = click.get_current_context()
-    given = context.get_parameter_source('robot_source')
-    typed = given is click.core.ParameterSource.COMMANDLINE
-    first = ''.join(arguments[:1])
-    described = first == '-' or (bool(first) and describes_robot(first))
-    if first and not typed and (robot_source is None or described):
-        if robot_source is not None:
-            click.echo(f'{first} is used instead of --robot', err=True)
-        robot_source, *others = arguments
-        arguments = tuple(others)
-    if robot_source is None:
-        raise click.UsageError("Missing argument 'R', the description.")
-    robot_source = parameters.with_packages(context, robot_source) or ''
-    bags = tuple(map(Path, arguments))
-    context.params |= {'robot_source': robot_source, 'bags': bags}
     staged = None if out is None else options.stage(out, CheckResult.schema, robot_source)
     robot = options.open_robot(robot_source, gravity, joints, bags, tell=False)
     with progress('checking'):
@@ -142,4 +125,4 @@ def check(
     origin = options.origin(robot_source, source, seed)
     options.deliver(found, staged, origin, as_json)
     if strict and found.wrong:
-        context.exit(3)
+        click.get_current_context().exit(3)

@@ -6,8 +6,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-import math
-import threading
 import time
 
 from armid_ros.errors import visible
@@ -27,7 +25,7 @@ def progress(what: str) -> Iterator[Tick]:
     """
     Show a progress bar; yields tick(share, what=None).
 
-    Without a terminal there is a line on stderr every ten seconds.
+    Without a terminal there is a line on stderr at most every ten seconds.
 
     """
     from rich.console import Console
@@ -35,29 +33,17 @@ def progress(what: str) -> Iterator[Tick]:
 
     console = Console(stderr=True)
     if not console.is_terminal:
-        done, start = threading.Event(), time.monotonic()
-        shares, steps = [0.0], [what]
-
-        def watch() -> None:
-            before = math.inf
-            while not done.wait(10.0):
-                share, spent = shares[0], time.monotonic() - start
-                rest = spent * (1.0 / share - 1.0) if share else math.inf
-                # if the share has not grown, the remaining time cannot be predicted
-                click.echo(progress_line(steps[0], share, spent, rest < before), err=True)
-                before = min(before, rest)
+        start, step = time.monotonic(), [what]
+        due = [start + 10.0]
 
         def note(share: float, what: str | None = None) -> None:
-            shares[0] = share
-            steps[0] = steps[0] if what is None else what
+            step[0] = what or step[0]
+            now = time.monotonic()
+            if now >= due[0]:
+                click.echo(progress_line(step[0], share, now - start), err=True)
+                due[0] = now + 10.0
 
-        thread = threading.Thread(target=watch, daemon=True)
-        thread.start()
-        try:
-            yield note
-        finally:
-            done.set()
-            thread.join()
+        yield note
         return
     columns = (TextColumn('{task.description}'), BarColumn(), TimeElapsedColumn())
     with Progress(*columns, console=console, transient=True) as bar:
@@ -71,8 +57,8 @@ def progress(what: str) -> Iterator[Tick]:
         yield tick
 
 
-def progress_line(what: str, share: float, spent: float, steady: bool = True) -> str:
-    """Return progress as a line of text, with the remaining time if steady; time spent in s."""
-    known = steady and 0.0 < share < 1.0
+def progress_line(what: str, share: float, spent: float) -> str:
+    """Return progress as a line of text, with the remaining time; time spent in s."""
+    known = 0.0 < share < 1.0
     rest = f', about {spent * (1.0 / share - 1.0):.0f} s to go' if known else ''
     return f'{what}: {100.0 * share:.0f} %, {spent:.0f} s{rest}'

@@ -345,7 +345,6 @@ def test_a_line_of_progress_has_share_time_and_time_to_go(share, numbers):
     line = progress_line('identifying', share, 10.0)
     assert line.startswith('identifying: ')
     assert tuple(map(int, re.findall(r'\d+', line))) == numbers
-    assert 'to go' not in progress_line('identifying', share, 10.0, steady=False)
 
 
 @pytest.mark.parametrize(
@@ -399,12 +398,3 @@ def test_the_last_line_is_a_command(bags, folder, command, then, words):
     assert {paths.get(word, word) for word in words} <= set(arguments)
     for page in (folder / name / 'report.html' for name in ('plan', 'c') if name in command):
         assert done[-1].removeprefix('next: ') in page.read_text()
-
-
-def test_a_check_takes_the_robot_of_the_project(bags, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    armid('check', code=2)
-    (tmp_path / 'armid.toml').write_text(f'robot = "{ROBOT}"\n')
-    assert f'{ROBOT}' in armid('check', bags[0]).stdout.splitlines()[-1]
-    armid('check', 'no.urdf', code=2)
-    assert '- is used' in armid('check', '-', bags[0]).stderr
