@@ -21,7 +21,7 @@ from armid_ros.api.arguments import (
 )
 from armid_ros.api.baseline import baseline_recordings, diagnosed_model
 from armid_ros.api.identification import IdentificationResult
-from armid_ros.api.table import data_frame, ResidualPart, ShownModel, Summary
+from armid_ros.api.table import data_frame, ShownModel, Summary
 from armid_ros.arm import ArmModel, Misfit, save_model
 from armid_ros.diagnosis import diagnose as run
 from armid_ros.diagnosis import (
@@ -154,9 +154,6 @@ class DiagnosisResult(ShownModel):
         }
         return draw_joints(self.arm.robot.joints, curves, 'residual torque [N m or N]')
 
-    def _residuals(self) -> list[ResidualPart]:
-        return [(o.source, o.trajectory.t, o.measured - o.after) for o in self.core.overlays]
-
     def to_dataframe(self) -> pandas.DataFrame:
         """Return the named effects as a pandas table, one row per parameter."""
         return data_frame(
@@ -267,7 +264,11 @@ class DiagnosisResult(ShownModel):
         most = 6  # number of rows without --all
         if not every and len(rows) > most + 1:
             rows[most:] = [(f'... and {len(rows) - most} more: --all, or report.html',)]
-        lines = [] if self.simulated is None else [f'simulator: {self.simulated.fitted_to}']
+        lines = []
+        if self.simulated is not None:
+            sources = ', '.join(one.source for one in self.simulated.recordings)
+            error = f'{self.simulated.error_percent:.2g} %'
+            lines.append(f'simulator: identified from {sources} to {error}')
         if self.baseline:
             lines.append(f'baseline: {", ".join(one.source for one in self.baseline)}')
         lines += cause_sentences(self.core)

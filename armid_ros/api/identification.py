@@ -22,7 +22,7 @@ from armid_ros.api.arguments import (
     USUAL,
     with_sources_apart,
 )
-from armid_ros.api.table import aligned, data_frame, ResidualPart, ShownModel, Summary
+from armid_ros.api.table import aligned, data_frame, ShownModel, Summary
 from armid_ros.arm import ArmModel, Misfit, save_model
 from armid_ros.arm.export import arm_mjcf, arm_urdf, Exported, torque_check
 from armid_ros.diagnosis import known_misfit
@@ -36,7 +36,6 @@ from armid_ros.identification import (
     identification_document,
     IdentificationSettings,
     PhysicalSettings,
-    Score,
     SignalSettings,
     Verification,
     write_document,
@@ -124,28 +123,6 @@ class IdentificationResult(ShownModel):
         return self.core.estimate
 
     @property
-    def notes(self) -> tuple[str, ...]:
-        """Return notes for the user."""
-        return self.core.notes
-
-    @property
-    def training(self) -> Score:
-        """Errors on the training data."""
-        return Score.of(self.core.training)
-
-    @property
-    def held_out_score(self) -> Score | None:
-        """Errors on held-out recordings; None if there are none."""
-        fits = [fit for part in self.validation.values() for fit in part]
-        return Score.of(fits) if fits else None
-
-    @property
-    def fitted_to(self) -> str:
-        """Return the recordings of the identification and its error, in words."""
-        sources = ', '.join(one.source for one in self.recordings)
-        return f'identified from {sources} to {self.error_percent:.2g} %'
-
-    @property
     def error_percent(self) -> float:
         """Error of the worst joint in the grade, 100 |tau - tau_hat| / |tau| [%]."""
         return self.graded.error_percent
@@ -201,12 +178,6 @@ class IdentificationResult(ShownModel):
         """Return the parameters as a pandas table: name, joint, value, std, unit."""
         return data_frame(self.document()['parameters'])
 
-    def _residuals(self) -> list[ResidualPart]:
-        held_out = [fit for fits in self.validation.values() for fit in fits]
-        return [
-            (fit.source, fit.motion.t, fit.residual) for fit in (*self.core.training, *held_out)
-        ]
-
     @cached_property
     def exports(self) -> dict[str, Exported]:
         """Return URDF and MJCF by file name; empty unless the links are physically consistent."""
@@ -258,7 +229,7 @@ class IdentificationResult(ShownModel):
         """Return errors and friction of joints, warnings, and next step; `every`: all values."""
         core, estimate, joints = self.core, self.estimate, self.arm.robot.joints
         others = self.graded.reasons[1:]
-        shown = [fit for fits in self.validation.values() for fit in fits] or core.training
+        held_out = [fit for fits in self.validation.values() for fit in fits]
         known = int(np.sum(excludes_zero(estimate.values, estimate.std)))
         count = f'{known} of {counted(len(estimate.parameters), "parameter")} differ from zero'
         unseen = core.theory.rank - core.base.rank
@@ -280,7 +251,7 @@ class IdentificationResult(ShownModel):
                 bodies += far_from_described(
                     self.description.robot, core.arm.robot.rigid_parameters[::10]
                 )
-        columns = joint_columns(core, self.description, self.held_out_score)
+        columns = joint_columns(core, self.description, held_out)
         return Summary(
             self.graded.reasons[0],
             self.grade,
@@ -288,7 +259,7 @@ class IdentificationResult(ShownModel):
             list(zip(*columns.values(), strict=True)),
             (
                 *others,
-                *residual_trends(joints, shown),
+                *residual_trends(joints, held_out or core.training),
                 *(self.gains.sentences() if self.gains else ()),
                 *friction_per_kelvin(core.arm, estimate, core.scatter),
                 *(f'{one.source}: {one.report.describe()}' for one in damaged),

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from base64 import b64encode
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from io import BytesIO
 import json
 from typing import Any, ClassVar, Literal
@@ -99,6 +99,18 @@ class Chart(Templated):
     symmetric: bool = False
     legend: bool = True
 
+    @classmethod
+    def over_time(
+        cls, t: FloatArray, series: Sequence[Series], ylabel: str, **others: Any
+    ) -> Chart:
+        """Return curves over time [s], without samples that make no visible difference."""
+        kept = thinned(*(one.y for one in series))
+        drawn = [
+            replace(one, y=one.y[kept], upper=None if one.upper is None else one.upper[kept])
+            for one in series
+        ]
+        return cls(t[kept], drawn, 'time [s]', ylabel, **others)
+
     @property
     def label(self) -> str:
         """Return the description of the chart, for screen readers."""
@@ -147,7 +159,7 @@ def thinned(*series: npt.ArrayLike, most: int = 3000) -> npt.NDArray[np.intp]:
     -------
     ndarray of int
         Samples in order: all, or those where one of the curves is lowest or highest within each
-        of many equal stretches. Samples with NaN are kept, because they mark breaks.
+        of many equal stretches. The ends of stretches with NaN are kept, because they mark breaks.
 
     """
     curves = [np.asarray(values, dtype=float) for values in series]
@@ -158,7 +170,8 @@ def thinned(*series: npt.ArrayLike, most: int = 3000) -> npt.NDArray[np.intp]:
     edges = np.linspace(0, count, stretches + 1).astype(np.intp)[:-1]
     kept = [np.array([0, count - 1])]
     for curve in curves:
-        kept.append(np.flatnonzero(np.isnan(curve)))
+        broken = np.isnan(curve)
+        kept.append(np.flatnonzero(broken[1:-1] & ~(broken[:-2] & broken[2:])) + 1)
         for sign in (1.0, -1.0):
             value = np.where(np.isnan(curve), -np.inf, sign * curve)
             best = np.maximum.reduceat(value, edges)

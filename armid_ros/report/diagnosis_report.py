@@ -27,13 +27,14 @@ from armid_ros.report.blocks import (
     Paragraph,
     VerdictSection,
 )
-from armid_ros.report.charts import Chart, joined, joined_time, Series, thinned
+from armid_ros.report.charts import Chart, joined, joined_time, Series
 from armid_ros.report.notation import (
     counted,
     percent,
     pretty,
     probability,
     robot_label,
+    sentence,
 )
 from armid_ros.report.page import Page, Section
 from armid_ros.report.provenance import DEFAULT_ORIGIN, ResultOrigin
@@ -176,7 +177,7 @@ def _at_fault(diagnosis: Diagnosis, read: Mapping[str, Sequence[Recording]]) -> 
 
 
 def _verdict(diagnosis: Diagnosis, worse: Sequence[str], step: str) -> VerdictSection:
-    notes = [f'{note[0].upper()}{note[1:].rstrip(".")}.' for note in diagnosis.notes]
+    notes = [sentence(note) for note in diagnosis.notes]
     if worse:
         notes.append(
             f'Driven by the recorded torques, the patched model has larger position errors than '
@@ -285,35 +286,32 @@ def overlay_section(diagnosis: Diagnosis, gap: Gap) -> ContentSection:
     acting = [one for one in diagnosis.spans if one.source == shown.source and not one.whole]
     marks = [(one.start, f'from {one.start:.1f} s', True) for one in acting]
     marks += [(one.stop, f'to {one.stop:.1f} s', False) for one in acting]
-    kept = thinned(measured, measured - before, measured - after)
-    band: FloatArray = np.full(len(kept), 2.0 * shown.sigma[j])
+    band: FloatArray = np.full(len(t), 2.0 * shown.sigma[j])
 
     def models(first: FloatArray, second: FloatArray) -> list[Series]:
         if not patched:
-            return [Series('model', second[kept], 'after')]
-        given = Series('given model', first[kept], 'before')
-        return [given, Series('with the named cause', second[kept], 'after')]
+            return [Series('model', second, 'after')]
+        given = Series('given model', first, 'before')
+        return [given, Series('with the named cause', second, 'after')]
 
     dashes = ', dashes on it are the model with the named cause' * patched
     return ContentSection(
         'Measured and modelled',
         [
             Paragraph(f'Joint {robot.joints[j]} in recording {shown.source}: the largest error.'),
-            Chart(
-                t[kept],
-                [Series('measured', measured[kept], 'measured'), *models(before, after)],
-                'time [s]',
+            Chart.over_time(
+                t,
+                [Series('measured', measured, 'measured'), *models(before, after)],
                 f'torque [{unit}]',
                 link='overlay',
                 marks=marks,
             ),
-            Chart(
-                t[kept],
+            Chart.over_time(
+                t,
                 [
                     Series('twice the usual error', -band, 'floor', 'band', band),
                     *models(measured - before, measured - after),
                 ],
-                'time [s]',
                 f'residual [{unit}]',
                 height=170,
                 link='overlay',

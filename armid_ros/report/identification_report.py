@@ -27,7 +27,7 @@ from armid_ros.report.blocks import (
     VerdictSection,
 )
 from armid_ros.report.judgement import judge
-from armid_ros.report.notation import counted, digits, plain, pretty, robot_label
+from armid_ros.report.notation import counted, digits, plain, pretty, robot_label, sentence
 from armid_ros.report.page import Page, Section
 from armid_ros.report.parameter_tables import (
     effects_in_words,
@@ -217,10 +217,7 @@ def _noise_section(robot: Robot, check: NoiseCheck) -> ContentSection:
                 f'position noise of the recordings is {noise}.'
             ),
             BulletList(
-                [
-                    (f'{text[:1].upper()}{text[1:]}.', 'fine' if fine else 'warn')
-                    for text, fine in check.findings()
-                ]
+                [(sentence(text), 'fine' if fine else 'warn') for text, fine in check.findings()]
             ),
             Fold(
                 'The largest biases', [DataTable(('Parameter', 'Bias', '±', 'Bias / std'), rows)]
@@ -258,7 +255,7 @@ def _physical_section(
         'Smallest eigenvalue over its prior',
         'Constraint',
     )
-    activity = [(line[:1].upper() + line[1:], '') for line in certificate.activity]
+    activity = [(sentence(line), '') for line in certificate.activity]
     homeless = []
     for file, lines in exports.items():
         kinds = Counter(line.split(':')[0] for line in lines)

@@ -22,8 +22,8 @@ from armid_ros.report.blocks import (
     Paragraph,
     VerdictSection,
 )
-from armid_ros.report.charts import Chart, Series, thinned
-from armid_ros.report.notation import counted, digits, plain, pretty, robot_label
+from armid_ros.report.charts import Chart, Series
+from armid_ros.report.notation import counted, digits, plain, pretty, robot_label, sentence
 from armid_ros.report.page import Page, Section, Templated
 from armid_ros.report.provenance import DEFAULT_ORIGIN, ResultOrigin
 import numpy as np
@@ -65,7 +65,7 @@ def inspection_report(found: Inspection, origin: ResultOrigin = DEFAULT_ORIGIN) 
     first = 1 if grade == 'ready' else 2
     texts = [remark.text for remark in found.remarks]
     texts.insert(first - 1, found.verdict)  # not worse than the worst remark
-    sentences = [_sentence(text.replace('`', '')) for text in texts]
+    sentences = [sentence(text.replace('`', '')) for text in texts]
     sections: list[Section] = [
         VerdictSection(
             grade, _TONES[grade], sentences[:first], sentences[first:], step=origin.step
@@ -101,7 +101,7 @@ def check_word(remarks: Sequence[Remark], found: LinkCheck | None) -> str:
 
 def headline(remarks: Sequence[Remark], found: LinkCheck | None) -> tuple[str, ...]:
     """Return the finding in one sentence, then its numbers and further suspicious values."""
-    suspicious = [pretty(_sentence(one.text)) for one in remarks if one.weight != 'note']
+    suspicious = [pretty(sentence(one.text)) for one in remarks if one.weight != 'note']
     impossible = [one for one in remarks if one.weight == 'bad']
     values = suspicious or ['No impossible or suspicious value in the description.']
     if found is None:
@@ -111,7 +111,7 @@ def headline(remarks: Sequence[Remark], found: LinkCheck | None) -> tuple[str, .
         f'{digits(found.fitted_error_percent)} % with fitted links.'
     )
     if found.fault:
-        first = _sentence(f'the recording cannot check the links: {found.fault}')
+        first = sentence(f'the recording cannot check the links: {found.fault}')
     elif found.agrees:
         first = 'The links of the URDF agree with the recording.'
     elif found.explained < 0.9:  # with a smaller share, links are not the cause
@@ -126,11 +126,6 @@ def headline(remarks: Sequence[Remark], found: LinkCheck | None) -> tuple[str, .
     if found.wrong and not suspicious:
         return first, errors
     return (*values, first, errors) if impossible else (first, errors, *values)
-
-
-def _sentence(text: str) -> str:
-    text = text[:1].upper() + text[1:]
-    return text if text.endswith('?') else f'{text.rstrip(".")}.'
 
 
 def _wrong_mass(found: LinkCheck, k: int) -> str:
@@ -173,7 +168,7 @@ def description_check_report(
     """Return the page of a check, one HTML file that loads nothing."""
     first, *others = headline(remarks, links)
     grade, bars = check_word(remarks, links), None
-    notes = [_sentence(one.text) for one in remarks if one.weight == 'note']
+    notes = [sentence(one.text) for one in remarks if one.weight == 'note']
     if links is not None and not links.fault:
         others = [text for text in others if not text.startswith('Torque error')]  # bars
         errors = links.error_percent, links.fitted_error_percent
@@ -281,11 +276,9 @@ def _curves_section(found: Inspection) -> ContentSection:
         panels: list[tuple[str, str, list[Templated]]] = []
         for quantity, own, values, lines in quantities:
             if values is not None:
-                chosen = thinned(values[:, k])
-                chart = Chart(
-                    recording.t[chosen],
-                    [Series(quantity, values[chosen, k], 'after')],
-                    'time [s]',
+                chart = Chart.over_time(
+                    recording.t,
+                    [Series(quantity, values[:, k], 'after')],
                     f'{quantity} [{own}]',
                     height=160,
                     link='time',
@@ -294,12 +287,9 @@ def _curves_section(found: Inspection) -> ContentSection:
                 )
                 panels.append((name if not panels else '\N{NO-BREAK SPACE}', '', [chart]))
         blocks.append(Panels(panels, three=True))
-    steps = 1e3 * np.diff(recording.t)
-    chosen = thinned(steps)
-    chart = Chart(
-        recording.t[1:][chosen],
-        [Series('step', steps[chosen], 'residual')],
-        'time [s]',
+    chart = Chart.over_time(
+        recording.t[1:],
+        [Series('step', 1e3 * np.diff(recording.t), 'residual')],
         'step [ms]',
         height=150,
         legend=False,

@@ -13,7 +13,7 @@ from armid_ros.identification import Fit, Identification, Score, Verification
 from armid_ros.identification.assess.grade_limits import LIMITS
 from armid_ros.identification.fitting.identifiability import excludes_zero
 from armid_ros.recording import Recording
-from armid_ros.report.notation import counted, digits, plain
+from armid_ros.report.notation import counted, digits, plain, sentence
 from armid_ros.report.statistics import explained_shares, MIN_TREND_SHARE, Whiteness
 import numpy as np
 
@@ -90,7 +90,7 @@ def judge(
         *_of_errors(result, training, held_out, misfits),
         *_of_residuals(result, fits or result.training),
         *([] if verification is None else _of_verification(verification, misfits)),
-        *((note[0].upper() + note[1:] + '.', '') for note in result.notes if note not in known),
+        *((sentence(note), '') for note in result.notes if note not in known),
     ]
     steps = [step for _, step in findings if step]
     if held_out is not None and not steps:
@@ -182,8 +182,8 @@ def residual_trends(joints: Sequence[str], fits: Sequence[Fit]) -> tuple[str, ..
 def _of_residuals(result: Identification, fits: Sequence[Fit]) -> Iterator[Caution]:
     """Yield statements on residuals and excitation."""
     joints = result.arm.robot.joints
-    for sentence in residual_trends(joints, fits):
-        yield sentence, 'Find the missing effect with armid diagnose, and add it with --effects.'
+    for trend in residual_trends(joints, fits):
+        yield trend, 'Find the missing effect with armid diagnose, and add it with --effects.'
     coloured = [
         name
         for joint, name in enumerate(joints)
@@ -214,7 +214,7 @@ def _of_residuals(result: Identification, fits: Sequence[Fit]) -> Iterator[Cauti
 def _of_verification(verification: Verification, misfits: bool) -> Iterator[Caution]:
     """Yield statements on simulations and the test for encoder noise."""
     for text in verification.left_out:
-        yield text[0].upper() + text[1:] + '.', ''
+        yield sentence(text), ''
     worse = ', '.join(sorted({name for pair in verification.forward for name in pair.worse}))
     if worse:
         yield (

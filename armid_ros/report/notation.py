@@ -46,6 +46,12 @@ def plain(value: float, count: int = 3) -> str:
     return f'{value:.0f}' if whole else f'{value:.{count}g}'
 
 
+def sentence(text: str) -> str:
+    """Return a text with a capital letter and a full stop."""
+    text = text[:1].upper() + text[1:]
+    return text if text.endswith('?') else f'{text.rstrip(".")}.'
+
+
 def with_interval(value: float, std: float, unit: str) -> str:
     """Return a value with its 95 % interval and unit, an angle in degrees as well."""
     text = _plus_minus(value, std, f' {pretty(unit)}'.rstrip())

@@ -9,7 +9,7 @@ import re
 
 from armid_ros.arm import ArmModel
 from armid_ros.estimate import Estimate, measured, name_in_words, ParameterName, symbol_in_words
-from armid_ros.identification import Identification, Score
+from armid_ros.identification import Fit, Identification, Score
 from armid_ros.identification.fitting.identifiability import HALF_WIDTH, Unidentified
 from armid_ros.motion import FloatArray
 from armid_ros.report.blocks import (
@@ -212,7 +212,7 @@ def parameter_section(
 
 
 def joint_columns(
-    result: Identification, description: ArmModel, held_out: Score | None
+    result: Identification, description: ArmModel, held_out: Sequence[Fit]
 ) -> dict[str, list[str]]:
     """
     Return the columns of a table with a row for each joint, by their heads.
@@ -223,13 +223,13 @@ def joint_columns(
         The identified model.
     description : ArmModel
         The model before.
-    held_out : Score or None
-        Errors on held-out recordings; those of the fit without.
+    held_out : sequence of Fit
+        Predictions of held-out recordings; without any, the errors are those of the fit.
 
     """
     estimate, joints = result.estimate, result.arm.robot.joints
-    errors = (held_out or Score.of(result.training)).joint_relative_error_percent
-    head = 'error (fit)' if held_out is None else 'error'
+    errors = Score.of(held_out or result.training).joint_relative_error_percent
+    head = 'error' if held_out else 'error (fit)'
     columns = {'joint': list(joints), head: [f'{digits(error)} %' for error in errors]}
     for head, parameter in _FRICTION.items():
         own = [k for k, one in enumerate(estimate.parameters) if one.name == parameter]

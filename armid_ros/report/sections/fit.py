@@ -18,8 +18,8 @@ from armid_ros.report.blocks import (
     Panels,
     Paragraph,
 )
-from armid_ros.report.charts import Chart, joined, joined_time, Role, Series, thinned
-from armid_ros.report.notation import counted, digits, plain
+from armid_ros.report.charts import Chart, joined, joined_time, Role, Series
+from armid_ros.report.notation import counted, digits, plain, sentence
 from armid_ros.report.page import Templated
 from armid_ros.robots import Robot
 import numpy as np
@@ -144,25 +144,19 @@ def _fit_charts(fits: Sequence[Fit], joint: int, unit: str, link: str) -> tuple[
     predicted = joined([fit.predicted[:, joint] for fit in fits])
     residual = measured - predicted
     counts = joined([fit.informative[:, joint].astype(float) for fit in fits]) > 0.5
-    kept = thinned(measured, residual)
-    torque_chart = Chart(
-        t[kept],
-        [
-            Series('measured', measured[kept], 'measured'),
-            Series('predicted', predicted[kept], 'predicted'),
-        ],
-        'time [s]',
+    torque_chart = Chart.over_time(
+        t,
+        [Series('measured', measured, 'measured'), Series('predicted', predicted, 'predicted')],
         f'torque [{unit}]' if unit == 'N m' else f'force [{unit}]',
         height=200,
         link=link,
     )
-    residual_chart = Chart(
-        t[kept],
+    residual_chart = Chart.over_time(
+        t,
         [
-            Series('at rest, not counted', np.where(counts, np.nan, residual)[kept], 'faint'),
-            Series('residual', np.where(counts, residual, np.nan)[kept], 'residual'),
+            Series('at rest, not counted', np.where(counts, np.nan, residual), 'faint'),
+            Series('residual', np.where(counts, residual, np.nan), 'residual'),
         ],
-        'time [s]',
         f'residual [{unit}]',
         height=145,
         link=link,
@@ -208,7 +202,7 @@ def forward_section(
             own.append(Paragraph(f'The model before cannot be simulated: {inconsistent}.'))
         comment = pair.comment()
         if comment:
-            own.append(Paragraph(f'{comment[:1].upper()}{comment[1:]}.'))
+            own.append(Paragraph(sentence(comment)))
         errors = [1e3 * score.position_error for *_, score in models]
         for unit in dict.fromkeys(pair.after.units):
             rows = [
@@ -236,16 +230,15 @@ def _worst_joint(
     farthest = max((score for *_, score in models), key=lambda one: one.position_error.max())
     worst, motion = int(farthest.position_error.argmax()), pair.after.motion
     curves = [1e3 * (score.simulated[:, worst] - motion.q[:, worst]) for *_, score in models]
-    kept, joint = thinned(*curves), robot.joints[worst]
+    joint = robot.joints[worst]
     return [
         Paragraph(f'Position error of {joint}, the worst joint, over time:', 'hint'),
-        Chart(
-            motion.t[kept],
+        Chart.over_time(
+            motion.t,
             [
-                Series(label, curve[kept], role)
+                Series(label, curve, role)
                 for (role, label, _), curve in zip(models, curves, strict=True)
             ],
-            'time [s]',
             f'{joint}: error [m{pair.after.units[worst]}]',
             height=190,
             symmetric=True,
