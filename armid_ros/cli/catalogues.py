@@ -10,9 +10,6 @@ from armid_ros.cli import parameters
 from armid_ros.cli.terminal import say
 import click
 
-#: Placeholder for a non-breaking space.
-_JOINED = '\u00a0'
-
 
 @click.command(epilog='Example: armid robots')
 @parameters.as_json
@@ -26,8 +23,7 @@ def robots(as_json: bool) -> None:
         click.echo(json_text(rows, indent=1))
         return
     for row in rows:
-        text = f'{row["name"]}: {row["what it is"]}'
-        say(textwrap.fill(text, 80, subsequent_indent='    ', break_on_hyphens=False))
+        _say_wrapped(f'{row["name"]}: {row["what it is"]}')
 
 
 @click.command(epilog='Example: armid effects --json')
@@ -49,15 +45,15 @@ def effects(as_json: bool) -> None:
     if as_json:
         click.echo(json_text(rows, indent=1))
         return
-    lines = textwrap.TextWrapper(80, '', '    ', break_long_words=False, break_on_hyphens=False)
     for row in rows:
-        lines.initial_indent = ''
-        say(lines.fill(f'{row["name"]}: {row["what it is"]}'))
-        lines.initial_indent = '    '
+        _say_wrapped(f'{row["name"]}: {row["what it is"]}')
         for kind, head in (('parameters', ''), ('shapes', 'shape: ')):
-            names = ', '.join(name.replace(' ', _JOINED) for name in row[kind])
-            if names:
-                say(lines.fill(head + names).replace(_JOINED, ' '))
+            if row[kind]:
+                _say_wrapped(f'    {head}{", ".join(row[kind])}')
+
+
+def _say_wrapped(text: str) -> None:
+    say(textwrap.fill(text, 80, subsequent_indent='    ', break_on_hyphens=False))
 
 
 def _with_unit(name: str, unit: str) -> str:

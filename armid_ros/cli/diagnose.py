@@ -44,7 +44,7 @@ def share_of_percent(
 @parameters.validate
 @click.option(
     '--model',
-    type=click.Path(path_type=Path),
+    type=parameters.ModelPath(path_type=Path),
     help='model.yaml of the arm; its effects are part of the model in question.',
 )
 @click.option(
@@ -155,7 +155,6 @@ def diagnose(
     """Find which effect a model lacks, and add it."""
     if baseline and no_baseline:
         raise click.UsageError('give --baseline or --no-baseline, not both')
-    model = model / 'model.yaml' if model is not None and model.is_dir() else model
     if against and (model or baseline):
         raise click.UsageError('give --against without --model and --baseline')
     from armid_ros.api.diagnosis import diagnose as run

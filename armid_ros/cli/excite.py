@@ -30,19 +30,14 @@ _SHARED = {
 }  # fmt: skip
 
 
-class Speed(click.ParamType[str | float]):
-    """Speed class, or share of the velocity and acceleration limits."""
-
-    name = 'speed'
-
-    def convert(self, value: Any, param: Any, ctx: Any) -> str | float:
-        """Parse a class or a share."""
-        if value in SPEED_CLASSES:
-            return str(value)
-        try:
-            return float(value)
-        except ValueError:
-            self.fail(f"'{value}' is neither one of {', '.join(SPEED_CLASSES)} nor a number")
+def _speed(context: click.Context, parameter: click.Parameter, value: Any) -> str | float:
+    """Return a speed class, or a share of the velocity and acceleration limits."""
+    try:
+        return str(value) if value in SPEED_CLASSES else float(value)
+    except ValueError:
+        known = ', '.join(SPEED_CLASSES)
+        text = f"'{value}' is neither one of {known} nor a number"
+        raise click.BadParameter(text, context, parameter) from None
 
 
 @click.command(epilog='Example: armid excite --robot ur5.urdf --duration 40 --out plan')
@@ -82,7 +77,7 @@ class Speed(click.ParamType[str | float]):
 @click.option(
     '--speed',
     shell_complete=parameters.completed,
-    type=Speed(),
+    callback=_speed,
     metavar='S',
     default='fast',
     show_default=True,
@@ -125,7 +120,9 @@ class Speed(click.ParamType[str | float]):
     help='With --criterion T: effects that may act instead of --effect.',
 )
 @click.option(
-    '--model', type=click.Path(path_type=Path), help='model.yaml of the arm with its effects.'
+    '--model',
+    type=parameters.ModelPath(path_type=Path),
+    help='model.yaml of the arm with its effects.',
 )
 @click.option(
     '--start',

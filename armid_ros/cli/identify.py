@@ -119,7 +119,6 @@ def identify(
             [*bags, *validate],
             seed,
             source=options.kept_source(robot_source, robot, staged.folder),
-            settings=result.document()['settings'],
         )
         options.deliver(result, staged, origin, as_json, result.summary(every))
     if strict and result.grade == 'unusable':

@@ -20,7 +20,7 @@ from armid_ros.cli.following import following
 from armid_ros.cli.parameters import CRC, FORCE, MEMORY
 from armid_ros.cli.terminal import say
 from armid_ros.effects import make_effect
-from armid_ros.errors import ModelError, RecordingError, RobotError, visible
+from armid_ros.errors import ModelError, RobotError, visible
 from armid_ros.files import (
     default_memory_limit,
     json_text,
@@ -190,10 +190,9 @@ def origin(
     seed: int | None = None,
     *,
     source: str = '',
-    settings: Mapping[str, Any] | None = None,
 ) -> ResultOrigin:
     """Return the origin of a result: --robot, its name in model.yaml, and the `provenance`."""
-    return ResultOrigin(robot, source, provenance(paths, settings, seed))
+    return ResultOrigin(robot, source, provenance(paths, seed=seed))
 
 
 def read_settings() -> ReadSettings:
@@ -310,12 +309,6 @@ def read(paths: Sequence[Path], robot: Robot, topic: str | None) -> list[Recordi
             click.echo('\n'.join(lines) if body not in shown else f'{lines[0]}, alike', err=True)
         shown.add(body)
 
-    for path in paths if settings.rename else ():
-        if ':' in path.name and not path.exists():  # a second pair of names without --rename
-            raise RecordingError(
-                f"there is no recording '{path}'; to rename several names, repeat the option: "
-                f"--rename '{settings.rename[-1][0]}:{settings.rename[-1][1]}' --rename '{path}'"
-            )
     return [
         read_recording(
             path,

@@ -41,6 +41,15 @@ class OutPath(click.Path):
         return super().convert(value, param, ctx)
 
 
+class ModelPath(click.Path):
+    """Path of a model.yaml, or of the folder with it that identify or diagnose wrote."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """Return the path of the file."""
+        path = Path(super().convert(value, param, ctx))
+        return path / 'model.yaml' if path.is_dir() else path
+
+
 def completed(_: click.Context, parameter: click.Parameter, incomplete: str) -> list[str]:
     """Complete the last name of a list: a shipped robot, an effect, or a word of the option."""
     before, sign, last = incomplete.rpartition('=' if parameter.name == 'priors' else ',')

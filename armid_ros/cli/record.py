@@ -31,7 +31,11 @@ if TYPE_CHECKING:
     help=f'Effect such as {EFFECT_EXAMPLES}. Every joint gets the values; for different joints '
     'give the option several times, as NAME@A:k=v and NAME@B:k=w.',
 )
-@click.option('--model', type=click.Path(path_type=Path), help='A model.yaml of armid identify.')
+@click.option(
+    '--model',
+    type=parameters.ModelPath(path_type=Path),
+    help='A model.yaml of armid identify.',
+)
 @click.option(
     '--trajectory', type=click.Path(path_type=Path), help='A YAML, CSV or bag of armid excite.'
 )

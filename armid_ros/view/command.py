@@ -19,7 +19,7 @@ import click
 @click.argument('bag', type=click.Path(path_type=Path))
 @click.option(
     '--model',
-    type=click.Path(path_type=Path),
+    type=parameters.ModelPath(path_type=Path),
     help='A model.yaml, or the folder that identify or diagnose wrote: its torque is predicted, '
     'and joints that the diagnosis names are coloured.',
 )
@@ -55,10 +55,10 @@ def view(
         arm = ArmModel(options.open_robot(robot_source or '-', gravity, joints, [bag]))
     else:
         robot = options.open_robot(robot_source, gravity, joints, [bag]) if robot_source else None
-        arm = options.model_of(model / 'model.yaml' if model.is_dir() else model, robot)
+        arm = options.model_of(model, robot)
     (recording,) = options.read([bag], arm.robot, topic)
     if model is not None and not mark:  # joints of the named effects of a diagnosis
-        path = (model if model.is_dir() else model.parent) / 'diagnosis.json'
+        path = model.with_name('diagnosis.json')
         if path.is_file():
             effects = json.loads(path.read_text(encoding='utf-8'))['effects']
             mark = tuple(dict.fromkeys(joint for one in effects for joint in one['joints']))

@@ -23,7 +23,7 @@ _KINDS_OF = {'joint': LOADS, 'frame': LOADS, 'spread': ('ranges',)}
 
 
 @click.command('export', epilog='Example: armid export found/model.yaml --to cpp --out torque.hpp')
-@click.argument('model', type=click.Path(path_type=Path))
+@click.argument('model', type=parameters.ModelPath(path_type=Path))
 @click.option(
     '--to',
     'kind',
@@ -74,7 +74,6 @@ def export(
         typed = context.get_parameter_source(name) is ParameterSource.COMMANDLINE
         if typed and kind not in kinds:
             raise click.UsageError(f'--{name} belongs to --to {", ".join(kinds)}, not to {kind}')
-    model = model / 'model.yaml' if model.is_dir() else model
     if out.exists() and model.exists() and out.samefile(model):
         raise OutputError(f'{out}: is the model itself; name another file with --out')
     robot = None
