@@ -22,7 +22,7 @@ from armid_ros.report.blocks import (
     TableCell,
     VerdictSection,
 )
-from armid_ros.report.notation import counted, digits, pretty, robot_label
+from armid_ros.report.notation import counted, digits, robot_label, sentence, with_interval
 from armid_ros.report.page import Page, Section
 from armid_ros.report.parameter_tables import estimate_text, full_label, parameter_folds
 from armid_ros.report.provenance import ResultOrigin
@@ -30,9 +30,9 @@ from armid_ros.report.provenance import ResultOrigin
 #: Columns of the table of changes.
 HEADS = ('parameter', 'before', 'after', 'difference, 95 %')
 _WHY = {
-    'motion': 'the motion of the {other} does not identify {them}',
-    'effect': 'the model of the {other} does not have {them}',
-    'grouping': 'the data of the {other} group parameters differently',
+    'motion': 'not identified by the motion of the {other}',
+    'effect': 'not in the model of the {other}',
+    'grouping': 'grouped differently by the data of the {other}',
 }
 
 
@@ -55,9 +55,10 @@ def compare_report(comparison: Comparison, origin: ResultOrigin) -> str:
     """
     facts = []
     for heading, side in (('First', comparison.before), ('Second', comparison.after)):
-        error = side.error_percent
-        error_text = '' if error is None else f'; torque error over all joints {error:.2f} %'
-        facts.append((heading, f'{side.source}: {robot_label(side.robot)}{error_text}'))
+        text = f'{side.source}: {robot_label(side.robot)}'
+        if side.error_percent is not None:
+            text += f'; torque error over all joints {side.error_percent:.2f} %'
+        facts.append((heading, text))
     rows = change_rows(comparison)
     sections: list[Section] = [
         VerdictSection(
@@ -72,8 +73,7 @@ def compare_report(comparison: Comparison, origin: ResultOrigin) -> str:
         ContentSection('Input', [FactList(facts)]),
         Origin(origin.provenance),
     ]
-    robot = robot_label(comparison.after.robot)
-    title = f'Comparison of two identifications of {robot}'
+    title = f'Comparison of two identifications of {robot_label(comparison.after.robot)}'
     subtitle = f'{comparison.before.source} · {comparison.after.source}'
     return Page(title, subtitle, sections).html()
 
@@ -100,18 +100,13 @@ def change_rows(comparison: Comparison) -> list[tuple[str, ...]]:
     """Return a row for each changed parameter, with the columns of `HEADS`."""
     rows = []
     for change in comparison.changed:
-        values = [(change.before, change.before_std), (change.after, change.after_std)]
-        ends = [
-            measured(x, HALF_WIDTH * std)[0] if excludes_zero(x, std) else 'includes 0'
-            for x, std in values
-        ]
-        number, reach = measured(change.difference, HALF_WIDTH * change.std)
-        share = ''
-        if ends[0] != 'includes 0':
-            share = f' ({100.0 * change.difference / abs(change.before):+.0f} %)'
-        sign = '+' * (change.difference > 0.0)
-        by = f'{sign}{number} ± {reach} {pretty(change.parameter.unit)}{share}'
-        rows.append((full_label(change.parameter), *ends, by))
+        before, _ = estimate_text(change.before, change.before_std)
+        after, _ = estimate_text(change.after, change.after_std)
+        by = '+' * (change.difference > 0.0)
+        by += with_interval(change.difference, change.std, change.parameter.unit)
+        if before != 'includes 0':
+            by += f' ({100.0 * change.difference / abs(change.before):+.0f} %)'
+        rows.append((full_label(change.parameter), before, after, by))
     return rows
 
 
@@ -121,16 +116,14 @@ def change_sentences(comparison: Comparison) -> tuple[str, ...]:
     for one in comparison.unusable:
         assert one.fit is not None
         reason = one.fit.reason[:1].lower() + one.fit.reason[1:].rstrip('.')
-        remedy = 'Run armid diagnose to find what the model lacks.'
-        lines.append(f'{one.source} is unusable: {reason}. {remedy}')
+        lines.append(f'{one.source} is unusable: {reason}. Find what it lacks by armid diagnose.')
     if comparison.factors:
-        before, after = comparison.before.source, comparison.after.source
         named = ', '.join(f'{joint} {factor:.3g}' for joint, factor in comparison.factors.items())
         lines.append(
-            f'Inertia and friction of {after} are those of {before} times one factor per joint '
-            f'({named}). Torques of one of the two are in another unit, or are currents, as '
-            'drivers change with their version. Convert them with --current-gain, and identify '
-            'again.'
+            f'Inertia and friction of {comparison.after.source} are those of '
+            f'{comparison.before.source} times one factor per joint ({named}). Torques of one of '
+            'the two are in another unit, or are currents, as drivers change with their version. '
+            'Convert them with --current-gain, and identify again.'
         )
         return tuple(lines)
     if comparison.load is not None:
@@ -138,15 +131,14 @@ def change_sentences(comparison: Comparison) -> tuple[str, ...]:
     else:
         lines += [_change(change) for change in comparison.changed[:1]]
     lines += [_count_sentence(comparison), *_residuals(comparison), *_not_compared(comparison)]
-    changed = comparison.changed
     for group in comparison.changed_together:
         what = f'Effects at {group.joint}' if group.joint else 'The rigid body'
         lines.append(
             f'{what} changed as a group (p = {group.p_value:.1g}), though none of its '
             f'{len(group.parameters)} parameters alone is significant.'
         )
-    rigid = [c for c in changed if c.parameter.rigid]
-    if comparison.load is None and len(rigid) >= 3 and len(rigid) > len(changed) - len(rigid):
+    rigid = [c for c in comparison.changed if c.parameter.rigid]
+    if comparison.load is None and len(rigid) > max(2, len(comparison.changed) / 2):
         lines.append(
             f'Mainly inertial parameters changed, most clearly at {rigid[0].parameter.joint}: a '
             'tool or load was added or removed, or gravity or mounting differ.'
@@ -158,12 +150,10 @@ def change_sentences(comparison: Comparison) -> tuple[str, ...]:
 
 def _change(change: ParameterChange) -> str:
     """Return a sentence on the change of a parameter, with the 95 % interval of the change."""
-    ends = [measured(x, HALF_WIDTH * change.std) for x in (change.before, change.after)]
-    verb, label = 'rose' if change.difference > 0.0 else 'fell', full_label(change.parameter)
-    unit = pretty(change.parameter.unit)
-    return (
-        f'{label[:1].upper()}{label[1:]} {verb} from {ends[0][0]} to {" ± ".join(ends[1])} {unit}.'
-    )
+    verb = 'rose' if change.difference > 0.0 else 'fell'
+    start, _ = measured(change.before, HALF_WIDTH * change.std)
+    end = with_interval(change.after, change.std, change.parameter.unit)
+    return sentence(f'{full_label(change.parameter)} {verb} from {start} to {end}')
 
 
 def _count_sentence(comparison: Comparison) -> str:
@@ -171,17 +161,15 @@ def _count_sentence(comparison: Comparison) -> str:
     changed, others = comparison.changed, len(comparison.not_compared)
     count = counted(len(comparison.changes), 'parameter') + ' that both have' * bool(others)
     also = f'; {others} more {"was" if others == 1 else "were"} not compared' if others else ''
+    joints = ', '.join(dict.fromkeys(c.parameter.joint for c in changed if c.parameter.joint))
+    where = f', at {joints}' if joints else ''
+    if comparison.load is not None and all(c.parameter.rigid for c in changed):
+        return f'These {len(changed)} of {count} follow from it{where}{also}.'
     if changed or comparison.changed_together:
-        joints = ', '.join(dict.fromkeys(c.parameter.joint for c in changed if c.parameter.joint))
-        where = f', at {joints}' if joints else ''
-        if comparison.load is not None and all(c.parameter.rigid for c in changed):
-            return f'These {len(changed)} of {count} follow from it{where}{also}.'
         return f'{len(changed)} of {count} changed beyond uncertainty{where}{also}.'
-    but = ''
+    but = ', but the residuals did' if comparison.changed_residuals else ''
     if comparison.unusable:
         but = ', but an unusable model is no evidence'
-    elif comparison.changed_residuals:
-        but = ', but the residuals did'
     return f'None of {count} changed beyond its uncertainty{but}{also}.'
 
 
@@ -225,9 +213,9 @@ def _load(comparison: Comparison, load: LoadChange) -> tuple[str, str]:
     rivals = ''
     if load.rivals:
         rivals = f'; it may as well be on {" or ".join(named[1:])}'
-    mass = ' ± '.join(measured(abs(load.mass), HALF_WIDTH * load.mass_std))
+    mass = with_interval(abs(load.mass), load.mass_std, 'kg')
     return (
-        f'A load of {mass} kg {verb} {named[0]}{rivals}.',
+        f'A load of {mass} {verb} {named[0]}{rivals}.',
         f'{where}It explains every change of the inertial parameters.',
     )
 
@@ -253,7 +241,7 @@ def _not_compared(comparison: Comparison) -> tuple[str, ...]:
         for why, template in _WHY.items():
             some = [one for one in found if one.why == why]
             if some:
-                reason = template.format(other=other, them='it' if len(some) == 1 else 'them')
+                reason = template.format(other=other)
                 # a line names six parameters
                 shown = ', '.join(full_label(one.parameter) for one in some[:6])
                 more = f' and {len(some) - 6} more' * (len(some) > 6)
@@ -291,12 +279,10 @@ def changes_section(comparison: Comparison) -> ContentSection:
             )
             for value, std in ((one.before, one.before_std), (one.after, one.after_std))
         )
-        known = excludes_zero(one.before, one.before_std) or excludes_zero(
-            one.after, one.after_std
-        )
+        unknown = 'includes' in before and 'includes' in after
         return (
             before,
-            TableCell(after, 'changed' if one.changed else '' if known else 'unknown'),
+            TableCell(after, 'changed' if one.changed else 'unknown' * unknown),
             f'{one.deviations:+.1f}',
             IntervalTrack(one.after, HALF_WIDTH * one.after_std, one.before),
         )

@@ -23,7 +23,15 @@ from armid_ros.report.blocks import (
     VerdictSection,
 )
 from armid_ros.report.charts import Chart, Series
-from armid_ros.report.notation import counted, digits, plain, pretty, robot_label, sentence
+from armid_ros.report.notation import (
+    counted,
+    digits,
+    plain,
+    pretty,
+    robot_label,
+    sentence,
+    with_interval,
+)
 from armid_ros.report.page import Page, Section, Templated
 from armid_ros.report.provenance import DEFAULT_ORIGIN, ResultOrigin
 import numpy as np
@@ -133,9 +141,9 @@ def _wrong_mass(found: LinkCheck, k: int) -> str:
     change, reach = found.measured_mass[k] - found.mass[k], HALF_WIDTH * found.mass_std[k]
     if not abs(change) > reach:
         return ''
-    size, interval = measured(abs(float(change)), float(reach))
+    size = with_interval(abs(float(change)), float(found.mass_std[k]), 'kg')
     word = 'light' if change > 0.0 else 'heavy'
-    return f'is {size} ± {interval} kg too {word} at {found.joints[k]}'
+    return f'is {size} too {word} at {found.joints[k]}'
 
 
 def link_rows(found: LinkCheck) -> list[tuple[str, ...]]:
