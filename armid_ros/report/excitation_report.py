@@ -46,7 +46,7 @@ from armid_ros.report.charts import Chart, Role, Series
 from armid_ros.report.judgement import GOOD_CONDITION, WEAK_CONDITION
 from armid_ros.report.notation import counted, digits, plain, pretty, robot_label
 from armid_ros.report.page import Page, Section, Templated
-from armid_ros.report.parameter_tables import effects_in_words, full_label, parameter_folds
+from armid_ros.report.parameter_tables import arm_facts, full_label, parameter_folds
 from armid_ros.report.provenance import ResultOrigin
 from armid_ros.report.sections.diagnosed import isolability_section
 from armid_ros.report.sections.fit import ZOOM
@@ -228,7 +228,8 @@ def _input_section(
     settings, run = design.settings, design.excitation
     criterion = f'{settings.criterion}: {CRITERIA[settings.criterion]}'
     focus = f'; focus on {", ".join(settings.focus)}' if settings.focus else ''
-    start = f'{_numbers(whole.approach.q[0])}, with an approach of {whole.approach.duration:.1f} s'
+    pose = ', '.join(f'{q:.3g}' for q in whole.approach.q[0])
+    start = f'{pose}, with an approach of {whole.approach.duration:.1f} s'
     if start_reason:
         start += f'; {start_reason}'
     name = settings.speed
@@ -239,10 +240,7 @@ def _input_section(
         for value, unit in zip(design.noise, arm.robot.torque_units, strict=True)
     )
     facts = [
-        ('Robot', robot),
-        ('Joints', ', '.join(run.joints)),
-        ('Gravity', f'({_numbers(arm.robot.gravity)}) m/s²'),
-        ('Effects', effects_in_words(arm)),
+        *arm_facts(arm, robot),
         ('Target', f'{TARGETS[settings.target]}{focus}'),
         ('Criterion', criterion),
         ('Speed', speed),
@@ -261,10 +259,6 @@ def _input_section(
         ),
     ]
     return ContentSection('Input', [FactList(facts)])
-
-
-def _numbers(values: FloatArray) -> str:
-    return ', '.join(f'{value:.3g}' for value in values)
 
 
 def _motion_section(

@@ -30,7 +30,7 @@ from armid_ros.report.judgement import judge
 from armid_ros.report.notation import counted, digits, plain, pretty, robot_label, sentence
 from armid_ros.report.page import Page, Section
 from armid_ros.report.parameter_tables import (
-    effects_in_words,
+    arm_facts,
     full_label,
     not_as_described,
     parameter_section,
@@ -165,14 +165,10 @@ def _contradictions(result: Identification, description: ArmModel) -> list[str]:
 def _input_section(
     result: Identification, robot: str, training: Sequence[str], validation: Sequence[str]
 ) -> ContentSection:
-    gravity = ', '.join(f'{g:.4g}' for g in result.arm.robot.gravity)
     used = result.used
     kept = used.rate_hz / used.decimation
     facts = [
-        ('Robot', robot),
-        ('Joints', ', '.join(result.arm.robot.joints)),
-        ('Gravity', f'({gravity}) m/s²'),
-        ('Effects', effects_in_words(result.arm)),
+        *arm_facts(result.arm, robot),
         ('Method', IN_WORDS[result.settings.method]),
         (
             'Filter',

@@ -241,18 +241,13 @@ def _contents_section(found: Inspection) -> ContentSection:
 
 
 def _joints_section(found: Inspection) -> ContentSection:
-    """Return ranges, speeds and efforts; heads have no line break within a unit."""
-    heads = list(joint_heads(found))
-    if len(set(found.units)) == 1:
-        for column, like in ((2, 1), (5, 1), (8, 7)):
-            heads[column] += heads[like][heads[like].index(' [') :]
-    heads = [head.replace('N m', 'N\N{NO-BREAK SPACE}m') for head in heads]
+    """Return ranges, speeds and efforts."""
     hint = (
         'Speed: 99th percentile, from the positions. Step: smallest change of position between '
         'samples. Velocity ratio: recorded velocity over the derivative of the positions; 1 if '
         'units and signs agree.'
     )
-    table = DataTable(heads, joint_rows(found), kind='tight')
+    table = DataTable(joint_heads(found), joint_rows(found), kind='tight')
     return ContentSection('Joints', [table, Paragraph(hint, 'hint')])
 
 

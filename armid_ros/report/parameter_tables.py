@@ -77,9 +77,15 @@ def grouping(name: ParameterName, links: Sequence[str] = ()) -> str:
     return _SYMBOL.sub(named, name.name)
 
 
-def effects_in_words(arm: ArmModel) -> str:
-    """List the effects of an arm by name, or state that there are none."""
-    return ', '.join(name_in_words(effect.name) for effect in arm.effects) or 'none'
+def arm_facts(arm: ArmModel, robot: str) -> list[tuple[str, str]]:
+    """Return the description as given, driven joints, gravity and effects of an arm."""
+    gravity = ', '.join(f'{g:.4g}' for g in arm.robot.gravity)
+    return [
+        ('Robot', robot),
+        ('Joints', ', '.join(arm.robot.joints)),
+        ('Gravity', f'({gravity}) m/s²'),
+        ('Effects', ', '.join(name_in_words(effect.name) for effect in arm.effects) or 'none'),
+    ]
 
 
 def parameter_folds(
