@@ -242,12 +242,6 @@ def test_a_recording_in_place_of_the_robot_is_answered_with_the_order(runs):
         ar.identify(runs[0], 'my_arm.urdf')
 
 
-def test_a_folder_in_place_of_a_model_is_answered_with_the_model_in_it(tmp_path):
-    (tmp_path / 'model.yaml').touch()
-    with pytest.raises(ar.ArmidError, match=r'name .*model\.yaml'):
-        ar.identify(tmp_path, 'monday')
-
-
 def test_a_model_is_read_with_a_robot_in_any_form(arm, tmp_path):
     path = tmp_path / 'model.yaml'
     ar.save_model(path, arm, 'nowhere.urdf')

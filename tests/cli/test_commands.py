@@ -227,12 +227,6 @@ def test_a_number_that_is_not_finite_is_refused_with_its_option(arguments, numbe
     assert f"'{arguments[-1]}'" in said and number in said
 
 
-@pytest.mark.parametrize('command', ['identify', 'diagnose', 'inspect', 'excite', 'simulate'])
-def test_a_seed_is_no_negative_number(command, tmp_path):
-    said = armid(command, '--seed', -1, '--robot', ROBOT, '--out', tmp_path / 'x', 'bag', code=2)
-    assert "'--seed'" in said.stderr and '>=0' in said.stderr
-
-
 def test_an_effect_that_makes_a_link_no_body_is_named(tmp_path):
     """The mass is as far from the joint as its first moment says, and has no inertia there."""
     effect = 'payload@wrist_pitch:payload_m=0.4,payload_mz=0.4'
@@ -295,13 +289,6 @@ def test_commands_and_options_are_completed():
     assert {'robots', 'recover'} <= set(completed('r'))
     assert completed('identify', '--effects') == ['--effects']
     assert '--version' in completed('--v')
-
-
-def test_values_are_completed():
-    assert 'humanoid_arm' in completed('identify', '--robot', 'hum')
-    assert completed('identify', '--effects', 'viscous_friction,stribeck') == [
-        'viscous_friction,stribeck_friction'
-    ]
 
 
 @pytest.mark.parametrize(

@@ -117,32 +117,6 @@ def test_what_a_model_leaves_is_a_change_where_no_parameter_is(tmp_path, compare
     }
 
 
-def test_what_is_not_compared_is_counted_with_the_reason(tmp_path, compared):
-    lost = dict(zip(('name', 'joint', 'unit'), FRICTION, strict=True)) | {
-        'reason': 'this motion does not show it'
-    }
-    spring = ('spring_stiffness', 'elbow', 'N m/rad')
-    rows = rows_of({INERTIA: (0.501, 0.01), spring: (1, 1)})
-    text, page, document = compared(
-        identified(tmp_path / 'a', 0.08),
-        identified(tmp_path / 'b', 0.08, parameters=rows, not_identified=[lost]),
-    )
-    assert 'of 1' in text and '2 more' in text
-    assert '>unchanged<' not in page and '2 more' in page
-    assert document['not_compared'] == 2
-    missing = document['only_before'] + document['only_after']
-    assert [one['why'] for one in missing] == ['motion', 'effect']
-
-
-def test_arms_of_other_kinematics_are_refused(tmp_path):
-    first, second = (
-        identified(tmp_path / name, 0.08, description={'kinematics': name}) for name in 'ab'
-    )
-    text = armid('compare', first, second, '--out', tmp_path / 'none', code=2).output
-    assert len(text.strip().splitlines()) == 1
-    assert not (tmp_path / 'none').exists()
-
-
 def modelled(folder, mass):
     """Write a model, and the identification beside it that tells sums of its parameters alone."""
     robot = load_robot('humanoid_arm')

@@ -132,10 +132,6 @@ def test_stamps_that_are_rounded_are_said_with_their_step(clean):
     assert not any('rounded' in remark for remark in remarks(jittered))
 
 
-def test_what_identification_says_as_well_is_said_once(clean, robot):
-    assert sum('is short' in remark for remark in remarks(short(clean), robot)) == 1
-
-
 def test_a_joint_beyond_its_limit_is_doubted_with_both_numbers(clean, robot):
     elbow = clean.q[:, 3].max()
     shifted = replace(clean, q=clean.q + (robot.upper[3] + 0.3 - elbow) * np.eye(6)[3])
@@ -165,11 +161,6 @@ def test_what_identify_calls_unusable_is_not_taken(clean, robot):
     assert graded.word != 'good'
     assert (found.trial.grade, found.trial.reasons) == (graded.word, graded.reasons)
     assert graded.word in found.verdict and graded.reasons[0] in found.verdict
-
-
-def test_torques_that_nobody_measured_are_said_once(clean, robot):
-    silent = remarks(replace(clean, tau=0.0 * clean.tau), robot)
-    assert sum('torque' in one or 'effort' in one for one in silent) == 1
 
 
 @pytest.mark.parametrize('period', [6.0, 7.973, 8.0])

@@ -4,7 +4,6 @@
 
 import json
 from pathlib import Path
-import re
 from xml.etree import ElementTree
 
 from armid_ros.files.output import is_own
@@ -43,37 +42,15 @@ def test_a_namespace_is_before_every_topic_of_the_nodes():
     assert values[-1] == '/left/online_identifier/predicted_joint_states.effort[1]'
 
 
-def test_panels_of_foxglove_have_the_settings_that_foxglove_reads():
-    """As its sources declare them; what they do not is ignored without a word."""
-    known = {
-        'Plot': 'foxglovePanelTitle paths isSynced xAxisVal sidebarDimension showXAxisLabels '
-        'showYAxisLabels showLegend legendDisplay showPlotValuesInLegend',
-        '3D': 'followTf followMode cameraState scene transforms topics layers publish imageMode',
-        'RawMessages': 'topicPath diffEnabled diffMethod diffTopicPath showFullMessageForDiff',
-        'DiagnosticSummary': 'minLevel pinnedIds hardwareIdFilter topicToRender sortByLevel',
-    }
-    layout = json.loads(plotter_layouts('arm', ('a',))['foxglove.json'])
-    shown = set(re.findall(r'[\w]+![\w]+', json.dumps(layout['layout'])))
-    assert shown == set(layout['configById'])
-    for panel, settings in layout['configById'].items():
-        assert set(settings) == set(known[panel.partition('!')[0]].split())
-
-
-def test_the_arm_and_what_is_drawn_on_it_are_shown_in_the_frame_of_its_base():
+def test_the_arm_is_shown_in_the_frame_of_its_base():
     layouts = plotter_layouts('arm', ('a',), 'left', 'foot')
-    configured = json.loads(layouts['foxglove.json'])['configById']
-    scene = configured['3D!arm']
+    scene = json.loads(layouts['foxglove.json'])['configById']['3D!arm']
     assert scene['followTf'] == 'foot'
-    assert set(scene['topics']) == {'/left/residual_markers/markers'}
-    assert scene['layers']['arm']['layerId'] == 'foxglove.Urdf'
-    assert scene['layers']['arm']['sourceType'] == 'topic'
     assert scene['layers']['arm']['topic'] == '/left/robot_description'
-    assert configured['RawMessages!diagnosis']['topicPath'].startswith('/left/live_diagnosis/')
     manager = yaml.safe_load(layouts['arm.rviz'])['Visualization Manager']
     assert manager['Global Options']['Fixed Frame'] == 'foot'
     _, arm, markers = manager['Displays']
     assert arm['Description Topic']['Value'] == '/left/robot_description'
-    assert arm['Description Topic']['Durability Policy'] == 'Transient Local'
     assert markers['Topic']['Value'] == '/left/residual_markers/markers'
 
 
