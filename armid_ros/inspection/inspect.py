@@ -136,7 +136,6 @@ def inspect(
         *_of_units(recording, joints, robot),
         *_of_motion(recording, joints, sampling),
         *_of_efforts(joints, trial),
-        *_of_temperatures(recording),
     ]
     mixed = two_senders(recording)
     if trial is None and mixed:
@@ -291,16 +290,6 @@ def _of_motion(
             f'positions of {", ".join(coarse)} repeat in most samples while they move: the '
             f'encoder is read slower than at {sampling.rate_hz:.4g} Hz, or its steps are coarse',
         )
-
-
-def _of_temperatures(recording: Recording) -> Iterator[Remark]:
-    """Yield the range of the temperatures of the joints, if measured."""
-    if recording.temperature is None:
-        return
-    heat = recording.temperature.at(recording.t)
-    ends = zip(recording.joints, heat.min(axis=0), heat.max(axis=0), strict=True)
-    ranges = [f'{name} {low:.1f} to {high:.1f}' for name, low, high in ends if np.isfinite(low)]
-    yield Remark('note', f'temperatures [degC]: {", ".join(ranges)}')
 
 
 def _of_efforts(joints: tuple[JointFacts, ...], trial: TrialFit | None) -> Iterator[Remark]:

@@ -99,26 +99,8 @@ class IntervalTrack:
         return round(50.0 + 48.0 * max(-1.0, min(1.0, number / span)), 2)
 
 
-@dataclass(frozen=True)
-class ShareBar:
-    """
-    A bar from the left, as a cell of a table.
-
-    Attributes
-    ----------
-    percent : float
-        Length [%].
-    role : str
-        Role of the series, which gives the colour.
-
-    """
-
-    percent: float
-    role: str
-
-
 #: Cells of a row.
-Cells = Sequence[str | TableCell | IntervalTrack | ShareBar]
+Cells = Sequence[str | TableCell | IntervalTrack]
 
 
 @dataclass(frozen=True)
@@ -130,7 +112,7 @@ class DataTable(Templated):
     ----------
     heads : sequence of str
         Headings of the columns; may be empty.
-    rows : sequence of sequence of (str, TableCell, IntervalTrack or ShareBar)
+    rows : sequence of sequence of (str, TableCell or IntervalTrack)
         Cells.
     words : collection of int
         Columns with text; the others have numbers.

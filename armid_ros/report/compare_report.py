@@ -287,9 +287,6 @@ def changes_section(comparison: Comparison) -> ContentSection:
             IntervalTrack(one.after, HALF_WIDTH * one.after_std, one.before),
         )
 
-    def count(members: list[int]) -> int:
-        return sum(changes[k].changed for k in members)
-
     return ContentSection(
         'Side by side',
         [
@@ -302,8 +299,7 @@ def changes_section(comparison: Comparison) -> ContentSection:
                 tuple(one.parameter for one in changes),
                 ('First', 'Second', 'Difference / std', ''),
                 cells,
-                suffix=lambda members: f'{count(members)} of {len(members)} changed',
-                opened=lambda members: count(members) > 0,
+                changed=[one.changed for one in changes],
             ),
         ],
     )

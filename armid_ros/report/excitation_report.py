@@ -38,7 +38,6 @@ from armid_ros.report.blocks import (
     Origin,
     Panels,
     Paragraph,
-    ShareBar,
     TableCell,
     VerdictSection,
 )
@@ -336,18 +335,15 @@ def _accuracy_section(design: Design, links: Sequence[str] = ()) -> ContentSecti
     """Return the predicted uncertainty of every parameter, best known first."""
     information, described = design.information, design.described
     size = information.std / information.scale
-    longest = float(np.max(size, where=np.isfinite(size), initial=1e-12))
 
     def cells(k: int) -> Cells:
         name, std, value = information.parameters[k], information.std[k], described[k]
         seen, known = bool(np.isfinite(std)), name.rigid or bool(value)
         relative = f'{digits(100.0 * std / abs(value))} %' if value and seen else ''
-        share = 100.0 * float(size[k]) / longest if seen else 100.0
         return (
             f'{value:.3g}' if known else 'not known',
             digits(float(std)) if seen else TableCell('not seen', 'unknown'),
             relative if std < abs(value) or not relative else TableCell('> 100 %', 'unknown'),
-            ShareBar(round(share, 1), 'residual' if seen else 'predicted'),
         )
 
     return ContentSection(
@@ -355,11 +351,11 @@ def _accuracy_section(design: Design, links: Sequence[str] = ()) -> ContentSecti
         [
             Paragraph(
                 'Predicted standard deviation of each parameter after the run, for the stated '
-                'torque noise and a correct model. Bars compare the torque uncertainty.'
+                'torque noise and a correct model; the smallest torque uncertainty first.'
             ),
             *parameter_folds(
                 information.parameters,
-                ('Prior model', '± 1 \N{GREEK SMALL LETTER SIGMA}', 'Relative', ''),
+                ('Prior model', '± 1 \N{GREEK SMALL LETTER SIGMA}', 'Relative'),
                 cells,
                 links,
                 order=lambda k: float(size[k]),

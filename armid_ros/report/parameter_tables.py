@@ -94,8 +94,7 @@ def parameter_folds(
     cells: Callable[[int], Cells],
     links: Sequence[str] = (),
     *,
-    suffix: Callable[[list[int]], str] | None = None,
-    opened: Callable[[list[int]], bool] | None = None,
+    changed: Sequence[bool] | None = None,
     order: Callable[[int], float] = float,
 ) -> list[Fold]:
     """
@@ -111,9 +110,8 @@ def parameter_folds(
         Returns the cells of these columns for the position of a parameter.
     links : sequence of str
         Names of the links, in the order of their numbers.
-    suffix, opened : callable
-        Return the text after the heading of a table, and whether the table is open, for the
-        positions of its parameters; by default their number, and True.
+    changed : sequence of bool, optional
+        Whether each parameter changed; then tables without change are closed.
     order : callable
         Returns the sorting key of a row for the position of a parameter.
 
@@ -142,8 +140,10 @@ def parameter_folds(
         columns = ('Parameter', 'Unit') if rigid else ('Joint',)
         kind = 'parameters' if len(heads) < 5 else 'parameters described'
         table = DataTable((*columns, *heads), rows, tuple(range(len(columns))), kind)
-        count = suffix(members) if suffix else str(len(members))
-        shown = opened is None or opened(members)
+        count, shown = str(len(members)), True
+        if changed is not None:
+            some = sum(changed[k] for k in members)
+            count, shown = f'{some} of {count} changed', some > 0
         folds.append(Fold(f'{title}: {count}', [table], shown))
     return folds
 

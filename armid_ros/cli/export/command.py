@@ -40,8 +40,8 @@ _KINDS_OF = {'joint': LOADS, 'frame': LOADS, 'spread': ('ranges',)}
 @click.option('--joint', help='Joint that moves the payload; needed if several have one.')
 @click.option(
     '--frame',
-    help='Link whose frame the load data are in; by default tool0, flange, or the only link '
-    'without mass and shape fixed to the last moving link.',
+    help='Link whose frame the load data are in; by default tool0, flange, or the only link that '
+    'moves with the payload.',
 )
 @click.option(
     '--spread',

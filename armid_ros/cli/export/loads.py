@@ -12,7 +12,6 @@ from armid_ros.arm import ArmModel
 from armid_ros.errors import meant, ModelError
 from armid_ros.motion import FloatArray
 from armid_ros.robots import NO_MASS
-from armid_ros.robots.description import parse_xml
 from armid_ros.robots.robot import PER_LINK
 import numpy as np
 import pinocchio as pin
@@ -60,8 +59,7 @@ def load_of(arm: ArmModel, joint: str | None = None, frame: str | None = None) -
     joint : str, optional
         Joint that moves the payload, if there are payloads on several.
     frame : str, optional
-        A link that moves with the payload; by default tool0, flange, or the only link without
-        mass and shape at the end of a fixed joint on the last moving link.
+        A link that moves with the payload; by default tool0, flange, or the only such link.
 
     Raises
     ------
@@ -100,7 +98,7 @@ def load_of(arm: ArmModel, joint: str | None = None, frame: str | None = None) -
         )
     frames = [f for f in model.frames if (f.parentJoint, f.type) == (number, pin.FrameType.BODY)]
     placements = {str(one.name): one.placement for one in frames}
-    frame = frame or _flange(arm, joint, placements)
+    frame = frame or _flange(joint, placements)
     if frame not in placements:
         raise ModelError(
             f"'{frame}' is no link that moves with the payload of joint '{joint}': name "
@@ -110,22 +108,16 @@ def load_of(arm: ArmModel, joint: str | None = None, frame: str | None = None) -
     return CarriedLoad(joint, frame, placement.actInv(pin.Inertia.FromDynamicParameters(ten)))
 
 
-def _flange(arm: ArmModel, joint: str, links: Collection[str]) -> str:
-    """Return the only link that can be the flange; otherwise raise a ModelError."""
-    # ROS-Industrial calls the frame of a flange tool0 or flange
+def _flange(joint: str, links: Collection[str]) -> str:
+    """Return the link with the usual name of a flange, or the only link; else a ModelError."""
+    # names of the frame of a flange by ROS-Industrial
     usual = [name for name in ('tool0', 'flange') if name in links]
-    last, tree = arm.robot.tree.links[arm.robot.tree.index(joint)], arm.robot.description.joints
-    # links without mass, shape and children, fixed to the link that the joint moves
-    bare = {one.get('name') for one in parse_xml(arm.robot.urdf).iter('link') if not len(one)}
-    bare = (bare & set(links)) - {one.parent for one in tree}
-    ends = [one.child for one in tree if one.parent == last and one.child in bare]
-    ends = usual[:1] or (list(links) if len(links) == 1 else ends)
-    if len(ends) != 1:
+    if not usual and len(links) != 1:
         raise ModelError(
             f"the link at the flange of joint '{joint}' is unknown: name it with --frame; "
             f'{", ".join(links)} move with the payload'
         )
-    return ends[0]
+    return [*usual, *links][0]
 
 
 def universal_robots(load: CarriedLoad) -> str:
