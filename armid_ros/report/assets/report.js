@@ -349,30 +349,13 @@
     field.setAttribute('aria-label', 'Filter parameters');
     const rows = [...section.querySelectorAll('table.parameters tbody tr')];
     const words = (row) => (row.closest('details').firstElementChild.textContent + row.textContent).toLowerCase();
-    const keeps = {known: (row) => !row.querySelector('.unknown'), changed: (row) => row.querySelector('.changed')};
-    const tools = [field];
-    const apply = () => {
-      const chosen = tools.slice(1).filter((tool) => tool.ariaPressed === 'true').map((tool) => keeps[tool.textContent]);
-      for (const row of rows) {
-        row.hidden = !words(row).includes(field.value.toLowerCase()) || !chosen.every((keep) => keep(row));
-      }
+    field.addEventListener('input', () => {
+      for (const row of rows) row.hidden = !words(row).includes(field.value.toLowerCase());
       for (const fold of section.querySelectorAll('details:has(> .scroll > table.parameters)')) {
         fold.hidden = !fold.querySelector('tbody tr:not([hidden])');
       }
-    };
-    field.addEventListener('input', apply);
-    for (const [name, keep] of Object.entries(keeps)) {
-      const left = rows.filter(keep).length;
-      if (!left || left === rows.length) continue;
-      const button = document.createElement('button');
-      Object.assign(button, {type: 'button', className: 'tool', textContent: name, ariaPressed: 'false'});
-      button.addEventListener('click', () => {
-        button.ariaPressed = String(button.ariaPressed !== 'true');
-        apply();
-      });
-      tools.push(button);
-    }
-    section.querySelector('details').before(...tools);
+    });
+    section.querySelector('details').before(field);
   }
 
   // A number and its unit stay on one line.
