@@ -4,11 +4,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from math import inf
 
 from armid_ros.estimate import measured
-from armid_ros.identification.assess.comparison import Comparison, LoadChange, ParameterChange
+from armid_ros.identification.assess.comparison import Comparison, LoadChange
 from armid_ros.identification.fitting.identifiability import excludes_zero, HALF_WIDTH
 from armid_ros.report.blocks import (
     Cells,
@@ -113,10 +113,10 @@ def change_rows(comparison: Comparison) -> list[tuple[str, ...]]:
 def change_sentences(comparison: Comparison) -> tuple[str, ...]:
     """Return sentences on the changes, the headline first, the details last."""
     lines = []
-    for one in comparison.unusable:
-        assert one.fit is not None
-        reason = one.fit.reason[:1].lower() + one.fit.reason[1:].rstrip('.')
-        lines.append(f'{one.source} is unusable: {reason}. Find what it lacks by armid diagnose.')
+    for side in comparison.unusable:
+        assert side.fit is not None
+        reason = side.fit.reason[:1].lower() + side.fit.reason[1:].rstrip('.')
+        lines.append(f'{side.source} is unusable: {reason}. Find what it lacks by armid diagnose.')
     if comparison.factors:
         named = ', '.join(f'{joint} {factor:.3g}' for joint, factor in comparison.factors.items())
         lines.append(
@@ -129,7 +129,11 @@ def change_sentences(comparison: Comparison) -> tuple[str, ...]:
     if comparison.load is not None:
         lines += _load(comparison, comparison.load)
     else:
-        lines += [_change(change) for change in comparison.changed[:1]]
+        for one in comparison.changed[:1]:
+            verb = 'rose' if one.difference > 0.0 else 'fell'
+            start, _ = measured(one.before, HALF_WIDTH * one.std)
+            end = with_interval(one.after, one.std, one.parameter.unit)
+            lines.append(sentence(f'{full_label(one.parameter)} {verb} from {start} to {end}'))
     lines += [_count_sentence(comparison), *_residuals(comparison), *_not_compared(comparison)]
     for group in comparison.changed_together:
         what = f'Effects at {group.joint}' if group.joint else 'The rigid body'
@@ -144,16 +148,16 @@ def change_sentences(comparison: Comparison) -> tuple[str, ...]:
             'tool or load was added or removed, or gravity or mounting differ.'
         )
     if not comparison.anything:
-        lines.append(_least_visible(comparison.changes))
+        worn = [c for c in comparison.changes if not c.parameter.rigid] or comparison.changes
+        known = [c for c in worn if excludes_zero(c.before, c.before_std)]
+        # 3.5 standard deviations of the parameters that wear
+        sizes = sorted(350.0 * c.std / abs(c.before) for c in known)
+        if sizes:
+            lines.append(
+                f'Smallest detectable change: {sizes[0]:.2g} % for the best-determined '
+                f'parameter, {sizes[len(sizes) // 2]:.2g} % for the median one.'
+            )
     return tuple(lines)
-
-
-def _change(change: ParameterChange) -> str:
-    """Return a sentence on the change of a parameter, with the 95 % interval of the change."""
-    verb = 'rose' if change.difference > 0.0 else 'fell'
-    start, _ = measured(change.before, HALF_WIDTH * change.std)
-    end = with_interval(change.after, change.std, change.parameter.unit)
-    return sentence(f'{full_label(change.parameter)} {verb} from {start} to {end}')
 
 
 def _count_sentence(comparison: Comparison) -> str:
@@ -217,19 +221,6 @@ def _load(comparison: Comparison, load: LoadChange) -> tuple[str, str]:
     return (
         f'A load of {mass} {verb} {named[0]}{rivals}.',
         f'{where}It explains every change of the inertial parameters.',
-    )
-
-
-def _least_visible(changes: Sequence[ParameterChange]) -> str:
-    """Return a sentence on the smallest detectable change of wearing parameters."""
-    worn = [c for c in changes if not c.parameter.rigid] or list(changes)
-    known = [c for c in worn if excludes_zero(c.before, c.before_std)]
-    if not known:
-        return 'The smallest detectable change is unknown.'
-    shares = sorted(3.5 * c.std / abs(c.before) for c in known)
-    return (
-        f'Smallest detectable change: {100.0 * shares[0]:.2g} % for the best-determined '
-        f'parameter, {100.0 * shares[len(shares) // 2]:.2g} % for the median one.'
     )
 
 
