@@ -38,7 +38,7 @@ _WHY = {
 
 def compare_report(comparison: Comparison, origin: ResultOrigin) -> str:
     """
-    Return the page of a comparison.
+    Return the page of a comparison, one HTML file that loads nothing.
 
     Parameters
     ----------
@@ -46,11 +46,6 @@ def compare_report(comparison: Comparison, origin: ResultOrigin) -> str:
         Two identifications.
     origin : ResultOrigin
         Files, versions, and the next step.
-
-    Returns
-    -------
-    str
-        One HTML file that loads nothing.
 
     """
     facts = []

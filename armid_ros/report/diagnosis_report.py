@@ -99,7 +99,7 @@ def diagnosis_report(
     origin: ResultOrigin = DEFAULT_ORIGIN,
 ) -> str:
     """
-    Return report.html of a diagnosis.
+    Return report.html of a diagnosis, one HTML file that loads nothing.
 
     Parameters
     ----------
@@ -119,11 +119,6 @@ def diagnosis_report(
         Joints with a learned residual.
     origin : ResultOrigin
         Robot, files, versions, settings, seed.
-
-    Returns
-    -------
-    str
-        One HTML file that loads nothing.
 
     """
     arm = diagnosis.arm

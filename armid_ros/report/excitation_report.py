@@ -65,7 +65,7 @@ def excitation_report(
     origin: ResultOrigin,
 ) -> str:
     """
-    Return report.html of a design.
+    Return report.html of a design, one HTML file that loads nothing.
 
     Parameters
     ----------
@@ -85,11 +85,6 @@ def excitation_report(
         Reason why the run does not start at zero.
     origin : ResultOrigin
         Robot, files, versions, settings, seed, and the command that follows.
-
-    Returns
-    -------
-    str
-        One HTML file that loads nothing.
 
     """
     excitation, limits = design.excitation, design.limits

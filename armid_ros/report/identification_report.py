@@ -78,7 +78,7 @@ def identification_report(
     origin: ResultOrigin = DEFAULT_ORIGIN,
 ) -> str:
     """
-    Return report.html of an identification.
+    Return report.html of an identification, one HTML file that loads nothing.
 
     Parameters
     ----------
@@ -96,11 +96,6 @@ def identification_report(
         Tests and exports of the identification.
     origin : ResultOrigin
         Robot, files, versions, settings, seed.
-
-    Returns
-    -------
-    str
-        One HTML file that loads nothing.
 
     """
     described, assessment = result.arm.robot, assessment or Assessment()

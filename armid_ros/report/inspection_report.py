@@ -53,7 +53,7 @@ _TONES = {
 
 def inspection_report(found: Inspection, origin: ResultOrigin = DEFAULT_ORIGIN) -> str:
     """
-    Return the page of an inspection, with all curves.
+    Return the page of an inspection with all curves, one HTML file that loads nothing.
 
     Parameters
     ----------
@@ -61,11 +61,6 @@ def inspection_report(found: Inspection, origin: ResultOrigin = DEFAULT_ORIGIN) 
         Result of the inspection.
     origin : ResultOrigin
         Name or path of the description, files, versions, and the next step.
-
-    Returns
-    -------
-    str
-        One HTML file that loads nothing.
 
     """
     recording = found.recording

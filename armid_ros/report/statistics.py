@@ -37,7 +37,7 @@ class Trend:
     centre, mean : ndarray, shape (B,)
         Mean abscissa and mean residual of each bin, equally many samples in each.
     share : float
-        Share of the residual's variance that the means explain beyond chance, 0 to 1.
+        Share of the residual's variance that the means explain, 0 to 1.
 
     """
 
@@ -54,11 +54,7 @@ class Trend:
         sizes = np.array([len(group) for group in groups])
         total = float(np.sum((residual - residual.mean()) ** 2))
         between = float(np.sum(sizes * (mean - residual.mean()) ** 2))
-        freedom = len(x) - len(groups)
-        if total <= 0.0 or freedom <= 0:
-            return Trend(centre, mean, 0.0)
-        noise = (total - between) / freedom
-        return Trend(centre, mean, max(0.0, (between - (len(groups) - 1) * noise) / total))
+        return Trend(centre, mean, between / total if total > 0.0 else 0.0)
 
 
 @dataclass(frozen=True)
@@ -163,7 +159,7 @@ def residual_section(robot: Robot, fits: Sequence[Fit], role: str) -> ContentSec
         'Residual by variable',
         [
             Paragraph(
-                f'Share of the {role} residual that one variable explains, beyond chance, the '
+                f'Share of the {role} residual that one variable explains, the '
                 'worst joint first. Noise depends on none. Wrong friction depends on speed; wrong '
                 'gravity or masses on position; gears and drives on load.'
             ),
