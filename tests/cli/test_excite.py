@@ -74,13 +74,6 @@ def test_an_arm_that_stands_stays_above_its_base_plane(ur5):
     assert document['not_checked'] == [] and document['verdict'] in said.lower()
 
 
-def test_an_arm_whose_zero_is_on_the_floor_starts_near_it_and_names_the_link(ur5):
-    out, said = ur5
-    first = plan_of(example('ur5_robot'), out).q[0]
-    assert 0.0 < np.abs(first).max() < 0.2
-    assert 'wrist_3_link' in said
-
-
 def test_a_simulated_arm_follows_the_plan_from_its_first_point(made, tmp_path):
     arguments = ('--robot', ROBOT, '--rate', 200, '--trajectory', made / 'trajectory')
     armid('simulate', *arguments, '--out', tmp_path / 'run')

@@ -14,7 +14,6 @@ from armid_ros.recording import read_recording, write_recording
 from armid_ros.robots import load_robot
 import numpy as np
 import pytest
-import yaml
 
 from .conftest import armid, bag_of, ROBOT
 
@@ -117,21 +116,6 @@ def test_links_are_bodies_unless_that_is_refused_or_costs_too_much(bags, quick, 
     armid('identify', bags[0], *asked, '--no-physical', '--out', tmp_path / 'free')
     folders = (quick[0], tmp_path / 'free', tmp_path / 'not')
     assert [(one / 'identified.urdf').exists() for one in folders] == [True, False, False]
-
-
-def test_what_one_moving_joint_does_not_tell_is_nowhere_a_number(tmp_path):
-    robot = load_robot(ROBOT)
-    arm = ArmModel(robot).with_effect(make_effect('viscous_friction', robot), np.full(6, 0.1))
-    bag, out = bag_of(tmp_path / 'bag', arm, 0, moving=3), tmp_path / 'out'
-    armid('identify', bag, '--robot', ROBOT, *QUICK, '--out', out)
-    document = document_of(out)
-    shown = [row['joint'] for row in document['parameters'] if row['name'] == VISCOUS]
-    assert shown == ['elbow_pitch']
-    unseen = {row['joint'] for row in document['not_identified'] if row['name'] == VISCOUS}
-    assert unseen == set(robot.joints) - {'elbow_pitch'}
-    model = yaml.safe_load((out / 'model.yaml').read_text())
-    (viscous,) = (e for e in model['effects'] if e['name'] == 'viscous_friction')
-    assert [row['joint'] for row in viscous['parameters'] if row['std'] is not None] == shown
 
 
 def test_gravity_of_another_body_is_said_first_and_ends_a_strict_run(tmp_path):

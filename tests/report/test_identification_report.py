@@ -18,7 +18,6 @@ from armid_ros.identification import (
 from armid_ros.motion import Motion
 from armid_ros.report.identification_report import Assessment, identification_report
 from armid_ros.report.judgement import judge
-from armid_ros.report.parameter_tables import parameter_section
 from armid_ros.report.provenance import Provenance, ResultOrigin, versions
 from armid_ros.report.sections.data_quality import repeatability
 from armid_ros.report.sections.fit import fit_section
@@ -158,18 +157,6 @@ def test_what_was_put_to_a_test_has_a_section(case, whole):
     for link in case.result.arm.robot.links:
         assert link in reader.text
     assert 'identified.urdf' in reader.text and '(3 values)' in reader.text
-
-
-def test_what_the_data_do_not_tell_is_no_number(case):
-    """A parameter of zero, with an interval as wide as it is."""
-    estimate = case.result.estimate
-    values, covariance = 0.5 * estimate.std[:1], estimate.covariance[:1, :1]
-    one = replace(
-        estimate, parameters=estimate.parameters[:1], values=values, covariance=covariance
-    )
-    page = parameter_section(one, 0.0 * values).html()
-    assert page.count('>includes 0<') == 1
-    assert f'>{values[0]:.3g}<' not in page
 
 
 def test_periods_show_what_of_the_residual_repeats(case):
