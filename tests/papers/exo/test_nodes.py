@@ -74,16 +74,3 @@ def test_a_pair_that_falls_behind_real_time_says_so(bench, monkeypatch):
     assert re.match(r'\d+\.\d s', said)
     assert values['skipped_real_time'] > 9.0
     assert node.stamp_ns - before > 9 * 10**9
-
-
-def test_a_pair_that_fell_says_so_until_it_is_reset(bench):
-    node = pair_node(bench, driven=['all'], torque_rate=30.0)
-    diagnostics = bench.diagnostics()
-    while not node.pair.fallen and node.pair.t < 5.0:
-        node.step()
-    state = bench.diagnose(node, diagnostics)
-    assert state.level == state.WARN and 'open loop' in state.message
-    stamp = node.stamp_ns
-    assert node.step() == stamp
-    assert bench.call('simulated_pair/reset').success
-    assert not node.pair.fallen and node.step() > stamp

@@ -5,7 +5,7 @@
 from armid_ros.errors import IdentificationError
 from armid_ros.papers.exo.plant.gait import read_gait
 from armid_ros.papers.exo.plant.leg_pair import leg_pair
-from armid_ros.papers.exo.plant.torque_driven import SimulatedPair
+from armid_ros.papers.exo.plant.simulated_pair import SimulatedPair
 from armid_ros.papers.exo.springs import OnlineInteraction
 import numpy as np
 import pytest

@@ -12,7 +12,8 @@ from armid_ros.papers.exo.plant.leg_pair import (
     TiedPair,
     walking,
 )
-from armid_ros.papers.exo.plant.torque_driven import drive_by_torque, SimulatedPair, splined
+from armid_ros.papers.exo.plant.simulated_pair import SimulatedPair
+from armid_ros.papers.exo.plant.torque_driven import drive_by_torque, splined
 import numpy as np
 import pytest
 
@@ -69,27 +70,6 @@ def test_without_noise_it_is_the_gait_and_its_torques():
     np.testing.assert_allclose(
         [s.tau for s in samples], pair_torques(pair, *motions).tau, atol=1e-9
     )
-
-
-def test_one_joint_by_torque_stays_with_the_gait():
-    by_torque = simulated(driven=('exo_swing_knee',))
-    for _ in range(300):
-        sample = by_torque.advance()
-    gait = stepping(by_torque.pair, read_gait(), np.array([sample.t])).own.q[0]
-    assert np.degrees(np.abs(sample.q - gait).max()) < 0.01
-    assert not by_torque.fallen
-
-
-def test_all_joints_in_open_loop_fall_where_torques_are_sampled_coarsely():
-    """The instability of the open loop: nothing holds what a small error begins."""
-    by_torque = simulated(driven=leg_pair().robot.joints, torque_rate=30.0)
-    for _ in range(3000):
-        by_torque.advance()
-        if by_torque.fallen:
-            break
-    assert by_torque.fallen and by_torque.t < 3.0
-    by_torque.reset()
-    assert not by_torque.fallen and by_torque.t == 0.0
 
 
 def test_noise_has_the_size_asked_for_and_comes_from_the_seed():

@@ -17,38 +17,21 @@ from armid_ros.nodes.running.process import run
 from armid_ros.nodes.running.real_time import RealTime
 from armid_ros.papers.exo.plant.gait import read_gait
 from armid_ros.papers.exo.plant.leg_pair import leg_pair
-from armid_ros.papers.exo.plant.torque_driven import SimulatedPair
+from armid_ros.papers.exo.plant.simulated_pair import SimulatedPair
 from armid_ros.robots.ties import SEGMENTS
 import numpy as np
 from rclpy.time import Time
 from sensor_msgs.msg import JointState
 
-ALL = 'all'
-
 
 class SimulatedPairNode(ArmidNode):
-    """
-    Publishes the stepping leg pair on exo/joint_states and human/joint_states.
-
-    With all joints driven by torque in open loop the pair falls. The node then reports the fall
-    and publishes nothing until ~/reset.
-
-    """
+    """Publishes the stepping leg pair on exo/joint_states and human/joint_states."""
 
     table = (
         NodeParameter('gait', '', 'CSV of one leg over a cycle; empty: level walking.'),
         NodeParameter('stiffness', 1e4, 'Stiffness of all springs.', 'N/m', limits=(0.0, 1e6)),
         NodeParameter('segments', list(SEGMENTS), 'Where springs are; without names: none.'),
         NodeParameter('slack', 0.0, 'Slack before springs pull.', 'm', limits=(0.0, 0.1)),
-        NodeParameter(
-            'driven',
-            [''],
-            "Joints of the exoskeleton that follow torques, or 'all'; without names: none, all "
-            'follow the gait.',
-        ),
-        NodeParameter(
-            'torque_rate', 100.0, 'Sample rate of torques.', 'Hz', limits=(10.0, 1000.0)
-        ),
         NodeParameter('angle_noise', 0.05, 'Standard deviation.', 'deg', limits=(0.0, 10.0)),
         NodeParameter('torque_noise', 0.5, 'Standard deviation.', 'N m', limits=(0.0, 100.0)),
         NodeParameter('seed', 0, 'Random seed of the noise.', limits=(0, 2**62)),
@@ -78,13 +61,10 @@ class SimulatedPairNode(ArmidNode):
         super().__init__('simulated_pair', **kwargs)
         pair = leg_pair(self.value('stiffness'), self.value('segments'))
         pair = pair.with_slack(self.value('slack'))
-        driven = self.value('driven')
         gait = self.value('gait')
         self.pair = SimulatedPair(
             pair,
             read_gait(Path(gait) if gait else None),
-            driven=pair.robot.joints if driven == (ALL,) else driven,
-            torque_rate=self.value('torque_rate'),
             rate=self.value('rate'),
             angle_noise=math.radians(self.value('angle_noise')),
             torque_noise=self.value('torque_noise'),
@@ -112,8 +92,6 @@ class SimulatedPairNode(ArmidNode):
 
     def step(self) -> int:
         """Simulate the next sample, publish it on both topics, and return its timestamp [ns]."""
-        if self.pair.fallen:
-            return self.stamp_ns
         sample = self.pair.advance()
         robot, other = self.pair.pair.robot, self.pair.pair.other
         for publisher, joints, parts in (
@@ -129,11 +107,10 @@ class SimulatedPairNode(ArmidNode):
 
     def catch_up(self) -> None:
         """Simulate up to real time times the factor; skip time that cannot be caught up."""
-        if not self.pair.fallen:
-            factor = self.value('real_time_factor')
-            skipped = self.real_time.catch_up(factor, 1.0 / self.value('rate'))
-            if factor == 1.0:  # stamps stay those of the computer  # noqa: RUF069 - as it is written
-                self._origin_ns += round(skipped * 1e9)
+        factor = self.value('real_time_factor')
+        skipped = self.real_time.catch_up(factor, 1.0 / self.value('rate'))
+        if factor == 1.0:  # stamps stay those of the computer  # noqa: RUF069 - as it is written
+            self._origin_ns += round(skipped * 1e9)
 
     def reset(self) -> str:
         """Return both machines to the initial state; time continues."""
@@ -143,14 +120,11 @@ class SimulatedPairNode(ArmidNode):
         return 'both are in the initial state'
 
     def condition(self) -> tuple[str, Mapping[str, object]]:
-        """Return whether the pair stands, and whether the simulation keeps up with real time."""
+        """Return whether the simulation keeps up with real time."""
         values = {
             'simulated_time': self.pair.t,
-            'off_the_gait_deg': math.degrees(self.pair.deviation),
             'skipped_real_time': self.real_time.given_up,
         }
-        if self.pair.fallen:
-            return f'fell after {self.pair.t:.2f} s, as an open loop does: call ~/reset', values
         return self.real_time.trouble('start it with a lower rate'), values
 
 
