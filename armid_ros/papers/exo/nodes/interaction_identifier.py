@@ -10,7 +10,7 @@ from functools import partial
 from typing import Any
 
 from armid_msgs.msg import ParameterEstimate
-from armid_ros.errors import ArmidError, RecordingError
+from armid_ros.errors import RecordingError
 from armid_ros.identification.rows.causal import MAX_MAGNITUDE
 from armid_ros.identification.samples.joint_merge import joint_places
 from armid_ros.identification.samples.spikes import SpikeGate
@@ -155,40 +155,32 @@ class InteractionIdentifierNode(ArmidNode):
                 what = f'{topic}: positions step; earlier samples are discarded'
                 self.complaints.say(f'{topic} step', what)
             q, tau = sample.x[:n], sample.x[n:]
-            try:
-                if machine:
-                    self.identifier.take_other(sample.t, q)
-                elif self.identifier.take(sample.t, q, tau):
-                    found = self.identifier.separate
-                    assert found is not None
-                    estimate = estimate_message(found.estimate, len(found.residual))
-                    estimate.header = message.header
-                    self._estimates.publish(estimate)
-            except ArmidError as error:
-                self.complaints.say(topic, str(error))
+            if machine:
+                self.identifier.take_other(sample.t, q)
+            elif self.identifier.take(sample.t, q, tau):
+                found = self.identifier.separate
+                assert found is not None
+                estimate = estimate_message(found.estimate, len(found.residual))
+                estimate.header = message.header
+                self._estimates.publish(estimate)
 
     def _signals(self, machine: int, message: JointState) -> list[StreamSample]:
         """Return the samples of a message; raise RecordingError if the message is damaged."""
         topic, gate, fields = _TOPICS[machine], self._gates[machine], _FIELDS[machine]
-        try:
-            order = joint_places(self._joints[machine], message.name)
-            parts = [np.array(getattr(message, name)) for name in fields]
-            for name, part in zip(fields, parts, strict=True):
-                if len(part) != len(message.name):
-                    raise RecordingError(f'{len(message.name)} names but {len(part)} of {name}')
-            signal = np.concatenate([part[order] for part in parts])
-            if not np.all(np.abs(signal) <= MAX_MAGNITUDE):
-                raise RecordingError('implausibly large values')
-            stamp = message.header.stamp
-            if stamp.sec < 0 or stamp.nanosec >= 10**9:
-                raise RecordingError('an invalid timestamp')
-            if self._epoch is None:
-                self._epoch = stamp.sec
-            t = float(stamp.sec - self._epoch) + 1e-9 * stamp.nanosec
-        except RecordingError as error:
-            self.complaints.say(topic, f'{topic}: {error}')
-            return []
-        good = gate.take(t, signal)
+        order = joint_places(self._joints[machine], message.name)
+        parts = [np.array(getattr(message, name)) for name in fields]
+        for name, part in zip(fields, parts, strict=True):
+            if len(part) != len(message.name):
+                raise RecordingError(f'{len(message.name)} names but {len(part)} of {name}')
+        signal = np.concatenate([part[order] for part in parts])
+        if not np.all(np.abs(signal) <= MAX_MAGNITUDE):
+            raise RecordingError('implausibly large values')
+        stamp = message.header.stamp
+        if stamp.sec < 0 or stamp.nanosec >= 10**9:
+            raise RecordingError('an invalid timestamp')
+        if self._epoch is None:
+            self._epoch = stamp.sec
+        good = gate.take(float(stamp.sec - self._epoch) + 1e-9 * stamp.nanosec, signal)
         for reason, count in (gate.rejected - self._told[machine]).items():
             for _ in range(count):
                 self.complaints.say(f'{topic} {reason}', f'{topic}: {_DAMAGED[reason]}')
