@@ -26,6 +26,6 @@ motors, links = (
     ar.Recording(joints=side.joints, t=side.t, q=side.q, tau=side.tau)
     for side in (run.motor, run.link)
 )
-for joint in fit_springs(ar.load_robot(URDF), [(motors, links)], np.random.default_rng(2)):
+for joint in fit_springs(ar.load_robot(URDF), [(motors, links)]):
     value, low, high = joint.transmission.stiffness
     print(f'{joint.joint:9s} {value:6.0f} N m/rad ({low:.0f} to {high:.0f}), true 4000')

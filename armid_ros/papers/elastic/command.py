@@ -97,7 +97,7 @@ def elastic(
                 f'--demo and --steps need a pair of links that move in a horizontal plane, which '
                 f'{robot.name} is not; without them its springs are identified joint by joint'
             )
-        identify_springs(bags, robot, robot_source, model, out, seed, as_json)
+        identify_springs(bags, robot, robot_source, model, out, as_json)
         return
     if model is not None:
         raise RobotError('--model is not available here: the three steps identify the inertias')

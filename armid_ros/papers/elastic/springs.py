@@ -33,28 +33,6 @@ _MOTORS = (
 
 def _springs(found: Sequence[SpringEstimate]) -> ContentSection:
     """Return a section with stiffness, free play and motor of every joint."""
-    springs, motors = [], []
-    for one in found:
-        fit = one.transmission
-        value, low, high = fit.stiffness
-        play = [1e3 * x for x in fit.backlash]
-        none = 'none seen' if np.isfinite(play).all() else 'no reversals'
-        springs.append(
-            (
-                one.joint,
-                f'{value:.4g}' if one.informative else 'not identifiable',
-                f'{low:.4g} to {high:.4g}' if one.informative else '',
-                f'{play[1]:.2g} to {play[2]:.2g}' if fit.backlash_seen else none,
-                f'{fit.correlation:+.2f}' if np.isfinite(fit.correlation) else '',
-                f'{fit.explained:.4f}',
-            )
-        )
-        own = ['', '', ''] if one.motor is None else [f'{x:.3g}' for x in one.motor]
-        both = [
-            f'{x:.1f}' if one.informative and np.isfinite(x) else ''
-            for x in (one.antiresonance, one.resonance)
-        ]
-        motors.append((one.joint, f'{one.inertia:.3g}', *own, *both))
     text = (
         'The twist between motor and link is the torque of the rigid body over the stiffness. '
         'Backlash adds a step where the load changes its sign; with a correlation near ±1 '
@@ -64,11 +42,33 @@ def _springs(found: Sequence[SpringEstimate]) -> ContentSection:
         'Frequencies are those of each joint alone, the others held, at its mean inertia in the '
         'recording.'
     )
-    return ContentSection(
-        'Springs',
-        [Paragraph(text), DataTable(_SPRINGS, springs), DataTable(_MOTORS, motors),
-         Paragraph(hint, 'hint')],
-    )  # fmt: skip
+    springs = DataTable(_SPRINGS, [_spring_row(one) for one in found])
+    motors = DataTable(_MOTORS, [_motor_row(one) for one in found])
+    return ContentSection('Springs', [Paragraph(text), springs, motors, Paragraph(hint, 'hint')])
+
+
+def _spring_row(one: SpringEstimate) -> tuple[str, ...]:
+    fit = one.transmission
+    value, low, high = fit.stiffness
+    play = [1e3 * x for x in fit.backlash]
+    none = 'none seen' if np.isfinite(play).all() else 'no reversals'
+    return (
+        one.joint,
+        f'{value:.4g}' if one.informative else 'not identifiable',
+        f'{low:.4g} to {high:.4g}' if one.informative else '',
+        f'{play[1]:.2g} to {play[2]:.2g}' if fit.backlash_seen else none,
+        f'{fit.correlation:+.2f}' if np.isfinite(fit.correlation) else '',
+        f'{fit.explained:.4f}',
+    )
+
+
+def _motor_row(one: SpringEstimate) -> tuple[str, ...]:
+    own = ['', '', ''] if one.motor is None else [f'{x:.3g}' for x in one.motor]
+    both = [
+        f'{x:.1f}' if one.informative and np.isfinite(x) else ''
+        for x in (one.antiresonance, one.resonance)
+    ]
+    return (one.joint, f'{one.inertia:.3g}', *own, *both)
 
 
 def verdict(found: Sequence[SpringEstimate]) -> VerdictSection:
@@ -107,7 +107,7 @@ WITHOUT = (
 
 
 def identify_springs(
-    bags: Sequence[Path], robot: Robot, source: str, model: Path | None, out: Path, seed: int,
+    bags: Sequence[Path], robot: Robot, source: str, model: Path | None, out: Path,
     as_json: bool,
 ) -> None:  # fmt: skip
     """Fit springs to bags with both encoders of any arm, and write the results."""
@@ -123,32 +123,14 @@ def identify_springs(
             raise RecordingError(f'{error}{hint}') from None
         options.tell_damage(*(side for both in sides for side in both))
         tick(0.5, 'fitting')
-        found = fit_springs(body, sides, np.random.default_rng(seed))
+        found = fit_springs(body, sides)
     document = springs_document(found, source)
     origin = provenance(bags, {'model': str(model or source)})
     sections: list[Section] = [verdict(found), _springs(found), Origin(origin)]
     subtitle = f'{robot.name} · {counted(len(found), "joint")}, encoders on both sides'
     page = Page(f'Elastic joints of {robot.name}', subtitle, sections).html()
-    heads = ('joint', 'stiffness [N m/rad]', '95 %', 'free play', 'rotor', 'resonance')
-    table = None if as_json else (heads, [_row(one) for one in found])
+    table = None if as_json else (_SPRINGS, [_spring_row(one) for one in found])
     options.deliver_page(staged, page, 'elastic', document, verdict(found), table)
-
-
-def _row(found: SpringEstimate) -> tuple[str, ...]:
-    """Return the values of a joint; dashes for values that are not identifiable."""
-    if not found.informative:
-        return (found.joint, *['-'] * 5)
-    fit = found.transmission
-    stiffness, low, high = fit.stiffness
-    play = '-' if not np.isfinite(fit.correlation) else 'none seen'
-    return (
-        found.joint,
-        f'{stiffness:.4g}',
-        f'{low:.4g} to {high:.4g}',
-        f'{fit.backlash[0]:.2g} rad' if fit.backlash_seen else play,
-        '-' if found.motor is None else f'{found.motor[0]:.3g} kg m^2',
-        f'{found.resonance:.1f} Hz' if np.isfinite(found.resonance) else '-',
-    )
 
 
 def springs_document(found: Sequence[SpringEstimate], robot: str) -> dict[str, Any]:

@@ -9,7 +9,8 @@ between the encoders.
 
 The torque of a spring is that of inverse dynamics along the motion of the links. The rest of the
 motor torque is rotor inertia, viscous and Coulomb friction. Both models are linear, and slow
-motion is sufficient. The resonances follow from inertia and stiffness.
+motion is sufficient. The resonances follow from inertia and stiffness. Filters, decimation and
+standard deviations are those of the identification of rigid arms.
 
 """
 
@@ -19,25 +20,23 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from armid_ros.errors import IdentificationError
+from armid_ros.identification import Conditioning
+from armid_ros.identification.fitting.covariance import sandwich, score_products
+from armid_ros.identification.fitting.identifiability import HALF_WIDTH
+from armid_ros.identification.rows.signals import decimate, no_stretch, segments
 from armid_ros.model import inverse_dynamics
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.papers.elastic.identification.interaction import direction
-from armid_ros.recording import Recording
+from armid_ros.recording import recorded_together, Recording
 from armid_ros.robots import Robot
 import numpy as np
-import numpy.typing as npt
 import pinocchio as pin
 from scipy.linalg import block_diag
-from scipy.signal import butter, sosfiltfilt
-
-IntArray = npt.NDArray[np.intp]
 
 #: Cut-off of the signals [Hz].
 _CUTOFF = 8.0
-
-#: Time between samples [s], positions of motor and link at the joint [rad], and torque of the
-#: spring [N m], each of shape (N,).
-TwoEncoders = tuple[float, FloatArray, FloatArray, FloatArray]
+#: Filtered motions of motors (at the joints) and of links, and torques of the springs, (N, n).
+Sides = tuple[Motion, Motion, FloatArray]
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,16 +71,18 @@ class TransmissionFit:
         return self.backlash[1] > 0.0 and abs(self.correlation) < 0.95
 
 
-def fit_transmission(records: Sequence[TwoEncoders], rng: np.random.Generator) -> TransmissionFit:
+def fit_transmission(sides: Sequence[Sides], used: Conditioning, joint: int) -> TransmissionFit:
     """
-    Fit spring and free play to recordings of one joint.
+    Fit spring and free play of one joint.
 
     Parameters
     ----------
-    records : sequence of TwoEncoders
-        Recordings; each has its own offset and slope between the encoders.
-    rng : numpy.random.Generator
-        Random numbers for the bootstrap blocks of the intervals.
+    sides : sequence of Sides
+        Stretches; each has its own offset and slope between the encoders.
+    used : Conditioning
+        Their filter.
+    joint : int
+        Index of the joint.
 
     Raises
     ------
@@ -89,90 +90,59 @@ def fit_transmission(records: Sequence[TwoEncoders], rng: np.random.Generator) -
         If the joint moves too little.
 
     """
-    pieces = [_columns(record) for record in records]
-    if sum(len(twist) for _, twist, _, _ in pieces) < 50:
+    pieces = [_columns(stretch, used, joint) for stretch in sides]
+    shared = np.vstack([own[:, :3] for own, _ in pieces])
+    twist = np.concatenate([twist for _, twist in pieces])
+    if len(twist) < 50:
         raise IdentificationError('the joint hardly moves: its stiffness cannot be found')
-    table, twist, blocks = _stacked_recordings(pieces)
-    reversals = sum(count for _, _, _, count in pieces)
-    # number of draws of bootstrap blocks
-    draws = [rng.choice(len(blocks), len(blocks)) for _ in range(400)]
-    backlash, correlation = (np.nan, -np.inf, np.inf), np.nan
+    table = np.hstack([shared, block_diag(*(own[:, 3:] for own, _ in pieces))])
     # smallest number of flank changes for an estimate of free play
-    if reversals < 4:
+    reverses = sum(np.count_nonzero(np.diff(np.sign(own[:, 0]))) for own, _ in pieces) >= 4
+    if not reverses:
         table[:, 1] = 0.0
-    found, spread = _drawn(table, twist, blocks, draws)
-    if reversals >= 4:
-        backlash = _interval(2.0 * found[1], 2.0 * spread[:, 1])
-        correlation = float(np.corrcoef(spread[:, 0], spread[:, 1])[0, 1])
+    scale = np.linalg.norm(table, axis=0)
+    scale[scale <= 0.0] = 1.0
+    bread = np.linalg.pinv((table / scale).T @ (table / scale), hermitian=True)
+    found = bread @ ((table / scale).T @ twist) / scale
     residual = twist - table @ found
+    cuts = np.cumsum([len(own) for own, _ in pieces])[:-1]
+    scores = np.split(table / scale * residual[:, np.newaxis], cuts)
+    # errors are correlated over half a second
+    lags = max(1, round(0.5 * used.rate_hz / used.decimation))
+    freedom = len(twist) / max(len(twist) - table.shape[1], 1)
+    covariance = freedom * sandwich(bread, score_products(scores, lags))
+    std = np.sqrt(np.diag(covariance)) / scale
+    compliance, low, high = _interval(found[0], std[0])
     # the interval of the stiffness is unbounded if that of the compliance contains zero
-    compliance, lower, upper = _interval(found[0], spread[:, 0])
-    stiffness = [1.0 / c if c > 0.0 else np.inf for c in (compliance, upper, lower)]
+    stiffness = [1.0 / c if c > 0.0 else np.inf for c in (compliance, high, low)]
+    backlash, correlation = (np.nan, -np.inf, np.inf), np.nan
+    if reverses:
+        backlash = _interval(2.0 * found[1], 2.0 * std[1])
+        correlation = float(bread[0, 1] / np.sqrt(bread[0, 0] * bread[1, 1]))
     return TransmissionFit(
         (stiffness[0], stiffness[1], stiffness[2]),
         backlash,
-        _interval(found[2], spread[:, 2]),
+        _interval(found[2], std[2]),
         correlation,
         1.0 - float(residual @ residual / np.sum((twist - twist.mean()) ** 2)),
     )
 
 
-def _columns(record: TwoEncoders) -> tuple[FloatArray, FloatArray, FloatArray, int]:
-    """Return columns, twist, times and the number of flank changes of one recording."""
-    dt, *signals = record
-    sections = butter(4, _CUTOFF, fs=1.0 / dt, output='sos')
-    motor, link, torque = (sosfiltfilt(sections, x) for x in signals)
-    velocity = np.gradient(motor, dt)
-    # velocity below which a joint is at rest, as a share of the largest velocity
-    moving = np.abs(velocity) > 0.02 * np.abs(velocity).max()
-    ends = round(0.3 / dt)
-    moving[:ends] = moving[-ends:] = False
-    moving &= np.arange(len(moving)) % max(round(0.25 / _CUTOFF / dt), 1) == 0
+def _columns(sides: Sides, used: Conditioning, joint: int) -> tuple[FloatArray, FloatArray]:
+    """Return columns and twist of the samples of a stretch in which the joint moves."""
+    motor, link, torque = sides[0].q[:, joint], sides[1].q[:, joint], sides[2][:, joint]
+    velocity = sides[0].dq[:, joint]
     # torque range in which the flank changes, as a share of the median torque
     flank = np.tanh(torque / (0.05 * np.median(np.abs(torque))))
-    own = np.column_stack([torque, flank, velocity, motor, np.ones(len(motor))])
-    changes = int(np.count_nonzero(np.diff(np.sign(torque[moving]))))
-    times = np.asarray(dt * np.flatnonzero(moving), dtype=np.float64)
-    return own[moving], np.asarray((motor - link)[moving]), times, changes
+    ones = np.ones(len(motor))
+    rows = decimate(np.column_stack([torque, flank, velocity, motor, ones, motor - link]), used)
+    # velocity below which a joint is at rest, as a share of the largest velocity
+    moving = np.abs(rows[:, 2]) > 0.02 * np.abs(velocity).max()
+    return rows[moving, :5], rows[moving, 5]
 
 
-def _stacked_recordings(
-    pieces: Sequence[tuple[FloatArray, FloatArray, FloatArray, int]],
-) -> tuple[FloatArray, FloatArray, list[IntArray]]:
-    """Stack recordings, with own slope and offset of each, and cut them into blocks."""
-    shared = np.vstack([own[:, :-2] for own, *_ in pieces])
-    table = np.hstack([shared, block_diag(*(own[:, -2:] for own, *_ in pieces))])
-    blocks: list[IntArray] = []
-    first = 0
-    for _, _, t, _ in pieces:
-        labels = (t / 0.5).astype(int)  # bootstrap blocks of 0.5 s
-        blocks += [first + np.flatnonzero(labels == label) for label in np.unique(labels)]
-        first += len(t)
-    return table, np.concatenate([twist for _, twist, _, _ in pieces]), blocks
-
-
-def _drawn(
-    table: FloatArray, twist: FloatArray, blocks: list[IntArray], draws: list[IntArray]
-) -> tuple[FloatArray, FloatArray]:
-    """Return the least-squares solution, and the solutions of random sets of blocks."""
-    scale = np.linalg.norm(table, axis=0)
-    scale[scale <= 0.0] = 1.0
-    scaled = table / scale
-    normal = np.array([scaled[b].T @ scaled[b] for b in blocks])
-    right = np.array([scaled[b].T @ twist[b] for b in blocks])
-    found = np.linalg.lstsq(scaled, twist, rcond=None)[0]
-    spread = np.array(
-        [
-            np.linalg.lstsq(normal[d].sum(axis=0), right[d].sum(axis=0), rcond=None)[0]
-            for d in draws
-        ]
-    )
-    return found / scale, spread / scale
-
-
-def _interval(value: float, spread: FloatArray) -> tuple[float, float, float]:
-    lower, upper = np.quantile(spread, [0.025, 0.975])
-    return float(value), float(lower), float(upper)
+def _interval(value: float, std: float) -> tuple[float, float, float]:
+    return float(value), float(value - HALF_WIDTH * std), float(value + HALF_WIDTH * std)
 
 
 @dataclass(frozen=True, eq=False)
@@ -220,9 +190,7 @@ class SpringEstimate:
 
 
 def fit_springs(
-    robot: Robot,
-    sides: Sequence[tuple[Recording, Recording]],
-    rng: np.random.Generator,
+    robot: Robot, recordings: Sequence[tuple[Recording, Recording]]
 ) -> list[SpringEstimate]:
     """
     Fit a spring, free play and a motor to every joint of an arm.
@@ -231,10 +199,8 @@ def fit_springs(
     ----------
     robot : Robot
         Robot with known inertias and gravity.
-    sides : sequence of (Recording, Recording)
-        Recordings of motors (at the joints) and of links, with common timestamps.
-    rng : numpy.random.Generator
-        Random numbers for the bootstrap blocks of the intervals.
+    recordings : sequence of (Recording, Recording)
+        Recordings of motors (at the joints) and of links, of one clock.
 
     Raises
     ------
@@ -242,75 +208,48 @@ def fit_springs(
         If no stretch is long enough, or a joint hardly moves.
 
     """
-    shortest = 2.0  # used stretch [s]
-    stretches = [piece for pair in sides for piece in _stretches(*pair, shortest)]
-    if not stretches:
-        raise IdentificationError(
-            f'springs: there is no stretch of {shortest:g} s without a pause in the recordings'
-        )
-    loads = [inverse_dynamics(robot, link) for _, link in stretches]
-    q = np.concatenate([link.q for _, link in stretches])
+    rate = float(np.median([1.0 / motors.period for motors, _ in recordings]))
+    used = Conditioning(rate, _CUTOFF, max(1, int(rate / (2.5 * _CUTOFF))))
+    sides = [one for pair in recordings for one in _stretches(robot, *pair, used)]
+    if not sides:
+        raise no_stretch(recordings[0][0], used)
+    q = np.concatenate([link.q for _, link, _ in sides])
     data = robot.model.createData()
     chosen = q[np.linspace(0, len(q) - 1, 200).astype(int)]
     diagonals = [np.diag(pin.crba(robot.model, data, pose)).copy() for pose in chosen]
     inertia = np.asarray(np.mean(diagonals, axis=0))
+    measured = all(motors.tau is not None for motors, _ in recordings)
     found = []
     for j, joint in enumerate(robot.joints):
-        records = [
-            (float(motor.t[1] - motor.t[0]), motor.q[:, j], link.q[:, j], load[:, j])
-            for (motor, link), load in zip(stretches, loads, strict=True)
-        ]
         try:
-            fit = fit_transmission(records, rng)
+            fit = fit_transmission(sides, used, j)
         except IdentificationError as error:
             raise IdentificationError(f"joint '{joint}': {error}") from None
-        own = _motor([motor for motor, _ in stretches], loads, j)
-        found.append(SpringEstimate(joint, fit, own, float(inertia[j])))
+        motor = _motor(sides, used, j) if measured else None
+        found.append(SpringEstimate(joint, fit, motor, float(inertia[j])))
     return found
 
 
 def _stretches(
-    motors: Recording, links: Recording, shortest: float
-) -> list[tuple[Motion, Motion]]:
-    """Return filtered motions of motors and links without pauses, with the motor torque."""
-    period = motors.period
-    sections = butter(4, _CUTOFF, fs=1.0 / period, output='sos')
-
-    def smooth(at: FloatArray, times: FloatArray, values: FloatArray) -> FloatArray:
-        even = np.column_stack([np.interp(at, times, column) for column in values.T])
-        return np.asarray(sosfiltfilt(sections, even, axis=0))
-
-    link_times = links.t + 1e-9 * (links.start_ns - motors.start_ns)
-    cuts = np.flatnonzero(np.diff(motors.t) > 5.0 * period) + 1
-    pieces = []
-    for rows in np.split(np.arange(len(motors)), cuts):
-        if len(rows) * period < shortest:
-            continue
-        t = np.asarray(period * np.arange(len(rows)), dtype=np.float64)
-        at = motors.t[rows[0]] + t
-        motor = _motion(motors.joints, t, smooth(at, motors.t, motors.q))
-        if motors.tau is not None:
-            motor = replace(motor, tau=smooth(at, motors.t, motors.tau))
-        pieces.append((motor, _motion(links.joints, t, smooth(at, link_times, links.q))))
-    return pieces
+    robot: Robot, motors: Recording, links: Recording, used: Conditioning
+) -> list[Sides]:
+    """Return filtered motions of motors and links without pauses, with the spring torques."""
+    both = recorded_together(motors, links, robot)
+    assert both.partner is not None
+    tau = np.zeros_like(both.q) if both.tau is None else both.tau
+    motor = replace(both, partner=None, tau=tau)
+    link = replace(motor, q=both.partner.q)
+    parts = zip(segments(motor, used), segments(link, used), strict=True)
+    return [(of_motor, of_link, inverse_dynamics(robot, of_link)) for of_motor, of_link in parts]
 
 
-def _motion(joints: tuple[str, ...], t: FloatArray, q: FloatArray) -> Motion:
-    dq = np.gradient(q, t, axis=0)
-    return Motion(joints, t, q, dq, np.gradient(dq, t, axis=0))
-
-
-def _motor(motors: Sequence[Motion], loads: Sequence[FloatArray], joint: int) -> FloatArray | None:
+def _motor(sides: Sequence[Sides], used: Conditioning, joint: int) -> FloatArray:
     """Fit rotor inertia, friction and offset to the motor torque minus the load."""
-    tables, torques = [], []
-    for motor, load in zip(motors, loads, strict=True):
-        if motor.tau is None:
-            return None
-        inner = slice(len(motor) // 20, -(len(motor) // 20) - 1)
-        sections = butter(4, _CUTOFF, fs=1.0 / (motor.t[1] - motor.t[0]), output='sos')
-        signs = sosfiltfilt(sections, direction(motor.dq), axis=0)
-        columns = [motor.ddq, motor.dq, signs, np.ones_like(motor.q)]
-        tables.append(np.column_stack([column[inner, joint] for column in columns]))
-        torques.append((motor.tau - load)[inner, joint])
-    found = np.linalg.lstsq(np.vstack(tables), np.concatenate(torques), rcond=None)[0]
-    return np.asarray(found[:3])
+    rows = []
+    for motor, _, load in sides:
+        assert motor.tau is not None
+        signs, torque = direction(motor.dq), motor.tau - load
+        columns = [motor.ddq, motor.dq, signs, np.ones_like(motor.q), torque]
+        rows.append(decimate(np.column_stack([column[:, joint] for column in columns]), used))
+    table = np.vstack(rows)
+    return np.asarray(np.linalg.lstsq(table[:, :4], table[:, 4], rcond=None)[0][:3])

@@ -7,6 +7,7 @@ import json
 from armid_ros.arm import ArmModel
 from armid_ros.effects import make_effect, parse_effect
 from armid_ros.errors import IdentificationError
+from armid_ros.identification import Conditioning
 from armid_ros.motion import Motion
 from armid_ros.papers.elastic.command import elastic
 from armid_ros.papers.elastic.identification.files import read_sides
@@ -63,7 +64,7 @@ def bag(tmp_path_factory):
 @pytest.fixture(scope='module')
 def found(bag):
     """Fit the springs."""
-    return fit_springs(ROBOT, [read_sides(bag, ROBOT)], np.random.default_rng(0))
+    return fit_springs(ROBOT, [read_sides(bag, ROBOT)])
 
 
 @pytest.mark.long
@@ -105,8 +106,11 @@ def test_two_links_are_a_planar_pair_where_they_bear_no_weight():
 SPRING, BACKLASH = 5e5, 4e-4
 
 
-def recording(rng, *, play=BACKLASH, weight=0.0, delay=0.0):
-    """Return a joint whose load is inertia, with or without a weight that never changes sides."""
+USED = Conditioning(250.0, 8.0, 12)
+
+
+def stretch(rng, *, play=BACKLASH, weight=0.0, delay=0.0):
+    """Return both sides of a joint that accelerates, with or without a constant weight."""
     dt = 4e-3
     t = dt * np.arange(2500)
     phases = rng.uniform(0.0, 6.0, 3)
@@ -117,7 +121,11 @@ def recording(rng, *, play=BACKLASH, weight=0.0, delay=0.0):
     load = 100.0 * acceleration + 60.0 * np.cos(2.0 * q) * np.sin(5.0 * t) + weight
     twist = load / SPRING + 0.5 * play * np.tanh(load / 5.0) + delay * velocity
     noise = 2e-6 * rng.standard_normal((2, len(t)))
-    return dt, q + twist + noise[0] + 0.01, q + noise[1], load
+    motor, link = (
+        Motion(('joint',), t, x[:, None], velocity[:, None], acceleration[:, None])
+        for x in (q + twist + noise[0] + 0.01, q + noise[1])
+    )
+    return motor, link, load[:, None]
 
 
 def holds(interval, value, slack=0.0):
@@ -127,7 +135,7 @@ def holds(interval, value, slack=0.0):
 
 def test_spring_and_free_play_are_found_and_told_apart() -> None:
     rng = np.random.default_rng(0)
-    fit = fit_transmission([recording(rng) for _ in range(3)], rng)
+    fit = fit_transmission([stretch(rng) for _ in range(3)], USED, 0)
     assert holds(fit.stiffness, SPRING, slack=0.1)
     assert holds(fit.backlash, BACKLASH, slack=0.15)
     assert fit.backlash_seen
@@ -135,14 +143,14 @@ def test_spring_and_free_play_are_found_and_told_apart() -> None:
 
 def test_without_free_play_none_is_seen() -> None:
     rng = np.random.default_rng(1)
-    fit = fit_transmission([recording(rng, play=0.0) for _ in range(3)], rng)
+    fit = fit_transmission([stretch(rng, play=0.0) for _ in range(3)], USED, 0)
     assert holds(fit.stiffness, SPRING, slack=0.05)
     assert fit.backlash[0] < 0.05 * BACKLASH
 
 
 def test_free_play_under_a_weight_is_an_offset() -> None:
     rng = np.random.default_rng(2)
-    fit = fit_transmission([recording(rng, weight=5000.0) for _ in range(3)], rng)
+    fit = fit_transmission([stretch(rng, weight=5000.0) for _ in range(3)], USED, 0)
     assert np.isnan(fit.backlash[0])
     assert not fit.backlash_seen
     assert holds(fit.stiffness, SPRING, slack=0.1)
@@ -150,12 +158,12 @@ def test_free_play_under_a_weight_is_an_offset() -> None:
 
 def test_a_late_encoder_is_not_taken_for_a_spring() -> None:
     rng = np.random.default_rng(3)
-    fit = fit_transmission([recording(rng, delay=3e-3) for _ in range(3)], rng)
+    fit = fit_transmission([stretch(rng, delay=3e-3) for _ in range(3)], USED, 0)
     assert fit.delay[0] == pytest.approx(3e-3, rel=0.05)
     assert holds(fit.stiffness, SPRING, slack=0.1)
 
 
 def test_a_joint_that_stands_is_refused() -> None:
-    still = 4e-3, np.zeros(200), np.zeros(200), np.ones(200)
+    still = Motion.of_states(('joint',), np.zeros((200, 1)), 0.0, 0.0)
     with pytest.raises(IdentificationError, match='hardly moves'):
-        fit_transmission([still], np.random.default_rng(0))
+        fit_transmission([(still, still, np.ones((200, 1)))], USED, 0)
