@@ -69,7 +69,8 @@ def gait_by_torque() -> None:
     print('in MuJoCo, one joint by its torque               paper      wanted      measured')
     for joint, paper, wanted in (('exo_right_hip', 1.5, 0.05), ('exo_right_knee', 2.5, 0.1)):
         for rate, believed in ((100.0, None), (200.0, None), (1000.0, None), (200.0, soft)):
-            torque = driving_torque(cycle, joint, rate, believed)
+            tau = cycle.torques(believed)
+            torque = driving_torque(cycle, joint, rate, tau)
             path = walk_in_mujoco(cycle, joint, lambda t, torque=torque: torque(t)[2]).driven
             error = _most(path - cycle.motions.own.q[:, cycle.pair.robot.index(joint)])
             what = f'{joint}, {rate:.0f} Hz' + (', springs 20 % too soft' if believed else '')

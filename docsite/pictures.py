@@ -121,7 +121,7 @@ def exo_cycle() -> Figure:
     panels = figure.subplots(3, 2, height_ratios=(2, 1.2, 2))
     for column, (joint, most) in enumerate((('hip', 1.5), ('knee', 2.5))):
         name = f'exo_right_{joint}'
-        right, wrong = (check_cycle(cycle, name, 200.0, k) for k in (None, soft))
+        right, wrong = (check_cycle(cycle, name, 200.0, cycle.torques(k)) for k in (None, soft))
         phase = cycle.phase[::2]
         angle, error = panels[0, column], panels[1, column]
         angle.plot(phase, np.degrees(right.prescribed), color=GREY, lw=4, label='prescribed')

@@ -59,13 +59,9 @@ def walk(pair: TiedPair, gait: Gait, stiffness: float | None, tick: Tick) -> Sim
     walkers = walking_pair(stiffness)
     cycle, rate = gait_cycle(walkers, gait), read_assumptions()['torque_rate'].value
     soft = walkers.with_stiffness((1.0 - STIFFNESS_ERROR) * walkers.stiffness)
-    shared = ground_by_shares(cycle)
+    torques = cycle.own.tau, cycle.torques(soft), cycle.torques(ground=ground_by_shares(cycle))
     driven = [
-        DrivenJoint(
-            check_cycle(cycle, joint, rate),
-            check_cycle(cycle, joint, rate, soft),
-            check_cycle(cycle, joint, rate, ground_forces=shared),
-        )
+        DrivenJoint(*(check_cycle(cycle, joint, rate, tau) for tau in torques))
         for joint in SOURCE_ERROR  # the source drives these joints, one at a time
     ]
     return SimulatedWalk(float(pair.stiffness[0]), cycle, driven)

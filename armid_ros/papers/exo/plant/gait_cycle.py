@@ -17,6 +17,7 @@ and of its share of the trunk, minus the spring forces. A single foot bears the 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from armid_ros.model import inverse_dynamics
@@ -155,6 +156,14 @@ class GaitCycle:
         """Return the motions of both machines."""
         return PairMotion(self.own.motion, self.other.motion)
 
+    def torques(
+        self, pair: TiedPair | None = None, ground: FloatArray | None = None
+    ) -> FloatArray:
+        """Return the machine's torques with other springs, or other forces on its feet, (N, n)."""
+        feet = self.own.ground if ground is None else ground
+        forces = (feet, self.other.ground)
+        return walking_torques(pair or self.pair, self.motions, forces).tau
+
 
 def gait_cycle(pair: TiedPair, gait: Gait) -> GaitCycle:
     """
@@ -206,7 +215,7 @@ def gait_cycle(pair: TiedPair, gait: Gait) -> GaitCycle:
         place, speed = _contact_motion(robot, whole[k])
         ground.append(read_only(ground_force(place[..., 1], speed[..., 1], speed[..., 0])))
     motions = PairMotion(*whole)
-    found = walking_torques(pair, motions, ground[0], ground[1])
+    found = walking_torques(pair, motions, ground)
     own, other = (
         WalkingMachine(*parts)
         for parts in (
@@ -225,7 +234,7 @@ def _contact_motion(robot: Robot, motion: Motion) -> tuple[FloatArray, FloatArra
 
 
 def walking_torques(
-    pair: TiedPair, motions: PairMotion, ground: FloatArray, other_ground: FloatArray
+    pair: TiedPair, motions: PairMotion, ground: Sequence[FloatArray]
 ) -> PairTorques:
     """
     Return the joint torques of both machines with springs and the forces at their feet, (27).
@@ -236,16 +245,14 @@ def walking_torques(
         Pair that is free to walk.
     motions : PairMotion
         Motions of both machines.
-    ground, other_ground : ndarray, shape (N, 4, 2)
-        Forces on heels and toes, forward and up [N].
+    ground : sequence of ndarray, each of shape (N, 4, 2)
+        Forces on heels and toes of the machine and of the other one, forward and up [N].
 
     """
     found = pair_torques(pair, *motions)
+    robots, torques = (pair.robot, pair.other), (found.tau, found.other_tau)
     parts = []
-    for robot, motion, forces, tau in (
-        (pair.robot, motions.own, ground, found.tau),
-        (pair.other, motions.other, other_ground, found.other_tau),
-    ):
+    for robot, motion, forces, tau in zip(robots, motions, ground, torques, strict=True):
         _, jacobian = points_motion(robot, *contacts(robot), motion.q)
         parts.append(tau - np.einsum('ncxj,ncx->nj', jacobian[:, :, _PLANE], forces))
     return replace(found, tau=read_only(parts[0]), other_tau=read_only(parts[1]))
@@ -309,11 +316,7 @@ def _walk(
 
 
 def check_cycle(
-    cycle: GaitCycle,
-    joint: str,
-    rate: float,
-    assumed: TiedPair | None = None,
-    ground_forces: FloatArray | None = None,
+    cycle: GaitCycle, joint: str, rate: float, tau: FloatArray | None = None
 ) -> GaitCheck:
     """
     Simulate a cycle in which one joint of the machine is driven by its torque.
@@ -329,34 +332,24 @@ def check_cycle(
         The joint that follows its torque.
     rate : float
         Torque samples per second, joined by cubic splines.
-    assumed : TiedPair, optional
-        The machines for which the torques are computed; by default the simulated ones.
-    ground_forces : ndarray, shape (N, 4, 2), optional
-        Forces on heels and toes for which the torques are computed [N]; by default the simulated
-        ones.
+    tau : ndarray, shape (N, n), optional
+        Torques of the machine [N m]; by default those of the cycle.
 
     """
     pair, motions = cycle.pair, cycle.motions
-    torque = driving_torque(cycle, joint, rate, assumed, ground_forces)
+    torque = driving_torque(cycle, joint, rate, tau)
     hips = [pair.robot.joints[place] for place in floating(pair.robot)[:2]]
     moved = drive_by_torque(pair, *motions, [*hips, joint], torque, on_ground=True)
     return GaitCheck(joint, motions.own.q[::2, pair.robot.index(joint)], moved)
 
 
 def driving_torque(
-    cycle: GaitCycle,
-    joint: str,
-    rate: float,
-    assumed: TiedPair | None = None,
-    ground_forces: FloatArray | None = None,
+    cycle: GaitCycle, joint: str, rate: float, tau: FloatArray | None = None
 ) -> DrivingTorque:
     """Return zero force on the hips and the interpolated torque of a joint, (3,) [N, N m]."""
-    tau = cycle.own.tau
-    if assumed is not None or ground_forces is not None:
-        ground = cycle.own.ground if ground_forces is None else ground_forces
-        pair = assumed or cycle.pair
-        tau = walking_torques(pair, cycle.motions, ground, cycle.other.ground).tau
-    curve = splined(cycle.own.motion.t, tau[:, [cycle.pair.robot.index(joint)]], rate)
+    column = [cycle.pair.robot.index(joint)]
+    own = (cycle.own.tau if tau is None else tau)[:, column]
+    curve = splined(cycle.own.motion.t, own, rate)
     return lambda t: np.concatenate([[0.0, 0.0], curve(t)])
 
 
