@@ -15,9 +15,9 @@ import sys
 from benchmarks.reference_loop import processor
 
 BENCHMARKS = (
-    *('changes', 'coverage', 'excitation', 'exo', 'exo_diagnosis', 'fleet', 'growth'),
+    *('changes', 'coverage', 'exo', 'exo_diagnosis', 'growth'),
     *('healthy_arms', 'hidden_effects', 'live_diagnosis', 'lived', 'nodes'),
-    *('offline_speed', 'online', 'part_time', 'reading', 'real_changes', 'real_diagnosis'),
+    *('offline_speed', 'online', 'reading', 'real_changes', 'real_diagnosis'),
     'simulation',
 )
 #: Benchmarks whose output is kept.

@@ -4,29 +4,19 @@
 Coverage of 95 % intervals, over repeats with coloured torque noise and encoder noise.
 
 The arm is simulated, so the true base parameters, effects and torques along another motion are
-known. The intervals are those of an identification from a recording, and online. Two
-identifications from different motions are compared as well: of the unchanged arm, of one with a
-load, and of one with more friction in the elbow.
+known. The intervals are those of an identification from a recording, and online.
 
-    python -m benchmarks.coverage [--repeats 500] [--online-repeats 200] [--pairs 200]
+    python -m benchmarks.coverage [--repeats 500] [--online-repeats 200]
 
 """
 
 import argparse
 from collections import defaultdict
-import json
 import time
 
 from armid_ros.arm import ArmModel
-from armid_ros.identification import (
-    identification_document,
-    IdentificationSettings,
-    identify,
-    SignalSettings,
-)
-from armid_ros.identification.assess.compare import compare
+from armid_ros.identification import IdentificationSettings, identify, SignalSettings
 from armid_ros.identification.online.identifier import OnlineIdentifier
-from armid_ros.identification.parameters_file import parameters_of
 from armid_ros.recording import Recording
 import numpy as np
 from scipy.signal import lfilter
@@ -40,8 +30,6 @@ FRICTION = (
 )
 RATE, SECONDS = 200.0, 20.0
 T = np.arange(round(SECONDS * RATE)) / RATE
-#: Mass in the hand [kg], and factor on the friction of the elbow.
-LOAD, WEAR = 0.1, 1.5
 HALF_WIDTH = 1.959964
 
 
@@ -84,15 +72,10 @@ def recorded(motion, tau, rng, encoder, torque, pole):
     )
 
 
-def identified(arm, recording):
-    """Identify an arm offline."""
-    settings = IdentificationSettings(signals=SignalSettings(10.0, 4))
-    return identify(arm, [recording], settings, rng=np.random.default_rng(0))
-
-
 def from_recording(arm, recording):
     """Identify offline; return base parameters and estimate."""
-    result = identified(arm, recording)
+    settings = IdentificationSettings(signals=SignalSettings(10.0, 4))
+    result = identify(arm, [recording], settings, rng=np.random.default_rng(0))
     return result.base, result.estimate
 
 
@@ -134,54 +117,11 @@ def coverage(method, repeats, encoder, pole):
         print(tally.line(what), flush=True)
 
 
-def parameters(arm, structure, rng):
-    """Identify an arm from a new motion; return the parameters in its document."""
-    motion = multisine(arm.robot.joints, T, rng)
-    result = identified(structure, recorded(motion, arm.torque(motion), rng, 2e-5, 0.02, 0.95))
-    document = json.loads(json.dumps(identification_document(result, 'arm', {})))
-    return parameters_of('repeat', document)
-
-
-def comparisons(pairs):
-    """Print how often two identifications of an unchanged, loaded or worn arm differ."""
-    rng = np.random.default_rng(0)
-    arm = ArmModel.of('humanoid_arm', effects=FRICTION)
-    structure = ArmModel(arm.robot, arm.effects)
-    body = np.array([1.0, 0.0, 0.0, 0.06, 0.005, 0.0, 0.005, 0.0, 0.0, 0.001])
-    theta = arm.theta.copy()
-    rigid = len(arm.robot.rigid_parameters)
-    theta[rigid - 10 : rigid] += LOAD * body
-    values = [value.copy() for value in arm.values]
-    for friction in values[:2]:
-        friction[3] *= WEAR
-    arms = (arm, arm, arm.with_theta(theta), ArmModel(arm.robot, arm.effects, tuple(values)))
-    alarms, sizes, wear = 0, [], 0
-    for _ in range(pairs):
-        first, *others = (parameters(one, structure, rng) for one in arms)
-        same, load, rubbed = (compare(first, other) for other in others)
-        alarms += same.anything
-        if load.load is not None and load.load.link == arm.robot.n_joints:
-            sizes.append((load.load.mass, load.load.mass_std))
-        joints = {c.parameter.joint for c in rubbed.changed}
-        joints |= {g.joint for g in rubbed.groups if g.changed}
-        wear += joints == {arm.robot.joints[3]}
-    mass, std = np.array(sizes).T
-    print(
-        f'{pairs} pairs: unchanged, reported to differ {100 * alarms / pairs:.1f} % (wanted: 5)\n'
-        f'    {1e3 * LOAD:g} g in the hand, found and placed {100 * len(sizes) / pairs:.1f} %, '
-        f'{1e3 * mass.mean():.1f} ± {1e3 * mass.std():.1f} g, 95 % intervals hold '
-        f'{100 * np.mean(np.abs(mass - LOAD) <= HALF_WIDTH * std):.1f} %\n'
-        f'    {100 * (WEAR - 1):.0f} % more friction in the elbow, and nothing else, reported '
-        f'{100 * wear / pairs:.1f} %'
-    )
-
-
 def main():
     """Print the tables."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument('--repeats', type=int, default=500)
     parser.add_argument('--online-repeats', type=int, default=200)
-    parser.add_argument('--pairs', type=int, default=200)
     arguments = parser.parse_args()
     for method, repeats in (
         (from_recording, arguments.repeats),
@@ -190,8 +130,6 @@ def main():
         for encoder, pole in ((2e-5, 0.95), (2e-4, 0.95), (0.0, 0.0)):
             if repeats:
                 coverage(method, repeats, encoder, pole)
-    if arguments.pairs:
-        comparisons(arguments.pairs)
 
 
 if __name__ == '__main__':

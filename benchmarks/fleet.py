@@ -1,25 +1,19 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-A simulated fleet with known changes, and the changes that `armid fleet` finds.
+A simulated fleet with known changes: bags for the tests and the golden results of `armid fleet`.
 
 Arms of one kind differ in mass and friction, and have a different motion in every bag, a bag per
 day. Friction varies with the temperature of the day. Some arms change: a step of friction, a
 load in the hand, wear of a joint, or an effect that the model lacks. Some bags are damaged.
 
-    python -m benchmarks.fleet [--arms N] [--bags M] [--changed K] [--damaged D]
-
 """
 
 from __future__ import annotations
 
-import argparse
 import datetime
 import json
 from pathlib import Path
-import subprocess
-import sys
-import tempfile
 
 from armid_ros.arm import ArmModel
 from armid_ros.effects import make_effect
@@ -136,52 +130,3 @@ def generate(folder, arms, bags, changed, damaged, seconds=60.0, seed=0):
             if day in damage:
                 (file,) = bag.glob('*.mcap')
                 file.write_bytes(b'\0' * 4096)
-
-
-def score(folder, results):
-    """Compare named changes with the truth, and print the result."""
-    from pyarrow import parquet
-
-    truth = json.loads(Path(folder, 'truth.json').read_text())
-    changes = parquet.read_table(f'{results}/watch/changes.parquet').to_pylist()
-    arms = parquet.read_table(f'{results}/watch/arms.parquet').to_pylist()
-    found = {row['arm'] for row in changes}
-    sick = set(truth['arms'])
-    print(f'{len(found & sick)} of {len(sick)} changed arms named, {len(found - sick)} others')
-    for arm in sorted(sick - found):
-        print(f'  not named: {arm} {truth["arms"][arm]}')
-    for arm in sorted(found - sick):
-        print(f'  healthy: {arm} {next(r["text"] for r in changes if r["arm"] == arm)}')
-    late = []
-    for arm in sorted(found & sick):
-        row, event = next(r for r in changes if r['arm'] == arm), truth['arms'][arm]
-        day = FIRST_DAY + datetime.timedelta(days=event['day'])
-        if row['kind'] == 'step':
-            late.append(abs((datetime.date.fromisoformat(row['first_day']) - day.date()).days))
-        print(f'  {arm} {event["what"]} {event["size"]:.2f} from {day.date()}: {row["text"]}')
-    print(f'day of steps off by {np.mean(late) if late else 0:.2f} days in the mean')
-    refused = sum(row['refused'] for row in arms)
-    print(f'{refused} of {len(truth["damaged"])} damaged bags refused')
-    return len(found & sick), len(found - sick)
-
-
-def main():
-    """Generate a fleet, identify and watch it, and compare with the truth."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument('--arms', type=int, default=20)
-    parser.add_argument('--bags', type=int, default=10)
-    parser.add_argument('--changed', type=int, default=4)
-    parser.add_argument('--damaged', type=int, default=2)
-    parser.add_argument('--seconds', type=float, default=60.0)
-    parser.add_argument('--seed', type=int, default=0)
-    asked = parser.parse_args()
-    with tempfile.TemporaryDirectory() as folder:
-        generate(f'{folder}/bags', **vars(asked))
-        for command in (['identify', f'{folder}/bags/*/*', '--robot', str(ROBOT)], ['watch']):
-            told = [sys.executable, '-m', 'armid_ros.cli', 'fleet', *command]
-            subprocess.run([*told, '--out', f'{folder}/results'], check=True)
-        score(f'{folder}/bags', f'{folder}/results')
-
-
-if __name__ == '__main__':
-    main()

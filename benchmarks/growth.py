@@ -3,7 +3,7 @@
 """
 Processor time and memory of the jobs over samples, joints, bags and effects, with slopes.
 
-``python -m benchmarks.growth [--quick]`` writes results/growth.json, which the docs plot. Each
+``python -m benchmarks.growth`` writes results/growth.json, which the docs plot. Each
 point is measured in a separate process. The arms are chains with friction on sums of sines.
 
 """
@@ -51,8 +51,6 @@ EFFECTS = (
     'viscous_friction', 'coulomb_friction', 'torque_offset', 'rotor_inertia', 'quadratic_friction',
     'asymmetric_friction', 'joint_spring', 'load_dependent_friction',
 )  # fmt: skip
-#: The largest values of a quick run.
-QUICK = {'samples': 10**5, 'joints': 7, 'bags': 10, 'effects': 2}
 
 
 def chain(joints: int) -> str:
@@ -106,7 +104,7 @@ def measure(run: Callable[[], object]) -> tuple[float, float]:
     return used, (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) / 1024.0
 
 
-def slope(x: list[int], y: list[float]) -> float:
+def slope(x: tuple[int, ...], y: list[float]) -> float:
     """Return the exponent of the growth over the upper half of the values."""
     last = max(2, len(x) // 2)
     return float(np.polyfit(np.log(x[-last:]), np.log(np.maximum(y[-last:], 1e-3)), 1)[0])
@@ -115,9 +113,6 @@ def slope(x: list[int], y: list[float]) -> float:
 def main() -> None:
     """Measure every point in a separate process; write and print the table."""
     parser = argparse.ArgumentParser(description=__doc__.strip().partition('\n')[0])
-    parser.add_argument(
-        '--quick', action='store_true', help='small sizes only; nothing is written'
-    )
     parser.add_argument('--point', nargs=3, help=argparse.SUPPRESS)
     asked = parser.parse_args()
     if asked.point:
@@ -128,21 +123,19 @@ def main() -> None:
         return
     table = []
     for (job, axis), values in POINTS.items():
-        kept = [value for value in values if not asked.quick or value <= QUICK[axis]]
         found = []
-        for value in kept:
+        for value in values:
             command = [sys.executable, '-m', 'benchmarks.growth', '--point', job, axis, str(value)]
             done = subprocess.run(command, capture_output=True, text=True, check=True)
             found.append(json.loads(done.stdout.splitlines()[-1]))
         seconds, memory = (list(column) for column in zip(*found, strict=True))
-        row = {'job': job, 'over': axis, 'values': kept, 'seconds': seconds, 'megabytes': memory}
-        table.append(row | {'slope': slope(kept, seconds)})
+        row = {'job': job, 'over': axis, 'values': values, 'seconds': seconds, 'megabytes': memory}
+        table.append(row | {'slope': slope(values, seconds)})
         points = ', '.join(
-            f'{v:,}: {s:.2f} s {m:.0f} MB' for v, (s, m) in zip(kept, found, strict=True)
+            f'{v:,}: {s:.2f} s {m:.0f} MB' for v, (s, m) in zip(values, found, strict=True)
         )
         print(f'{job:9} over {axis:8} slope {table[-1]["slope"]:.2f}   {points}', flush=True)
-    if not asked.quick:
-        OUT.write_text(json.dumps({'machine': processor(), 'jobs': table}, indent=1) + '\n')
+    OUT.write_text(json.dumps({'machine': processor(), 'jobs': table}, indent=1) + '\n')
 
 
 if __name__ == '__main__':

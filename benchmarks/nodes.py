@@ -24,16 +24,13 @@ from armid_ros.excitation import Excitation, Limits, random_feasible, save_excit
 from armid_ros.identification.online.identifier import OnlineIdentifier
 from armid_ros.nodes.lockstep import run_lockstep
 from armid_ros.nodes.online_identifier import OnlineIdentifierNode
-from armid_ros.nodes.qos import STREAM
 from armid_ros.nodes.running.domains import private_context
 from armid_ros.nodes.running.process import steady
 from armid_ros.recording import read_recording
 from armid_ros.robots import load_robot
-from armid_ros.simulation import Reference, SimulatedArm
+from armid_ros.simulation import SimulatedArm
 import numpy as np
-import rclpy
 from rclpy.experimental import EventsExecutor
-from sensor_msgs.msg import JointState
 
 from benchmarks.real_recordings import example_robot
 
@@ -152,72 +149,30 @@ def at_one_kilohertz(seconds, folder):
     )
 
 
-def bare_loop(steps=3000):
-    """
-    Return how often per second one JointState reaches three subscriptions.
-
-    The subscriptions belong to three nodes of this process and do not decode the message, so this
-    is the limit of the messages for a lock step of recorder, publisher and identifier.
-
-    """
-    with private_context() as context, steady():
-        executor, received = EventsExecutor(context=context), []
-        names = ('publisher', 'first_reader', 'second_reader', 'third_reader')
-        nodes = [rclpy.create_node(name, context=context) for name in names]
-        publisher = nodes[0].create_publisher(JointState, 'joint_states', STREAM)
-        for node in nodes[1:]:
-            node.create_subscription(JointState, 'joint_states', received.append, STREAM, raw=True)
-            executor.add_node(node)
-        while publisher.get_subscription_count() < 3:
-            time.sleep(0.01)
-        signals = {name: [0.1] * 6 for name in ('position', 'velocity', 'effort')}
-        message = JointState(name=[f'joint_{k}' for k in range(6)], **signals)
-        begun = time.perf_counter()
-        for step in range(steps):
-            publisher.publish(message)
-            while len(received) < 3 * (step + 1):
-                executor.spin_once(timeout_sec=0.1)
-        seconds = time.perf_counter() - begun
-        executor.shutdown()
-        for node in nodes:
-            node.destroy_node()
-    return steps / seconds
-
-
-def in_lock_step(rate, folder):
+def in_lock_step(rate, wanted, folder):
     """
     Print the speed of all nodes in lock step over real time.
 
     The speed is measured by the clock, which includes delays by other processes, and by
-    processor time, as on an idle machine. The speeds of the simulator alone and of the
-    messages alone are printed as well.
+    processor time, as on an idle machine.
 
     """
     robot = load_robot('humanoid_arm', gravity='moon')
     arm, run = ArmModel.of(robot, effects=EFFECTS), short_run(robot, 10.0, 1)
-    rng = np.random.default_rng(0)
-    plant = SimulatedArm(arm, rng=rng, start=run.at([0.0]).q[0])
-    alone = SimulatedArm(arm, rng=rng, start=run.at([0.0]).q[0])
-    alone.set_trajectory(Reference.of(run.motion(100.0)))
-    begun = time.process_time()
-    for _ in range(1000):
-        alone.advance(10)
-    simulator = 10.0 / (time.process_time() - begun)
-    identifier, used = OnlineIdentifier(arm, rng=rng), []
-
-    def tell(_):
-        used.append(time.process_time())
-
+    rng, used = np.random.default_rng(0), []
     end = run_lockstep(
-        plant, run, folder / f'bag_{rate:.0f}', identifier, rate=rate, on_progress=tell
+        SimulatedArm(arm, rng=rng, start=run.at([0.0]).q[0]),
+        run,
+        folder / f'bag_{rate:.0f}',
+        OnlineIdentifier(arm, rng=rng),
+        rate=rate,
+        on_progress=lambda _: used.append(time.process_time()),
     )
     by_processor = 1.0 / np.diff(used)
-    wanted = {200.0: 8, 500.0: 6, 1000.0: 5}[rate]
     print(
         f'lock step, joint_states at {rate:5.0f} Hz   {end.real_time_factor:.1f} x real time; '
         f'by processor time {np.median(by_processor):.1f}, in the best second '
-        f'{by_processor.max():.1f} (wanted: {wanted}; the simulator alone {simulator:.1f}, '
-        f'the messages alone {bare_loop() / rate:.1f})'
+        f'{by_processor.max():.1f} (wanted: {wanted})'
     )
 
 
@@ -229,8 +184,8 @@ def main():
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         at_one_kilohertz(seconds, folder)
-        for rate in (200.0, 500.0, 1000.0):
-            in_lock_step(rate, folder)
+        for rate, wanted in ((200.0, 8), (500.0, 6), (1000.0, 5)):
+            in_lock_step(rate, wanted, folder)
 
 
 if __name__ == '__main__':

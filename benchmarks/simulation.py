@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Speed of the simulated arm relative to real time, and the time of its parts.
+Speed of the simulated arm relative to real time, as a run and sample by sample.
 
 Every arm has rotor inertias, and viscous and Coulomb friction in each joint. It follows a smooth
 reference at 1 kHz by computed torque; sensors have noise, quantisation and a delay. The aim is 60
@@ -26,10 +26,9 @@ from armid_ros.simulation import (
     Sensors,
     simulate,
     SimulatedArm,
-    step,
 )
+from armid_ros.simulation.run import SimulatedRun
 import numpy as np
-import pinocchio as pin
 
 REACH = 60.0
 SECONDS = 0.5
@@ -47,8 +46,8 @@ def main() -> None:
 
 def report(name: str, robot: Robot) -> None:
     """Measure one arm and print its table."""
-    arm, reference = with_friction(robot), swinging(robot)
-    plant, controller = Plant(arm), ComputedTorque(ArmModel(robot))
+    reference, controller = swinging(robot), ComputedTorque(ArmModel(robot))
+    plant, rng = Plant(with_friction(robot)), np.random.default_rng(0)
     sensors = Sensors(
         torque_noise=0.05,
         position_noise=1e-6,
@@ -56,46 +55,27 @@ def report(name: str, robot: Robot) -> None:
         resolution=1e-5,
         torque_delay=2,
     )
-    rng = np.random.default_rng(0)
-    steps = round(SECONDS / plant.dt)
 
-    def all_in() -> None:
-        simulate(plant, reference, rng=rng, controller=controller, sensors=sensors)
+    def run() -> SimulatedRun:
+        return simulate(plant, reference, rng=rng, controller=controller, sensors=sensors)
 
-    run = simulate(plant, reference, rng=rng, controller=controller, sensors=sensors)
-    stuck = np.mean(run.truth.dq == 0.0)
-    arm_by_step = SimulatedArm(
+    stuck = np.mean(run().truth.dq == 0.0)
+    streamed = SimulatedArm(
         plant, rng=rng, controller=controller, sensors=sensors, start=reference.q[0]
     )
-    state = plant.state(run.truth.q[steps // 2], run.truth.dq[steps // 2])
-    torque = run.truth.tau[steps // 2]
-    rigid = Plant(ArmModel(robot), hard_stops=False)
-    free = rigid.state(state.q, state.dq)
-    desired = (state.q, state.dq, state.dq)
-    model, data = robot.model, robot.model.createData()
-
-    def dynamics() -> None:
-        pin.nonLinearEffects(model, data, state.q, state.dq)
-        pin.crba(model, data, state.q)
-
-    times = repeated(all_in, 1)
-    whole = min(times) / steps
-    factor, usual = plant.dt / whole, plant.dt * steps / float(np.median(times))
+    times = np.array(repeated(run, 1)) / round(SECONDS / plant.dt)
+    factor, usual = plant.dt / times.min(), plant.dt / np.median(times)
     verdict = 'reached' if factor >= REACH else 'NOT reached'
     print(f'{name}: {factor:.1f} x real time, {REACH:.0f} x wanted: {verdict}')
     print(f'  median of the repetitions                          {usual:6.1f} x')
     print(f'  joints at rest, of all samples                     {100 * stuck:6.1f} %')
     for what, seconds in (
-        ('simulate(), all in, per 1 ms step', whole),
+        ('simulate(), all in, per 1 ms step', times.min()),
+        ('SimulatedArm.advance(1), read every step', min(repeated(streamed.advance, 50))),
         (
-            '  step() as it moves, friction that sticks, stops',
-            best(lambda: step(plant, state, torque)),
+            'SimulatedArm.advance(5), read at 200 Hz',
+            min(repeated(lambda: streamed.advance(5), 50)),
         ),
-        ('  step() of the rigid body alone', best(lambda: step(rigid, free, torque))),
-        ('    of it inertia matrix and nonlinear effects', best(dynamics)),
-        ('  controller', best(lambda: controller.torque(state.q, state.dq, desired, torque))),
-        ('SimulatedArm.advance(1), read every step', best(arm_by_step.advance)),
-        ('SimulatedArm.advance(5), read at 200 Hz', best(lambda: arm_by_step.advance(5))),
     ):
         print(f'  {what:50s} {1e6 * seconds:6.1f} us')
 
@@ -117,11 +97,6 @@ def swinging(robot: Robot) -> Reference:
     q = middle + reach * np.sin(w * t)
     dq, ddq = reach * w * np.cos(w * t), -reach * w**2 * np.sin(w * t)
     return Reference(robot.joints, t[:, 0], q, dq, ddq)
-
-
-def best(call: Callable[[], object], number: int = 50) -> float:
-    """Return the shortest time of a call [s], averaged over `number` calls."""
-    return min(repeated(call, number))
 
 
 def repeated(call: Callable[[], object], number: int) -> list[float]:
