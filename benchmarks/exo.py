@@ -4,7 +4,7 @@
 The human-exoskeleton leg pair: gait by torque in MuJoCo, stiffness from noisy angles.
 
 Three tables: joints that follow their computed torque; the stiffness of one spring and of four;
-and the motions that determine four springs, with the bound for 200 poses.
+and the motions that determine four springs.
 
     python -m benchmarks.exo [--draws 8]
 
@@ -15,11 +15,7 @@ from __future__ import annotations
 import argparse
 
 from armid_ros.errors import IdentificationError
-from armid_ros.identification.ties.problem import (
-    interaction_problem,
-    InteractionProblem,
-)
-from armid_ros.motion import FloatArray, Motion
+from armid_ros.motion import FloatArray
 from armid_ros.papers.exo.plant.gait import read_gait
 from armid_ros.papers.exo.plant.gait_cycle import driving_torque, gait_cycle
 from armid_ros.papers.exo.plant.leg_pair import (
@@ -37,13 +33,10 @@ from armid_ros.robots.ties import SEGMENTS
 import numpy as np
 
 from benchmarks.exo_noise import find_springs, TORQUE_NOISE, with_torques
-from benchmarks.exo_poses import choose_poses, stiffness_bound
 from benchmarks.pair_in_mujoco import drive_in_mujoco, walk_in_mujoco
 
 STIFFNESS = 1e4
 PAIR = leg_pair(STIFFNESS)
-#: Durations of a step forward and back, for the choice of poses [s].
-SPEEDS = (1.8, 1.2, 0.9)
 
 
 def main() -> None:
@@ -54,7 +47,6 @@ def main() -> None:
     gait_by_torque()
     sets = {
         '200 poses': stepping(PAIR, read_gait(), np.linspace(0.0, 1.8, 201)[:-1]),
-        '200 chosen': chosen_poses(),
         '10 s 1 kHz': stepping(PAIR, read_gait(), np.arange(0.0, 10.0, 1e-3)),
     }
     exact = {name: with_torques(PAIR, motions) for name, motions in sets.items()}
@@ -94,7 +86,7 @@ def stiffness(sets: dict[str, PairMotion], draws: int) -> None:
     print(
         f'stiffness, {TORQUE_NOISE} N m noise, inertias free: {draws} draws, the worst spring [%]'
     )
-    print('  data       angles   springs  mean (scatter)    bound  least squares  wanted')
+    print('  data       angles   springs  mean (scatter)  least squares  wanted')
     for degrees in (0.05, 0.1):
         for separate in (False, True):
             for data, exact in sets.items():
@@ -106,79 +98,26 @@ def stiffness(sets: dict[str, PairMotion], draws: int) -> None:
                 plain = errors + np.array([100.0 * one.bias / STIFFNESS for one in found])
                 mean, scatter = errors.mean(axis=0), errors.std(axis=0, ddof=1)
                 worst = int(np.argmax(np.abs(mean) + scatter))
-                least = np.nan
-                if len(exact.own) < 1000:
-                    least = 100.0 * bound(exact, degrees, separate)[worst] / STIFFNESS
                 print(
                     f'  {data:10s} {degrees:4.2f} deg  {"four" if separate else "one":5s}  '
-                    f'{mean[worst]:+7.2f} ({scatter[worst]:.2f})    {least:5.2f}    '
-                    f'{plain.mean(axis=0)[worst]:+8.1f}     <= {5 if separate else 1}',
+                    f'{mean[worst]:+7.2f} ({scatter[worst]:.2f})  '
+                    f'{plain.mean(axis=0)[worst]:+8.1f}       <= {5 if separate else 1}',
                     flush=True,
                 )
 
 
-def chosen_poses() -> PairMotion:
-    """Choose the 200 poses of steps at three speeds that determine four springs best."""
-    gait = read_gait()
-    parts = [stepping(PAIR, gait, np.linspace(0.0, period, 601)[:-1], period) for period in SPEEDS]
-    own, other = (_joined([part[side] for part in parts]) for side in (0, 1))
-    problem = _planned(with_torques(PAIR, PairMotion(own, other)), 0.05, True)
-    rows = choose_poses(problem, _truth(problem), TORQUE_NOISE, 200)
-    return PairMotion(own.select(rows), other.select(rows))
-
-
-def _joined(motions: list[Motion]) -> Motion:
-    arrays = (np.concatenate([getattr(m, name) for m in motions]) for name in ('q', 'dq', 'ddq'))
-    return Motion(motions[0].joints, np.arange(float(sum(map(len, motions)))), *arrays)
-
-
-def bound(exact: PairMotion, degrees: float, separate: bool) -> FloatArray:
-    """Return the smallest possible standard deviation of an unbiased estimate [N/m]."""
-    problem = _planned(exact, degrees, separate)
-    return stiffness_bound(problem, _truth(problem), TORQUE_NOISE)
-
-
-def _planned(exact: PairMotion, degrees: float, separate: bool) -> InteractionProblem:
-    """Return the regression on poses with exact torques, inertias free."""
-    return interaction_problem(
-        PAIR,
-        exact.own,
-        exact.other,
-        noise=(np.radians(degrees), 0.0),
-        inertias='free',
-        separate=separate,
-    )
-
-
-def _truth(problem: InteractionProblem) -> FloatArray:
-    springs = len(problem.segments)
-    return np.concatenate([np.full(springs, STIFFNESS), problem.described[springs:]])
-
-
 def motions_of_four_springs() -> None:
-    """Print the bound for 200 poses of each motion, and the result of 10 s at 1 kHz."""
-    print('four springs, inertias free, 0.05 deg: deviation [%] of', ', '.join(SEGMENTS))
-    scale = 100.0 / STIFFNESS
-    for name, (*_, period) in EXERCISES.items():
-        poses, seconds = (
-            with_torques(PAIR, exercise(PAIR, name, t))
-            for t in (np.linspace(0.0, period, 201)[:-1], np.arange(0.0, 10.0, 1e-3))
-        )
+    """Print the stated intervals of four springs for 10 s at 1 kHz of each motion."""
+    print('four springs, inertias free, 0.05 deg, 10 s: 95 % interval [%] of', ', '.join(SEGMENTS))
+    for name in EXERCISES:
+        motions = with_torques(PAIR, exercise(PAIR, name, np.arange(0.0, 10.0, 1e-3)))
         try:
-            least = scale * bound(poses, 0.05, True)
-            found = find_springs(PAIR, seconds, 0.05, 0, inertias='free', separate=True)
+            found = find_springs(PAIR, motions, 0.05, 0, inertias='free', separate=True)
         except IdentificationError as problem:
             print(f'{name:11s} {problem}')
             continue
-        print(
-            f'{name:11s} 200 poses, bound {_four(least)}  10 s stated {_four(scale * found.std)}  '
-            f'worst 95 % {1.96 * scale * found.std.max():.1f}',
-            flush=True,
-        )
-
-
-def _four(values: FloatArray) -> str:
-    return ' '.join(f'{value:6.2f}' for value in values)
+        shown = ' '.join(f'{196.0 * std / STIFFNESS:6.2f}' for std in found.std)
+        print(f'{name:11s} {shown}', flush=True)
 
 
 if __name__ == '__main__':
