@@ -7,14 +7,14 @@ The cases are those of tests/hidden, whose data come from code that is independe
 diagnosis; rates have 95 % intervals (Wilson). For scope and rules see tests/hidden/README.md. The
 sizes of hidden effects are multiples of the noise, so every size is material (`material` is zero).
 
-    python -m benchmarks.hidden_effects [SET] [--slice] [--only TEXT] [--out FILE]
+    python -m benchmarks.hidden_effects [SET] [--only TEXT] [--out FILE]
 
 """
 
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 import traceback
@@ -28,48 +28,9 @@ from benchmarks.looks import judge_all
 from benchmarks.metrics import Metric, number, rate
 from benchmarks.two_days import Answer, ask, known_arm, Named, UNEXPLAINED
 from tests.hidden.base import HiddenEffect
-from tests.hidden.cases import Case, make_case
+from tests.hidden.cases import Case, make_case, VISIBLE
 from tests.hidden.lived.causes.base import Cause
 from tests.hidden.specification import case_list, CaseSpec, SETS
-
-#: Interval of the cases of a kind that are in the slice.
-SLICE = {'single': 9, 'free': 20, 'pair': 8, 'outside': 5, 'removed': 10}
-
-
-@dataclass(frozen=True)
-class Truth:
-    """The hidden effects of a case, without its recordings."""
-
-    key: str
-    kind: str
-    exact: bool
-    names: tuple[str, ...]
-    joints: tuple[tuple[str, ...], ...]
-    parameters: tuple[tuple[tuple[str, str, float], ...], ...]
-    repeats: bool
-    whole_arm: bool
-    size: float
-    visible: bool
-
-    @classmethod
-    def of(cls, case: Case) -> Truth:
-        """Return the truth of a case."""
-        joints = tuple(effect.joints for effect in case.effects)
-        return cls(
-            key=case.spec.key,
-            kind=case.spec.kind,
-            exact=case.spec.exact,
-            names=case.spec.effects,
-            joints=joints,
-            parameters=tuple(
-                tuple((p.name, p.joint, p.value) for p in effect.parameters)
-                for effect in case.effects
-            ),
-            repeats=all(effect.repeats for effect in case.effects),
-            whole_arm=any(len(own) in (0, case.robot.n_joints) for own in joints),
-            size=case.size,
-            visible=case.visible,
-        )
 
 
 @dataclass(frozen=True)
@@ -79,14 +40,23 @@ class Judged:
 
     Attributes
     ----------
-    truth : Truth
+    spec : CaseSpec
+        Specification of the case.
+    effects : tuple of HiddenEffect
         The hidden effects.
+    size : float
+        Gap of the largest one alone.
+    whole_arm : bool
+        Whether one of them acts on all joints.
     answer : Answer
         The answer of the diagnosis.
 
     """
 
-    truth: Truth
+    spec: CaseSpec
+    effects: tuple[HiddenEffect, ...]
+    size: float
+    whole_arm: bool
     answer: Answer
 
     @property
@@ -94,14 +64,19 @@ class Judged:
         """Return truth and answer in a line."""
         names = ' + '.join(map(str, self.answer.headline))
         return (
-            f'{self.truth.key} (gap {self.truth.size:.2g}): {self.answer.verdict} {names} '
+            f'{self.spec.key} (gap {self.size:.2g}): {self.answer.verdict} {names} '
             f'[{self.answer.seconds:.1f} s]' + self.answer.error.replace('\n', ' / ')
         )
 
     @property
+    def visible(self) -> bool:
+        """Whether what is hidden is large enough to be found."""
+        return bool(self.effects) and self.size >= VISIBLE
+
+    @property
     def findings(self) -> tuple[Named, ...]:
         """Return the findings, without link errors if the nominal model has wrong links."""
-        honest = () if self.truth.exact else ('link_inertia',)
+        honest = () if self.spec.exact else ('link_inertia',)
         return tuple(f for f in self.answer.headline if f.name not in honest)
 
     @property
@@ -113,35 +88,37 @@ class Judged:
     @property
     def top(self) -> bool:
         """Whether the truth was named first."""
-        return bool(self.findings) and self.findings[0].name in self.truth.names
+        return bool(self.findings) and self.findings[0].name in self.spec.effects
 
     @property
     def found(self) -> Named | None:
         """Return the finding with the (first) hidden effect among its names."""
-        return next((f for f in self.findings if self.truth.names[0] in f.names), None)
+        return next((f for f in self.findings if self.spec.effects[0] in f.names), None)
 
     @property
     def localised(self) -> bool:
         """Whether the truth was found in its joints, named first or as a rival."""
-        found, (name, *_) = self.found, self.truth.names
-        return found is not None and set(found.joints_of(name)) == set(self.truth.joints[0])
+        found, truth = self.found, self.effects[0]
+        return found is not None and set(found.joints_of(truth.name)) == set(truth.joints)
 
     @property
     def exact(self) -> bool:
         """Whether the named effects are exactly the hidden ones."""
-        return sorted(f.name for f in self.findings) == sorted(self.truth.names)
+        return sorted(f.name for f in self.findings) == sorted(self.spec.effects)
 
     @property
     def admitted(self) -> bool:
         """Whether the verdict admits that no known effect explains the gap."""
-        honest = UNEXPLAINED if self.truth.repeats else (*UNEXPLAINED, 'not_repeatable')
+        repeats = all(effect.repeats for effect in self.effects)
+        honest = UNEXPLAINED if repeats else (*UNEXPLAINED, 'not_repeatable')
         return self.answer.verdict in honest
 
     def parameter_errors(self) -> list[tuple[float, bool]]:
         """Compare the parameters of a right name with the true ones; empty for a wrong name."""
-        if self.found is None or self.found.name != self.truth.names[0]:
+        truth = self.effects[0]
+        if self.found is None or self.found.name != truth.name:
             return []
-        return self.found.parameter_errors(self.truth.parameters[0])
+        return self.found.parameter_errors(truth.parameters)
 
 
 def true_arm(case: Case) -> ArmModel:
@@ -191,16 +168,17 @@ def judge(spec: CaseSpec) -> Judged:
         answer = run_diagnosis(case)
     except Exception:
         answer = Answer(verdict='failed', error=traceback.format_exc(limit=-3))
-    return Judged(Truth.of(case), answer)
+    whole = any(len(one.joints) in (0, case.robot.n_joints) for one in case.effects)
+    return Judged(spec, case.effects, case.size, whole, answer)
 
 
 def score(judged: Sequence[Judged]) -> tuple[Metric, ...]:
     """Return all metrics of judged cases."""
-    free = [j for j in judged if j.truth.kind == 'free']
-    single = [j for j in judged if j.truth.kind == 'single' and j.truth.visible]
-    pairs = [j for j in judged if j.truth.kind == 'pair']
-    nameless = [j for j in judged if j.truth.kind in ('outside', 'removed') and j.truth.visible]
-    placed = [j for j in single if j.found and not j.truth.whole_arm]
+    free = [j for j in judged if j.spec.kind == 'free']
+    single = [j for j in judged if j.spec.kind == 'single' and j.visible]
+    pairs = [j for j in judged if j.spec.kind == 'pair']
+    nameless = [j for j in judged if j.spec.kind in ('outside', 'removed') and j.visible]
+    placed = [j for j in single if j.found and not j.whole_arm]
     errors = [error for j in single for error in j.parameter_errors()]
     sizes = np.array([size for size, _ in errors])
     seconds = np.array([j.answer.seconds for j in judged])
@@ -220,30 +198,20 @@ def score(judged: Sequence[Judged]) -> tuple[Metric, ...]:
     )
 
 
-def select(name: str, only: Iterable[str] = (), part: bool = False) -> list[CaseSpec]:
-    """Return the cases of a set or of its slice, whose key contains any of the given texts."""
-    specs = list(case_list(name))
-    if part:
-        chosen = []
-        for kind, every in SLICE.items():
-            chosen += [spec for spec in specs if spec.kind == kind][::every]
-        specs = chosen
-    texts = list(only)
-    return [spec for spec in specs if not texts or any(text in spec.key for text in texts)]
-
-
 def main() -> None:
     """Run a set of cases, print the table and write the answers."""
     parser = argparse.ArgumentParser(prog='python -m benchmarks.hidden_effects')
     parser.add_argument('set', nargs='?', default='development', choices=SETS)
-    parser.add_argument('--slice', action='store_true', help='a few cases of every kind')
     parser.add_argument('--only', nargs='+', default=[], metavar='TEXT', help='keys that have it')
     parser.add_argument('--out', type=Path, help='file for all answers, as JSON')
     parser.add_argument('--processes', type=int, default=2)
     options = parser.parse_args()
-    specs = select(options.set, options.only, options.slice)
+    specs = [
+        spec
+        for spec in case_list(options.set)
+        if not options.only or any(text in spec.key for text in options.only)
+    ]
     what = f'laboratory, {options.set}'
-    what += ', a slice' if options.slice else ''
     what += f', only {" ".join(options.only)}' if options.only else ''
     judge_all(judge, specs, what, score, processes=options.processes, out=options.out)
 

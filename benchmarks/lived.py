@@ -22,7 +22,7 @@ import traceback
 
 from armid_ros.api.identification import identify
 
-from benchmarks.lived_scoring import LivedJudged, LivedTruth, probabilities, score
+from benchmarks.lived_scoring import LivedJudged, probabilities, score
 from benchmarks.looks import judge_all, write_json
 from benchmarks.two_days import Answer, ask, identification_of, known_arm
 from tests.hidden.lived.cases import lived_case
@@ -66,7 +66,7 @@ def judge(
             repeated = ask(arm, day_1[:2], validate=day_1[2:], baseline=day_1)
     except Exception:
         answer = Answer(verdict='failed', error=traceback.format_exc(limit=-3))
-    return LivedJudged(LivedTruth.of(case), answer, repeated)
+    return LivedJudged.of(case, answer, repeated)
 
 
 def main() -> None:

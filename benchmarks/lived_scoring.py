@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -14,7 +14,9 @@ from benchmarks.metrics import Metric, number, rate
 from benchmarks.two_days import Answer, Named, UNEXPLAINED
 from tests.hidden.arrays import FloatArray
 from tests.hidden.lived.cases import LivedCase
+from tests.hidden.lived.causes.base import Cause
 from tests.hidden.lived.chain import Chain
+from tests.hidden.lived.specification import LivedSpec
 
 #: Gap of a visible cause: its power equals the squared misfit of day 1.
 VISIBLE = 1.0
@@ -32,91 +34,23 @@ ALSO = {
 
 
 @dataclass(frozen=True)
-class LivedTruth:
-    """
-    A case without its recordings.
-
-    Attributes
-    ----------
-    key, cause, size, style, arm : str
-        Specification of the case.
-    name : str
-        Name of the cause in the catalogue; empty without a change.
-    joints : tuple of str
-        Joints of the cause.
-    parameters : tuple of (name, joint, value)
-        True values of the cause.
-    in_catalogue : bool
-        Whether the catalogue has the cause.
-    gap : float
-        Power of the cause over the squared misfit of day 1.
-    gravity, described : ndarray, shape (3,)
-        True and described gravity [m/s^2].
-    friction : str
-        Friction in the given model: unknown, values or names.
-    felt : ndarray, shape (3, 3)
-        Projection on the directions of gravity that affect torques: with parallel axes, gravity
-        along them has no effect.
-
-    """
-
-    key: str
-    cause: str
-    size: str
-    style: str
-    arm: str
-    name: str
-    joints: tuple[str, ...]
-    parameters: tuple[tuple[str, str, float], ...]
-    in_catalogue: bool
-    gap: float
-    gravity: FloatArray
-    described: FloatArray
-    friction: str = 'unknown'
-    felt: FloatArray = field(default_factory=lambda: np.eye(3))
-
-    @classmethod
-    def of(cls, case: LivedCase) -> LivedTruth:
-        """Return the truth of a case."""
-        spec = case.spec
-        (truth,) = case.truth or (None,)
-        return cls(
-            key=spec.key,
-            cause=spec.cause,
-            size=spec.size,
-            style=case.held_out.style,
-            arm=spec.arm,
-            name=truth.name if truth else '',
-            joints=truth.joints if truth else (),
-            parameters=tuple((p.name, p.joint, p.value) for p in truth.parameters)
-            if truth
-            else (),
-            in_catalogue=truth.in_catalogue if truth else False,
-            gap=case.gap,
-            gravity=case.gravity,
-            described=case.robot.gravity,
-            friction=spec.friction,
-            felt=felt_directions(Chain.of(case.robot)),
-        )
-
-    def among(self, named: Named) -> int | None:
-        """Return the index of the right name: 0 for the finding, then its rivals; None if none."""
-        for k, (name, joints) in enumerate(((named.name, named.joints), *named.rivals)):
-            same = name in ALSO.get(self.name, ())
-            if name == self.name or (same and set(joints) == set(self.joints)):
-                return k
-        return None
-
-
-@dataclass(frozen=True)
 class LivedJudged:
     """
     One case with its truth and the answers of the diagnosis.
 
     Attributes
     ----------
-    truth : LivedTruth
-        The true change.
+    spec : LivedSpec
+        Specification of the case.
+    cause : Cause or None
+        The true change; None without one.
+    gap : float
+        Power of the cause over the squared misfit of day 1.
+    gravity, described : ndarray, shape (3,)
+        True and described gravity [m/s^2].
+    felt : ndarray, shape (3, 3)
+        Projection on the directions of gravity that affect torques: with parallel axes, gravity
+        along them has no effect.
     answer : Answer
         Answer for day 2.
     again : Answer or None
@@ -124,23 +58,54 @@ class LivedJudged:
 
     """
 
-    truth: LivedTruth
+    spec: LivedSpec
+    cause: Cause | None
+    gap: float
+    gravity: FloatArray
+    described: FloatArray
+    felt: FloatArray
     answer: Answer
     again: Answer | None = None
+
+    @classmethod
+    def of(cls, case: LivedCase, answer: Answer, again: Answer | None = None) -> LivedJudged:
+        """Return a case with the answers to it, without its recordings."""
+        (cause,) = case.truth or (None,)
+        felt = felt_directions(Chain.of(case.robot))
+        return cls(
+            case.spec, cause, case.gap, case.gravity, case.robot.gravity, felt, answer, again
+        )
+
+    def among(self, named: Named) -> int | None:
+        """Return the index of the right name: 0 for the finding, then its rivals; None if none."""
+        if self.cause is None:
+            return None
+        for k, (name, joints) in enumerate(((named.name, named.joints), *named.rivals)):
+            same = name in ALSO.get(self.cause.name, ())
+            if name == self.cause.name or (same and set(joints) == set(self.cause.joints)):
+                return k
+        return None
+
+    @property
+    def nameable(self) -> bool:
+        """Whether the catalogue has a name for the cause."""
+        return self.cause is not None and (self.cause.in_catalogue or self.cause.name == 'gravity')
 
     @property
     def line(self) -> str:
         """Return truth and answers in a line."""
-        truth, answer = self.truth, self.answer
-        right = self.first if nameable(truth) else self.admitted
-        if not truth.name:
+        spec, cause, answer = self.spec, self.cause, self.answer
+        right = self.first if self.nameable else self.admitted
+        truth = 'nothing'
+        if cause is None:
             right = silent(answer)
-        where = f'@{",".join(truth.joints)}' if truth.joints else ''
+        else:
+            truth = cause.name + (f'@{",".join(cause.joints)}' if cause.joints else '')
         names = '; '.join(map(str, answer.headline)) or 'nothing'
         again = '' if self.again is None else '; '.join(map(str, self.again.headline))
         return (
-            f'{truth.key} {truth.arm} {truth.style} {truth.size} gap {truth.gap:.2g} '
-            f'share {answer.true_share:.2f}: {truth.name or "nothing"}{where} -> '
+            f'{spec.key} {spec.arm} {spec.styles["held_out"]} {spec.size} gap {self.gap:.2g} '
+            f'share {answer.true_share:.2f}: {truth} -> '
             f'{"right" if right else "-"}: {answer.verdict} {names} | again: {again} '
             f'[{answer.seconds:.1f} s] {answer.error.strip().rpartition(chr(10))[2]}'.rstrip()
         )
@@ -149,7 +114,7 @@ class LivedJudged:
     def first(self) -> bool:
         """Whether the cause is named first, before its rivals."""
         headline = self.answer.headline
-        return bool(headline) and self.truth.among(headline[0]) == 0
+        return bool(headline) and self.among(headline[0]) == 0
 
     @property
     def tied(self) -> bool:
@@ -158,14 +123,16 @@ class LivedJudged:
             return False
         leading = self.answer.headline[0]
         return self.first or (
-            len(leading.rivals) < LARGEST_TIE and self.truth.among(leading) is not None
+            len(leading.rivals) < LARGEST_TIE and self.among(leading) is not None
         )
 
     @property
     def too_many(self) -> int:
         """Number of wrong or redundant names in the headline."""
-        true = [named for named in self.answer.headline if self.truth.among(named) is not None]
-        mounting = self.truth.name == 'gravity'  # direction and magnitude are two names
+        true = [named for named in self.answer.headline if self.among(named) is not None]
+        mounting = (
+            self.cause is not None and self.cause.name == 'gravity'
+        )  # direction and magnitude are two names
         return len(self.answer.headline) - min(len(true), 2 if mounting else 1)
 
     @property
@@ -173,7 +140,7 @@ class LivedJudged:
         """Whether the first finding of the headline has the joints of the cause."""
         first = self.answer.headline[0]
         names = (first.joints, *(joints for _, joints in first.rivals))
-        return set(names[self.truth.among(first) or 0]) == set(self.truth.joints)
+        return set(names[self.among(first) or 0]) == set(self.cause.joints)
 
     @property
     def share_error(self) -> float:
@@ -183,21 +150,23 @@ class LivedJudged:
     @property
     def admitted(self) -> bool:
         """Whether the answer admits that no effect of the catalogue explains the gap."""
-        pushed = self.truth.name == 'pushes' and any(
-            'human_interaction' in named.names for named in self.answer.headline
+        pushed = (
+            self.cause is not None
+            and self.cause.name == 'pushes'
+            and any('human_interaction' in named.names for named in self.answer.headline)
         )
         return self.answer.verdict in (*UNEXPLAINED, 'not_repeatable') or pushed
 
     def parameter_errors(self) -> list[tuple[float, bool]]:
         """Return relative errors of large values, and whether their intervals hold the truth."""
-        return (
-            self.answer.headline[0].parameter_errors(self.truth.parameters) if self.first else []
-        )
+        if not self.first:
+            return []
+        return self.answer.headline[0].parameter_errors(self.cause.parameters)
 
     def gravity_error(self) -> tuple[float, float]:
         """Return the error of gravity: of its direction [deg], relative of its magnitude [-]."""
-        told = self.truth.felt @ gravity_of(self.answer.headline, self.truth.described)
-        there = self.truth.felt @ self.truth.gravity
+        told = self.felt @ gravity_of(self.answer.headline, self.described)
+        there = self.felt @ self.gravity
         size, true = np.linalg.norm(told), np.linalg.norm(there)
         cosine = told @ there / size / true
         return float(np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0)))), float(size / true - 1.0)
@@ -242,20 +211,20 @@ def reliability(
 
 def score(judged: Sequence[LivedJudged], kind: str = '') -> tuple[Metric, ...]:
     """Return all metrics of judged cases, with those of their kind."""
-    free = [j for j in judged if not j.truth.name]
-    named = [j for j in judged if nameable(j.truth)]
-    seen = [j for j in named if j.truth.gap >= VISIBLE]
-    outside = [j for j in judged if j.truth.name and j not in named and j.truth.gap >= VISIBLE]
-    headed = [j for j in seen if j.tied and j.truth.joints]
+    free = [j for j in judged if j.cause is None]
+    changed = [j for j in judged if j.cause is not None and j.gap >= VISIBLE]
+    seen = [j for j in changed if j.nameable]
+    outside = [j for j in changed if not j.nameable]
+    headed = [j for j in seen if j.tied and j.cause.joints]
     stated = [j for j in seen if j.first and np.isfinite(j.share_error)]
     errors = [error for j in seen for error in j.parameter_errors()]
-    turned = [j.gravity_error() for j in seen if j.truth.cause == 'mounting']
+    turned = [j.gravity_error() for j in seen if j.spec.cause == 'mounting']
     again = [j for j in judged if j.again is not None]
     seconds = [j.answer.seconds for j in judged if np.isfinite(j.answer.seconds)]
     shares = [abs(j.share_error) for j in stated]
     answered = [j for j in judged if not j.answer.error]
     gaps = [abs(p - right) for p, right, _ in reliability(probabilities(judged))]
-    too_many = [j.too_many for j in answered if not j.truth.name or j.truth.in_catalogue]
+    too_many = [j.too_many for j in answered if j.cause is None or j.cause.in_catalogue]
     return (
         rate('cause named first', seen, lambda j: j.first, least=0.90),
         rate('  first or in a tie of 3', seen, lambda j: j.tied, least=0.97),
@@ -279,7 +248,7 @@ def score(judged: Sequence[LivedJudged], kind: str = '') -> tuple[Metric, ...]:
 
 def pairs(judged: Sequence[LivedJudged]) -> tuple[Metric, ...]:
     """Return the rates of causes found in point to point and in periodic motion, and the ratio."""
-    by_number = {int(one.truth.key.rpartition('/')[2]): one for one in judged}
+    by_number = {one.spec.index: one for one in judged}
     whole = [k for k in sorted(by_number) if k % 2 == 0 and k + 1 in by_number]
     periodic = [by_number[k] for k in whole]
     dwells = [by_number[k + 1] for k in whole]
@@ -298,9 +267,9 @@ def exact(judged: Sequence[LivedJudged]) -> tuple[Metric, ...]:
     """Return the rates of named payloads and of false alarms, for exact descriptions."""
     rows: list[Metric] = []
     for known in ('values', 'names'):
-        own = [one for one in judged if one.truth.friction == known]
-        loads = [one for one in own if one.truth.cause == 'payload']
-        free = [one.answer for one in own if not one.truth.name]
+        own = [one for one in judged if one.spec.friction == known]
+        loads = [one for one in own if one.spec.cause == 'payload']
+        free = [one.answer for one in own if one.cause is None]
         rows += [
             rate(f'payload, friction by {known}', loads, lambda j: j.first, least=0.95),
             rate('  and its mass within 5 %', loads, mass_is_right, least=0.95),
@@ -316,8 +285,10 @@ def exact(judged: Sequence[LivedJudged]) -> tuple[Metric, ...]:
 
 def mass_is_right(judged: LivedJudged) -> bool:
     """Return whether a payload is named, with a mass within 5 % of the true one."""
-    mass = [row for row in judged.truth.parameters if row[0] == 'payload_m']
-    errors = judged.answer.headline[0].parameter_errors(mass) if judged.first else []
+    if not judged.first:
+        return False
+    mass = [true for true in judged.cause.parameters if true.name == 'payload_m']
+    errors = judged.answer.headline[0].parameter_errors(mass)
     return bool(errors) and errors[0][0] <= 0.05
 
 
@@ -325,11 +296,6 @@ _OF_KIND: dict[str, Callable[[Sequence[LivedJudged]], tuple[Metric, ...]]] = {
     'pairs': pairs,
     'exact': exact,
 }
-
-
-def nameable(truth: LivedTruth) -> bool:
-    """Return whether the catalogue has a name for the cause."""
-    return truth.in_catalogue or truth.name == 'gravity'
 
 
 def silent(answer: Answer | None) -> bool:

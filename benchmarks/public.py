@@ -5,7 +5,7 @@ A public benchmark of diagnosis: recordings of arms on two days, and a score of 
 
     python -m benchmarks.public make FOLDER --seed 7 [--cases 24]
     python -m benchmarks.public answer FOLDER answers.json [--method METHOD]
-    python -m benchmarks.public score FOLDER.truth.json answers.json [--keep METHOD]
+    python -m benchmarks.public score answers.json --seed 7 [--cases 24] [--keep METHOD]
 
 The generators are tests and not in the wheel, so this is no command of `armid`.
 
@@ -20,8 +20,8 @@ Methods: `diagnosis` is this tool; `bic` is a plain ranking of the same causes; 
 difference.
 
 Rules: an answer uses the folder alone; the method is fixed before the cases are made; one seed is
-scored once, from committed code. Whoever makes the cases keeps the seed and the truth until the
-answers are given. `--keep` adds the score to results/public.json; `python -m benchmarks.rates`
+scored once, from committed code. Whoever makes the cases keeps the seed, which is the truth, until
+the answers are given. `--keep` adds the score to results/public.json; `python -m benchmarks.rates`
 shows it on public.md.
 
 """
@@ -29,8 +29,8 @@ shows it on public.md.
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable
-from dataclasses import asdict, replace
+from collections.abc import Callable, Iterator
+from dataclasses import replace
 import json
 from pathlib import Path
 from typing import Any
@@ -43,12 +43,12 @@ from armid_ros.robots import load_robot, Robot
 import numpy as np
 
 from benchmarks.bic_selection import bic_selection
-from benchmarks.lived_scoring import LivedJudged, LivedTruth, score, VISIBLE
+from benchmarks.lived_scoring import LivedJudged, score, VISIBLE
 from benchmarks.metrics import rate, table
 from benchmarks.other_ways import Estimates, figaroh_estimates, sysid_days
 from benchmarks.two_days import Answer, answer_of, identification_of
-from tests.hidden.lived.cases import case_of
-from tests.hidden.lived.specification import LivedSpec, specify
+from tests.hidden.lived.cases import case_of, LivedCase
+from tests.hidden.lived.specification import specify
 
 #: Number of standard errors from which a difference of two values is a change.
 SIGNIFICANT = 4.0
@@ -63,32 +63,30 @@ EFFECT_OF = {
 RESULTS = Path(__file__).parent / 'results' / 'public.json'
 
 
-def specification(seed: int, index: int) -> LivedSpec:
-    """Return the specification of a case, on an arm that the seed draws."""
-    own, shared = (crc32(f'public {seed} {what} {index}'.encode()) for what in ('case', 'shared'))
-    arm = f'drawn-{3 + own % 5}-{1000 + seed}'
-    return replace(specify('development', index), arm=arm, seed=own, shared_seed=shared)
+def cases(seed: int, count: int) -> Iterator[tuple[str, LivedCase]]:
+    """Yield the names of folders and the cases, in random order, on arms that the seed draws."""
+    order = np.random.default_rng(seed).permutation(count).tolist()
+    for number, index in enumerate(order):
+        own, shared = (
+            crc32(f'public {seed} {what} {index}'.encode()) for what in ('case', 'shared')
+        )
+        arm = f'drawn-{3 + own % 5}-{1000 + seed}'
+        spec = replace(specify('development', index), arm=arm, seed=own, shared_seed=shared)
+        try:
+            yield f'case_{number:02d}', case_of(spec)
+        except RuntimeError as error:  # the cause cannot be made large enough in this arm
+            print(f'case {number} left out: {error}')
 
 
 def make(folder: Path, seed: int, count: int) -> None:
-    """Write cases in random order, and their truth to a file beside the folder."""
-    truth, order = {}, np.random.default_rng(seed).permutation(count).tolist()
-    for number, index in enumerate(order):
-        try:
-            case = case_of(specification(seed, index))
-        except RuntimeError as error:  # the cause cannot be made large enough in this arm
-            print(f'case {number} left out: {error}')
-            continue
-        name = f'case_{number:02d}'
+    """Write the recordings of cases, and no truth."""
+    for name, case in cases(seed, count):
         (folder / name).mkdir(parents=True)
         (folder / name / 'arm.urdf').write_text(case.robot.urdf, encoding='utf-8')
         days = {'day_1': case.day_1, 'day_2': case.day_2, 'held_out': (case.held_out,)}
         for day, runs in days.items():
             for k, run in enumerate(runs):
                 write_recording(folder / name / f'{day}_{k}', run.recording)
-        truth[name] = asdict(replace(LivedTruth.of(case), key=name))
-    text = json.dumps(truth, indent=1, default=np.ndarray.tolist)
-    folder.with_name(f'{folder.name}.truth.json').write_text(text + '\n', encoding='utf-8')
 
 
 def answer(case: Path, method: str) -> dict[str, Any]:
@@ -146,20 +144,14 @@ def changed_parameter(before: Estimates, after: Estimates) -> dict[str, Any]:
     return found
 
 
-def judged(truth: Path, answers: Path) -> list[LivedJudged]:
-    """Read the truth and the answers to it; a case without an answer has failed."""
+def judged(seed: int, count: int, answers: Path) -> list[LivedJudged]:
+    """Make the cases again, and judge the answers; a case without an answer has failed."""
     given = json.loads(answers.read_text(encoding='utf-8'))
-    found = []
-    for name, facts in json.loads(truth.read_text(encoding='utf-8')).items():
-        for key in ('gravity', 'described', 'felt'):
-            facts[key] = np.array(facts[key])
-        facts['joints'] = tuple(facts['joints'])
-        facts['parameters'] = tuple(map(tuple, facts['parameters']))
-        own = Answer('failed', error='no answer')
-        if name in given:
-            own = answer_of(given[name], float('nan'))
-        found.append(LivedJudged(LivedTruth(**facts), own))
-    return found
+    missing = Answer('failed', error='no answer')
+    return [
+        LivedJudged.of(case, answer_of(given[name], np.nan) if name in given else missing)
+        for name, case in cases(seed, count)
+    ]
 
 
 def main() -> None:
@@ -167,17 +159,17 @@ def main() -> None:
     parser = argparse.ArgumentParser(prog='python -m benchmarks.public', description=__doc__)
     parser.formatter_class = argparse.RawDescriptionHelpFormatter
     commands = parser.add_subparsers(dest='command', required=True)
-    command = commands.add_parser('make', help='write cases and their truth')
+    drawn = argparse.ArgumentParser(add_help=False)
+    drawn.add_argument('--seed', type=int, required=True)
+    drawn.add_argument('--cases', type=int, default=24)
+    command = commands.add_parser('make', parents=[drawn], help='write cases')
     command.add_argument('folder', type=Path)
-    command.add_argument('--seed', type=int, required=True)
-    command.add_argument('--cases', type=int, default=24)
     command = commands.add_parser('answer', help='answer all cases by a method')
     command.add_argument('folder', type=Path)
     command.add_argument('answers', type=Path)
     methods = ('diagnosis', 'bic', *DAYS)
     command.add_argument('--method', choices=methods, default='diagnosis')
-    command = commands.add_parser('score', help='compare answers with the truth')
-    command.add_argument('truth', type=Path)
+    command = commands.add_parser('score', parents=[drawn], help='compare answers with the truth')
     command.add_argument('answers', type=Path)
     command.add_argument('--keep', choices=methods, help='add the score to results/public.json')
     options = parser.parse_args()
@@ -192,11 +184,13 @@ def main() -> None:
                 print(f'{case.name}: {type(error).__name__}: {error}', flush=True)
             options.answers.write_text(json.dumps(found, indent=1) + '\n', encoding='utf-8')
     else:
-        cases = judged(options.truth, options.answers)
+        found = judged(options.seed, options.cases, options.answers)
         own = {*EFFECT_OF.values(), 'payload', 'link_inertia'}
-        simple = [one for one in cases if one.truth.gap >= VISIBLE and one.truth.name in own]
-        metrics = (*score(cases), rate('simple cause named first', simple, lambda one: one.first))
-        print('\n'.join(one.line for one in cases))
+        simple = [
+            one for one in found if one.cause and one.gap >= VISIBLE and one.cause.name in own
+        ]
+        metrics = (*score(found), rate('simple cause named first', simple, lambda one: one.first))
+        print('\n'.join(one.line for one in found))
         print(table(metrics))
         if options.keep:
             kept = json.loads(RESULTS.read_text(encoding='utf-8')) if RESULTS.exists() else {}

@@ -24,6 +24,8 @@ from armid_ros.recording import Recording
 from armid_ros.robots import Robot
 import numpy as np
 
+from tests.hidden.arrays import Parameter
+
 #: Verdicts of a gap that no known effect explains.
 UNEXPLAINED = ('unknown', 'partial')
 
@@ -69,11 +71,9 @@ class Named:
         """Return the joints of the cause, or of its rival with a name."""
         return self.joints if name == self.name else dict(self.rivals).get(name, self.joints)
 
-    def parameter_errors(
-        self, truth: Sequence[tuple[str, str, float]]
-    ) -> list[tuple[float, bool]]:
+    def parameter_errors(self, truth: Sequence[Parameter]) -> list[tuple[float, bool]]:
         """
-        Compare the parameters with true ones: names, joints and values.
+        Compare the parameters with the true ones.
 
         Returns
         -------
@@ -83,13 +83,13 @@ class Named:
 
         """
         stated = {(name, joint): (value, std) for name, joint, value, std in self.parameters}
-        largest = max((abs(value) for _, _, value in truth), default=0.0)
+        largest = max((abs(true.value) for true in truth), default=0.0)
         errors = []
-        for name, joint, true in truth:
-            value, std = stated.get((name, joint), (np.nan, np.nan))
-            if np.isfinite(value) and 3.0 * abs(true) >= largest > 0.0:
-                error = abs(value - true)
-                errors.append((error / abs(true), bool(error <= 1.96 * std)))
+        for true in truth:
+            value, std = stated.get((true.name, true.joint), (np.nan, np.nan))
+            if np.isfinite(value) and 3.0 * abs(true.value) >= largest > 0.0:
+                error = abs(value - true.value)
+                errors.append((error / abs(true.value), bool(error <= 1.96 * std)))
         return errors
 
     def __str__(self) -> str:
@@ -108,12 +108,10 @@ class Answer:
     ----------
     verdict : str
         Verdict in diagnosis.json; 'failed' after an exception.
-    headline, minor : tuple of Named
-        Causes in the headline, and minor ones.
+    headline : tuple of Named
+        Causes in the headline.
     seconds : float
         Processor time [s].
-    summary : str
-        The verdict in words.
     error : str
         Reason why there is no diagnosis; empty if there is one.
     true_share : float
@@ -124,9 +122,7 @@ class Answer:
 
     verdict: str
     headline: tuple[Named, ...] = ()
-    minor: tuple[Named, ...] = ()
     seconds: float = np.nan
-    summary: str = ''
     error: str = ''
     true_share: float = np.nan
 
@@ -224,9 +220,7 @@ def answer_of(document: dict[str, Any], seconds: float) -> Answer:
     return Answer(
         verdict=document['verdict'],
         headline=tuple(_named(effect) for effect in document['effects']),
-        minor=tuple(_named(effect) for effect in document.get('minor', ())),
         seconds=seconds,
-        summary=document.get('summary', ''),
     )
 
 

@@ -4,39 +4,25 @@
 
 import pytest
 
-from benchmarks.hidden_effects import Judged, score, Truth
+from benchmarks.hidden_effects import Judged, score
 from benchmarks.metrics import wilson
 from benchmarks.two_days import Answer, Named
+from tests.hidden.specification import CaseSpec, HIDDEN
 
 ELBOW = ('panda_joint4',)
 
 
-def truth(kind='single', names=('coulomb_friction',), **changes):
-    """Return 0.2 N m of Coulomb friction in the elbow, or something else."""
-    parameters = (('coulomb_torque', ELBOW[0], 0.2),)
-    facts = {
-        'key': 'x',
-        'kind': kind,
-        'exact': True,
-        'names': names,
-        'joints': (ELBOW,) * len(names),
-        'parameters': (parameters,) * len(names),
-        'repeats': True,
-        'whole_arm': False,
-        'size': 3.0,
-        'visible': True,
-    }
-    return Truth(**(facts | changes))
+def judged(kind, name, verdict, *findings, exact=True):
+    """Return an answer about an effect in the elbow, such as 0.2 N m of Coulomb friction."""
+    names = (name,) if name else ()
+    spec = CaseSpec('x', kind, 'panda', names, (3.0,) * len(names), exact, False, 1.0, 0)
+    effects = tuple(HIDDEN[one](ELBOW[0], 3, 0.2) for one in names)
+    return Judged(spec, effects, 3.0, False, Answer(verdict, findings, seconds=1.0))
 
 
-def said(verdict, *findings):
-    """Return an answer."""
-    return Answer(verdict, findings, seconds=1.0)
-
-
-def metric(judged, name):
+def metric(outcomes, name):
     """Return a row of the table."""
-    return next(m for m in score(judged) if m.name.strip() == name)
+    return next(m for m in score(outcomes) if m.name.strip() == name)
 
 
 RIGHT = Named('coulomb_friction', ELBOW, (), (('coulomb_torque', ELBOW[0], 0.21, 0.01),))
@@ -45,11 +31,11 @@ WRONG = Named('joint_spring', ELBOW)
 
 
 def test_names_are_right_ambiguous_or_wrong():
-    judged = [
-        Judged(truth(), said('named', RIGHT)),
-        Judged(truth(), said('ambiguous', AMBIGUOUS)),
-        Judged(truth(), said('named', WRONG)),
-        Judged(truth(), said('unknown')),
+    outcomes = [
+        judged('single', 'coulomb_friction', 'named', RIGHT),
+        judged('single', 'coulomb_friction', 'ambiguous', AMBIGUOUS),
+        judged('single', 'coulomb_friction', 'named', WRONG),
+        judged('single', 'coulomb_friction', 'unknown'),
     ]
     expected = {
         'top-1 name right': 0.25,
@@ -58,37 +44,31 @@ def test_names_are_right_ambiguous_or_wrong():
         'parameter error, median': 0.05,
         '95 % intervals with the truth': 1.0,
     }
-    assert {name: metric(judged, name).value for name in expected} == pytest.approx(expected)
+    assert {name: metric(outcomes, name).value for name in expected} == pytest.approx(expected)
 
 
 def test_false_alarm_is_anything_but_silence():
-    clean = truth('free', (), joints=(), parameters=(), visible=False)
-    off = truth('free', (), joints=(), parameters=(), visible=False, exact=False)
     bodies = Named('link_inertia', ELBOW)
-    outcomes = [
-        (clean, said('consistent'), False),
-        (clean, said('named', RIGHT), True),
-        (clean, said('unknown'), True),
-        (clean, said('named', bodies), True),
-        (off, said('named', bodies), False),
-        (off, said('named', bodies, RIGHT), True),
-    ]
-    for what, outcome, alarm in outcomes:
-        assert Judged(what, outcome).false_alarm is alarm
+    for verdict, findings, exact, alarm in (
+        ('consistent', (), True, False),
+        ('named', (RIGHT,), True, True),
+        ('unknown', (), True, True),
+        ('named', (bodies,), True, True),
+        ('named', (bodies,), False, False),
+        ('named', (bodies, RIGHT), False, True),
+    ):
+        assert judged('free', '', verdict, *findings, exact=exact).false_alarm is alarm
 
 
 def test_unknown_is_admitted_or_not():
-    contact = truth('outside', ('random_contact',), repeats=False)
-    patch = truth('outside', ('dead_patch',))
-    removed = truth('removed')
-    judged = [
-        Judged(contact, said('not_repeatable')),
-        Judged(patch, said('not_repeatable')),
-        Judged(patch, said('unknown')),
-        Judged(removed, said('partial', WRONG)),
-        Judged(removed, said('named', WRONG)),
+    outcomes = [
+        judged('outside', 'random_contact', 'not_repeatable'),
+        judged('outside', 'dead_patch', 'not_repeatable'),
+        judged('outside', 'dead_patch', 'unknown'),
+        judged('removed', 'coulomb_friction', 'partial', WRONG),
+        judged('removed', 'coulomb_friction', 'named', WRONG),
     ]
-    assert metric(judged, 'unknown or partial').value == 0.6
+    assert metric(outcomes, 'unknown or partial').value == 0.6
 
 
 def test_intervals_are_those_of_wilson():

@@ -6,7 +6,7 @@ import json
 
 import pytest
 
-from benchmarks.public import answer, judged, make
+from benchmarks.public import answer, cases, judged, make
 
 
 @pytest.fixture(scope='module')
@@ -18,17 +18,20 @@ def folder(tmp_path_factory):
 
 
 def test_answers_are_scored_by_the_truth(folder):
-    path = folder.with_name('cases.truth.json')
-    truth = json.loads(path.read_text())
+    truth = {name: case.truth for name, case in cases(3, 2)}
+    assert set(truth) == {path.name for path in folder.iterdir()}
     right = {
-        name: {'verdict': 'named', 'effects': [{'name': one['name'], 'joints': one['joints']}]}
-        for name, one in truth.items()
+        name: {
+            'verdict': 'named',
+            'effects': [{'name': cause.name, 'joints': cause.joints} for cause in causes],
+        }
+        for name, causes in truth.items()
     }
     answers = folder.with_name('answers.json')
     answers.write_text(json.dumps(right))
-    assert all(one.first for one in judged(path, answers))
+    assert all(one.first for one in judged(3, 2, answers))
     answers.write_text('{}')
-    assert all(one.answer.error for one in judged(path, answers))
+    assert all(one.answer.error for one in judged(3, 2, answers))
 
 
 def test_a_case_has_no_trace_of_the_truth_and_can_be_answered(folder):
