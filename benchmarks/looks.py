@@ -137,31 +137,16 @@ def results_of(metrics: Iterable[Metric]) -> dict[str, dict[str, Any]]:
 
 def clean_commit(log: Path = LOG) -> str:
     """Return the commit of the tree; SystemExit if a file other than the log is uncommitted."""
-    folder = log.parent
-    changed = [
-        line[3:]
-        for line in _git(folder, 'status', '--porcelain').splitlines()
-        if not line.endswith(log.name)
-    ]
+    git = ['git', '-C', str(log.parent)]
+    others = [*git, 'status', '--porcelain', '--', ':/', f':!{log.name}']
+    changed = subprocess.check_output(others, text=True).splitlines()
     if changed:
         raise SystemExit(
             f'locked sets are used with committed code only; commit or stash: '
-            f'{", ".join(changed[:5])}{" ..." if len(changed) > 5 else ""}'
+            f'{", ".join(line[3:] for line in changed[:5])}{" ..." if len(changed) > 5 else ""}'
         )
-    return _git(folder, 'rev-parse', '--short=12', 'HEAD').strip()
+    return subprocess.check_output([*git, 'rev-parse', '--short=12', 'HEAD'], text=True).strip()
 
 
 def _finite(value: float) -> float | None:
     return round(float(value), 4) if math.isfinite(value) else None
-
-
-def _git(folder: Path, *words: str) -> str:
-    try:
-        done = subprocess.run(
-            ['git', '-C', str(folder), *words], capture_output=True, text=True, check=True
-        )
-    except (OSError, subprocess.CalledProcessError) as error:
-        raise SystemExit(
-            f'locked sets are used in a git tree only, which names the code: {error}'
-        ) from None
-    return done.stdout

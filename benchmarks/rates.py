@@ -19,6 +19,7 @@ from typing import Any
 
 from benchmarks.looks import LOG
 from benchmarks.metrics import wilson
+from docsite.markdown import table
 
 PAGE = Path(__file__).with_name('rates.md')
 PUBLIC_PAGE = PAGE.with_name('public.md')
@@ -40,6 +41,11 @@ _QUESTIONS = {
     'outside the catalogue, said so': 'cause without a name: no substitute',
     'failures': 'failed',
 }
+#: Columns of the table of generators.
+_GENERATORS = (
+    *('generator', 'arms', 'cause named first, first run', '95 % interval', 'now'),
+    *('no change: no name', 'intervals with the truth'),
+)
 
 _HEAD = """# How often the diagnosis is right
 
@@ -72,50 +78,33 @@ def page(looks: str, rates: str) -> str:
                 for run in runs
                 if run['commit'] in one['commits'] and run['set'].startswith('lived, locked, ')
             )
+    locked = (
+        ('' if k else f'`{one["command"]}`', question, *_share(last[one['set']][key]))
+        for one in other['locked']
+        for k, (key, question) in enumerate(one['rows'].items())
+    )
+    kinds = ((_command(row), row['question'], *_right(row['right'])) for row in other['kinds'])
+    generators = (
+        (
+            *(row['name'], row['arms'], *_right(row['first_run'])),
+            *(_of(row[key]) for key in ('now', 'no_change', 'intervals')),
+        )
+        for row in other['generators']
+    )
+    real = ((_command(row), row['recording'], row['answer']) for row in other['real'])
+    rate = ('right', '95 % interval')
     return '\n'.join(
         [
             _HEAD,
-            '## Locked sets, last run of all cases',
-            '',
-            '| command | question | right | 95 % interval |',
-            '|---|---|---|---|',
-            *(
-                _locked_row('' if k else f'`{one["command"]}`', question, last[one['set']][key])
-                for one in other['locked']
-                for k, (key, question) in enumerate(one['rows'].items())
-            ),
-            '',
-            '## Development sets',
-            '',
-            '| command | question | right | 95 % interval |',
-            '|---|---|---|---|',
-            *(
-                f'| {_command(row)} | {row["question"]} | {_right(row["right"])} |'
-                for row in other['kinds']
-            ),
-            '',
-            '## Independent generators',
-            '',
-            'Their authors had not seen the diagnosis: the first run is a forecast.',
-            '',
-            '| generator | arms | cause named first, first run | 95 % interval | now '
-            '| no change: no name | intervals with the truth |',
-            '|---|---|---|---|---|---|---|',
-            *(
-                f'| {row["name"]} | {row["arms"]} | {_right(row["first_run"])} | '
-                f'{_of(row["now"])} | {_of(row["no_change"])} | {_of(row["intervals"])} |'
-                for row in other['generators']
-            ),
-            '',
-            '## Real machines',
-            '',
-            '| command | recording | answer |',
-            '|---|---|---|',
-            *(
-                f'| {_command(row)} | {row["recording"]} | {row["answer"]} |'
-                for row in other['real']
-            ),
-            '',
+            *('## Locked sets, last run of all cases', ''),
+            *table(('command', 'question', *rate), locked),
+            *('## Development sets', ''),
+            *table(('command', 'question', *rate), kinds),
+            *('## Independent generators', ''),
+            *('Their authors had not seen the diagnosis: the first run is a forecast.', ''),
+            *table(_GENERATORS, generators),
+            *('## Real machines', ''),
+            *table(('command', 'recording', 'answer'), real),
         ]
     )
 
@@ -135,13 +124,13 @@ def public_page(public: str) -> str:
             'Methods that compare parameters know loads, links, friction, rotors, offsets.',
             'mujoco.sysid had 16 stretches of 0.4 s of each day, and 10 iterations.',
             '',
-            f'| method | {" | ".join(_QUESTIONS.values())} |',
-            f'|---|{len(_QUESTIONS) * "---|"}',
-            *(
-                f'| {words} | {" | ".join(_of(found[method][key]) for key in _QUESTIONS)} |'
-                for method, words in _METHODS.items()
+            *table(
+                ('method', *_QUESTIONS.values()),
+                (
+                    (words, *(_of(found[method][key]) for key in _QUESTIONS))
+                    for method, words in _METHODS.items()
+                ),
             ),
-            '',
         ]
     )
 
@@ -158,9 +147,8 @@ def _added(looks: Iterable[dict[str, Any]]) -> dict[str, Any]:
     return {name: {'value': hits / cases, 'cases': cases} for name, (hits, cases) in total.items()}
 
 
-def _locked_row(command: str, question: str, found: dict[str, Any]) -> str:
-    hits = round(found['value'] * found['cases'])
-    return f'| {command} | {question} | {_right([hits, found["cases"]])} |'
+def _share(found: dict[str, Any]) -> tuple[str, str]:
+    return _right([round(found['value'] * found['cases']), found['cases']])
 
 
 def _command(row: dict[str, Any]) -> str:
@@ -171,9 +159,10 @@ def _of(pair: list[int] | None) -> str:
     return '' if pair is None else f'{pair[0]} of {pair[1]}'
 
 
-def _right(pair: list[int]) -> str:
+def _right(pair: list[int]) -> tuple[str, str]:
+    """Return a rate and its 95 % interval."""
     low, high = wilson(*pair)
-    return f'{_of(pair)} | {100.0 * low:.0f} - {100.0 * high:.0f} %'
+    return _of(pair), f'{100.0 * low:.0f} - {100.0 * high:.0f} %'
 
 
 if __name__ == '__main__':

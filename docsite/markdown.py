@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 import inspect
 
 _ESCAPES = str.maketrans({'|': '\\|', '<': '&lt;', '>': '&gt;', '*': '\\*', '_': '\\_'})
@@ -20,7 +20,7 @@ def prose(text: str) -> str:
     return inspect.cleandoc(text).replace('<', '&lt;')
 
 
-def table(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> Iterator[str]:
+def table(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> Iterator[str]:
     """Return the lines of a table, followed by a blank line; cells are Markdown."""
     yield f'| {" | ".join(heads)} |'
     yield '|' + '---|' * len(heads)
