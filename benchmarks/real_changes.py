@@ -17,28 +17,10 @@ import sys
 import tempfile
 
 from armid_ros.errors import ArmidError
-from armid_ros.recording import Recording
 
-from benchmarks.real_days import DAYS, RealDays
+from benchmarks.real_days import DAYS
 from benchmarks.real_recordings import folder
-from benchmarks.two_days import Answer, ask, identification_of
-
-
-def answers(days: RealDays) -> tuple[Answer, Answer]:
-    """Return the answers of the diagnosis for day 2, and for day 1 again."""
-    try:
-        arm = identification_of(days.robot, days.day_1).arm
-    except ArmidError as error:
-        refused = Answer('no model', error=str(error))
-        return refused, refused
-
-    def said(recordings: tuple[Recording, ...], validate: tuple[Recording, ...]) -> Answer:
-        try:
-            return ask(arm, recordings, validate=validate, baseline=days.day_1)
-        except ArmidError as error:
-            return Answer('refused', error=str(error))
-
-    return said(days.day_2, days.held_out), said(days.day_1, ())
+from benchmarks.two_days import ask, identification_of
 
 
 def main() -> None:
@@ -50,16 +32,21 @@ def main() -> None:
                 continue
             days = load(folder(), Path(out))
             print(f'\n{days.name}\n    wanted   {days.wanted}')
-            for what, answer in zip(('day 2', 'day 1'), answers(days), strict=True):
+            for what, recordings, validate in (
+                ('day 2', days.day_2, days.held_out),
+                ('day 1', days.day_1, ()),
+            ):
+                try:
+                    arm = identification_of(days.robot, days.day_1).arm
+                    answer = ask(arm, recordings, validate=validate, baseline=days.day_1)
+                except ArmidError as error:
+                    print(f'    {what}    refused: {error}')
+                    continue
+                names = '; '.join(map(str, answer.headline))
                 print(
-                    f'    {what}    {answer.verdict:14s} {"; ".join(map(str, answer.headline))} '
-                    f'[{answer.seconds:.1f} s] {answer.error}',
+                    f'    {what}    {answer.verdict:14s} {names} [{answer.seconds:.1f} s]',
                     flush=True,
                 )
-                if answer.verdict == 'bad_data':
-                    print(f'             {answer.summary}')
-                if answer.minor:
-                    print(f'             minor: {"; ".join(map(str, answer.minor))}')
 
 
 if __name__ == '__main__':

@@ -50,8 +50,6 @@ class RealDays:
         Held-out recordings of day 2; empty if there are too few.
     wanted : str
         The right answer, in words.
-    push : ndarray, shape (N, n), or None
-        Torque of a recorded push on the first recording of day 2 [N m].
 
     """
 
@@ -61,7 +59,6 @@ class RealDays:
     day_2: tuple[Recording, ...]
     held_out: tuple[Recording, ...]
     wanted: str
-    push: np.ndarray | None = None
 
 
 def builds(data: Path, out: Path) -> RealDays:
@@ -78,36 +75,19 @@ def builds(data: Path, out: Path) -> RealDays:
     )
 
 
-def pushes(data: Path, out: Path, torque: str = 'tau_con', task: str = 'acrobot') -> RealDays:
-    """
-    Return runs of the double pendulum without and with pushes.
-
-    Parameters
-    ----------
-    data, out : Path
-        Folder of the recordings, and folder for written descriptions.
-    torque : {'tau_con', 'tau_meas'}
-        The commanded torque, which lacks the pushes, so they are external; or the measured one,
-        which contains them, so there is no change.
-    task : {'acrobot', 'pendubot'}
-        The task of the pendulum.
-
-    """
-    runs = {
+def pushes(data: Path, out: Path, task: str = 'acrobot') -> RealDays:
+    """Return runs of the double pendulum without and with pushes that the command lacks."""
+    before, after = {
         'acrobot': (('experiment01', 'experiment02'), ('experiment01', 'experiment04')),
         'pendubot': (('experiment02',), ('experiment02',)),
-    }
-    before, after = runs[task]
-    first = _table(data / 'dfki_double_pendulum' / f'C1_{task}_perturbed' / f'{after[0]}.csv.gz')
-    outside = torque == 'tau_con'
+    }[task]
     return RealDays(
-        f'double pendulum, {task} pushed, {torque}',
+        f'double pendulum, {task} pushed',
         _double_pendulum(data, out, 'design_C.1_model_1.1'),
-        tuple(_pendulum(data, f'C1_{task}_unperturbed/{run}', torque) for run in before),
-        tuple(_pendulum(data, f'C1_{task}_perturbed/{run}', torque) for run in after),
+        tuple(_pendulum(data, f'C1_{task}_unperturbed/{run}', 'tau_con') for run in before),
+        tuple(_pendulum(data, f'C1_{task}_perturbed/{run}', 'tau_con') for run in after),
         (),
-        'pushes from outside, twice a joint; or unknown' if outside else 'nothing',
-        np.column_stack([first['tau_pert1'], first['tau_pert2']]) if outside else None,
+        'pushes from outside, twice a joint; or unknown',
     )
 
 
@@ -175,9 +155,7 @@ DAYS: Mapping[str, Callable[[Path, Path], RealDays]] = MappingProxyType(
     {
         'builds': builds,
         'pushes': pushes,
-        'pushes measured': lambda data, out: pushes(data, out, 'tau_meas'),
-        'pendubot pushes': lambda data, out: pushes(data, out, task='pendubot'),
-        'pendubot pushes measured': lambda data, out: pushes(data, out, 'tau_meas', 'pendubot'),
+        'pendubot pushes': lambda data, out: pushes(data, out, 'pendubot'),
         'payload': payload,
         'hand': hand_guided,
         'fr3 12-34': fr3,

@@ -153,10 +153,17 @@ class Machines:
 
     def visible(self, question: Question) -> float:
         """Return the share of the added torque that a fit does not absorb, rms over rms."""
-        arm, _ = self.bare(question.machine)
-        joint = arm.robot.joints.index(question.joint)
-        seen = self._seen(question.machine, self._added(question))[joint]
-        return float(seen / self.left(question.machine)[joint])
+        bare, recording = self.bare(question.machine)
+        known = known_arm(bare, question.machine, None)
+        with_it = replace(recording, tau=recording.tau + self._added(question))
+        without, fitted = (
+            identify(known, [one], rng=np.random.default_rng(0)).training[0]
+            for one in (recording, with_it)
+        )
+        rest = fitted.residual - without.residual
+        seen = np.sqrt(np.mean(rest**2, axis=0, where=without.informative))
+        joint = bare.robot.joints.index(question.joint)
+        return float(seen[joint] / self.left(question.machine)[joint])
 
     def _added(self, question: Question) -> FloatArray:
         """Return a torque with the rms of the residual of its joint, shape (N, n) [N m]."""
@@ -172,18 +179,6 @@ class Machines:
         added = np.zeros_like(recording.tau)
         added[:, joint] = shape * self.left(question.machine)[joint] / np.sqrt(np.mean(shape**2))
         return added
-
-    def _seen(self, machine: str, added: FloatArray) -> FloatArray:
-        """Return the rms of the added torque that a fit does not absorb, (n,) [N m]."""
-        bare, recording = self.bare(machine)
-        with_it = replace(recording, tau=recording.tau + added)
-        known = known_arm(bare, machine, None)
-        without, fitted = (
-            identify(known, [one], rng=np.random.default_rng(0)).training[0]
-            for one in (recording, with_it)
-        )
-        rest = fitted.residual - without.residual
-        return np.sqrt(np.mean(rest**2, axis=0, where=without.informative))
 
     def left(self, machine: str) -> FloatArray:
         """Return the rms residual of the known model, or its noise if larger, (n,) [N m]."""

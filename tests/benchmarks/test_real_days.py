@@ -5,7 +5,7 @@
 import numpy as np
 import pytest
 
-from benchmarks.real_days import DAYS, pushes
+from benchmarks.real_days import DAYS
 
 pytestmark = [pytest.mark.real_data, pytest.mark.slow]
 
@@ -21,15 +21,3 @@ def test_every_question_has_recordings_of_two_days(name, real_data, tmp_path):
         assert np.all(np.diff(recording.t) > 0.0)
         assert np.all(np.isfinite(recording.tau))
         assert recording.t[-1] > 3.0
-
-
-def test_pushes_are_in_what_was_measured_and_not_in_what_was_commanded(real_data, tmp_path):
-    commanded = pushes(real_data, tmp_path)
-    measured = pushes(real_data, tmp_path, 'tau_meas')
-    assert commanded.push is not None
-    assert measured.push is None
-    outside = measured.day_2[0].tau - commanded.day_2[0].tau
-    for joint in range(2):
-        push = commanded.push[:, joint]
-        assert 0.2 < np.abs(push).max() < 0.8
-        assert np.corrcoef(push, outside[:, joint])[0, 1] > 0.4
