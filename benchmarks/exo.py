@@ -15,25 +15,21 @@ from __future__ import annotations
 import argparse
 
 from armid_ros.errors import IdentificationError
-from armid_ros.motion import FloatArray
 from armid_ros.papers.exo.plant.gait import read_gait
 from armid_ros.papers.exo.plant.gait_cycle import driving_torque, gait_cycle
 from armid_ros.papers.exo.plant.leg_pair import (
     exercise,
     EXERCISES,
     leg_pair,
-    pair_torques,
     PairMotion,
     stepping,
-    walking,
 )
-from armid_ros.papers.exo.plant.torque_driven import splined
 from armid_ros.papers.exo.plant.walkers import walking_pair
 from armid_ros.robots.ties import SEGMENTS
 import numpy as np
 
 from benchmarks.exo_noise import find_springs, TORQUE_NOISE, with_torques
-from benchmarks.pair_in_mujoco import drive_in_mujoco, walk_in_mujoco
+from benchmarks.pair_in_mujoco import walk_in_mujoco
 
 STIFFNESS = 1e4
 PAIR = leg_pair(STIFFNESS)
@@ -55,7 +51,7 @@ def main() -> None:
 
 
 def gait_by_torque() -> None:
-    """Drive joints by splined torques in MuJoCo over a cycle, then all joints at once."""
+    """Drive joints by splined torques in MuJoCo over a cycle."""
     cycle = gait_cycle(walking_pair(), read_gait())
     soft = cycle.pair.with_stiffness(0.8 * cycle.pair.stiffness)
     print('in MuJoCo, one joint by its torque               paper      wanted      measured')
@@ -64,21 +60,11 @@ def gait_by_torque() -> None:
             tau = cycle.torques(believed)
             torque = driving_torque(cycle, joint, rate, tau)
             path = walk_in_mujoco(cycle, joint, lambda t, torque=torque: torque(t)[2]).driven
-            error = _most(path - cycle.motions.own.q[:, cycle.pair.robot.index(joint)])
+            error = path - cycle.motions.own.q[:, cycle.pair.robot.index(joint)]
+            most = float(np.degrees(np.abs(error).max()))
             what = f'{joint}, {rate:.0f} Hz' + (', springs 20 % too soft' if believed else '')
             aim = ' ' * 10 if believed else f'<= {wanted:4.2f} deg'
-            print(f'  {what:45s} {paper:4.1f} deg {aim:11s}  {error:.3g} deg')
-    pair = leg_pair()
-    whole = walking(pair, read_gait(), np.linspace(0.0, 1.2, 1201))
-    for rate, share in ((50.0, 1.0), (100.0, 1.0), (400.0, 1.0), (400.0, 1.01)):
-        torque = splined(whole.own.t, share * pair_torques(pair, *whole).tau, rate)
-        path = drive_in_mujoco(pair, whole, pair.robot.joints, torque)
-        what = f'all joints, {rate:.0f} Hz' + (', torques 1 % off' if share != 1 else '')
-        print(f'  {what:45s}     -                     {_most(path - whole.own.q):.2g} deg')
-
-
-def _most(error: FloatArray) -> float:
-    return float(np.degrees(np.abs(error).max()))
+            print(f'  {what:45s} {paper:4.1f} deg {aim:11s}  {most:.3g} deg')
 
 
 def stiffness(sets: dict[str, PairMotion], draws: int) -> None:

@@ -22,7 +22,6 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Iterator
-from dataclasses import dataclass
 import time
 
 from armid_ros.arm import ArmModel
@@ -71,16 +70,6 @@ KINDS = (
 )
 
 
-@dataclass(frozen=True)
-class Draw:
-    """One effect that appeared, and the answer of the diagnosis."""
-
-    effect: str
-    delay: float | None
-    named: list[list[str]]
-    right: bool
-
-
 class Unhurried:
     """
     Diagnoses in this process, with answers delayed by their processor time.
@@ -124,27 +113,20 @@ def known_arm() -> ArmModel:
 
 
 def drawn(arm: ArmModel, along: Motion, kind: tuple[str, str], rng: np.random.Generator) -> str:
-    """Return an effect of typical size with a share of the torque of a joint."""
+    """Return an effect of typical size with the share `SHARE` of the torque of a joint."""
     name, quantity = kind
     largest = next(own.typical[1] for own in CATALOGUE[name].quantities if own.name == quantity)
+    torque, unit = arm.torque(along), 1e-3
     for _ in range(_TRIES):
         joint = str(rng.choice(ROBOT.joints))
-        size = sized(arm, along, kind, joint)
+        more = arm.with_effect(*parse_effect(f'{name}@{joint}:{quantity}={unit}', ROBOT))
+        column = ROBOT.joints.index(joint)
+        of_joint = np.sqrt(np.mean(torque[:, column] ** 2))
+        of_unit = np.sqrt(np.mean((more.torque(along) - torque)[:, column] ** 2)) / unit
+        size = float(SHARE * of_joint / of_unit)
         if size <= largest / LEAST:
             break
     return f'{name}@{joint}:{quantity}={min(size, largest):.6g}'
-
-
-def sized(arm: ArmModel, along: Motion, kind: tuple[str, str], joint: str) -> float:
-    """Return the size at which an effect has the share `SHARE` of the torque of a joint."""
-    name, quantity = kind
-    column = ROBOT.joints.index(joint)
-    torque = arm.torque(along)
-    scale = float(np.sqrt(np.mean(torque[:, column] ** 2)))
-    unit = 1e-3
-    more = arm.with_effect(*parse_effect(f'{name}@{joint}:{quantity}={unit}', ROBOT))
-    change = (more.torque(along) - torque)[:, column] / unit
-    return SHARE * scale / float(np.sqrt(np.mean(change**2)))
 
 
 class Bench:
@@ -198,25 +180,20 @@ class Bench:
         return [[name, *joints] for name, joints in self.live.named]
 
 
-def draw(number: int, seed: int) -> Draw:
-    """Run one draw: an effect appears in a running arm."""
+def draw(number: int, seed: int) -> tuple[bool, str]:
+    """Let an effect appear in a running arm; return whether it is named, and a line about it."""
     rng = np.random.default_rng(number + 1000 * seed)
     along = working_motion(BEFORE + WANTED + 6.0, rng.uniform(1.0, 2.0), rng)
-    arm = known_arm()
-    effect = drawn(arm, along, KINDS[number % len(KINDS)], rng)
+    effect = drawn(known_arm(), along, KINDS[number % len(KINDS)], rng)
     name, _, place = effect.partition(':')[0].partition('@')
     with Stage() as stage:
         nodes = Bench(stage, along)
         early = any(nodes.proposed for _ in nodes.run(BEFORE))
         nodes.set_effect(effect)
-        delay = None
-        for t in nodes.run(WANTED):
-            if nodes.proposed:
-                delay = t
-                break
-        first = nodes.proposed[0] if nodes.proposed else []
-        right = not early and first == [name, place]
-        return Draw(effect, delay, nodes.proposed, right)
+        delay = next((t for t in nodes.run(WANTED) if nodes.proposed), np.nan)
+        right = not early and nodes.proposed[:1] == [[name, place]]
+        verdict = 'right' if right else 'WRONG'
+        return right, f'{number:3} {verdict} {delay:5.1f} s  {effect}  {nodes.proposed}'
 
 
 def quiet(minutes: float, seed: int) -> tuple[int, int, list[list[list[str]]]]:
@@ -242,18 +219,12 @@ def main() -> None:
     parser.add_argument('--seed', type=int, default=0, help='other draws of the same kinds')
     parser.add_argument('--minutes', type=float, default=30.0)
     chosen = parser.parse_args()
-    begun, draws = time.process_time(), []
+    begun, right = time.process_time(), 0
     for number in range(chosen.draws):
-        one = draw(number, chosen.seed)
-        draws.append(one)
-        delay = '     -' if one.delay is None else f'{one.delay:5.1f} s'
-        print(
-            f'{number:3} {"right" if one.right else "WRONG":5} {delay}  {one.effect}  {one.named}',
-            flush=True,
-        )
-    if draws:
-        right = sum(one.right for one in draws)
-        print(f'named rightly within {WANTED:g} s: {right} of {len(draws)}')
+        ok, line = draw(number, chosen.seed)
+        right += ok
+        print(line, flush=True)
+    print(f'named rightly within {WANTED:g} s: {right} of {chosen.draws}')
     if chosen.minutes:
         asked, said, proposed = quiet(chosen.minutes, chosen.seed)
         print(

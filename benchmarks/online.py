@@ -21,7 +21,6 @@ import time
 
 from armid_ros.arm import ArmModel
 from armid_ros.identification.online.identifier import OnlineIdentifier, OnlineSettings
-from armid_ros.identification.online.settings import FALSE_ALARM_TIME
 from armid_ros.motion import Motion
 import numpy as np
 
@@ -34,55 +33,43 @@ POSITION_NOISE = 1e-5
 def update_times(arm: ArmModel, measured: Motion, settings: OnlineSettings) -> str:
     """Identify online from all samples; return one line of the table of update times."""
     online = OnlineIdentifier(arm, settings, rng=np.random.default_rng(0))
-    with_row, everything = [], []
+    used, with_row = [], []
     assert measured.tau is not None
     for t, q, torque in zip(measured.t, measured.q, measured.tau, strict=True):
         start = time.thread_time()
         sample = online.update(float(t), q, None, torque)
-        elapsed = time.thread_time() - start
-        everything.append(elapsed)
-        if sample is not None:
-            with_row.append(elapsed)
+        used.append(time.thread_time() - start)
+        with_row.append(sample is not None)
+    times = 1e6 * np.array(used)
     row = '  '.join(
-        f'{1e6 * value:7.0f}'
-        for times in (with_row, everything)
-        for value in (*np.percentile(times, [50, 99, 99.9]), np.mean(times))
+        f'{value:7.0f}'
+        for part in (times[with_row], times)
+        for value in (*np.percentile(part, [50, 99, 99.9]), np.mean(part))
     )
-    estimate = online.estimate()
-    return f'{row}  {online.samples:7d}  {len(estimate.values):4d}'
+    return f'{row}  {online.samples:7d}  {len(online.estimate().values):4d}'
 
 
-def print_update_times(arm: ArmModel, measured: Motion) -> None:
+def main() -> None:
     """Print update times with default rows and with a row per sample, and with forgetting."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[1])
+    parser.add_argument('--seconds', type=float, default=30.0, help='of motion at 1 kHz')
+    seconds = parser.parse_args().seconds
+    rng, arm = np.random.default_rng(1), panda()
+    made = motion(arm, seconds / 60.0, rng)
+    measured = replace(made, q=made.q + POSITION_NOISE * rng.normal(size=made.q.shape))
+    print(f'{arm.robot.name}, {seconds:g} s at 1 kHz; Python {platform.python_version()}, one run')
     print('\nmicroseconds of processor time per sample at 1 kHz')
     print(f'{"":31s}with a row                         all samples')
     columns = 2 * ('p50', 'p99', 'p99.9', 'mean') + ('rows', 'par.')
     print(' ' * 20 + ''.join(f'{name:>9s}' for name in columns))
-    cases = (
-        (None, 'default', 1.0, FALSE_ALARM_TIME),
-        (None, 'no search', 1.0, None),
-        (None, 'default', 0.999, FALSE_ALARM_TIME),
-        (RATE, 'every sample', 1.0, FALSE_ALARM_TIME),
-    )
-    for rate, title, forgetting, alarms in cases:
-        settings = OnlineSettings(
-            cutoff=CUTOFF, row_rate=rate, forgetting=forgetting, false_alarm_time=alarms
-        )
-        name = f'{title}, {forgetting:g}'
-        print(f'{name:20s}  {update_times(arm, measured, settings)}', flush=True)
-
-
-def main() -> None:
-    """Print the table."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[1])
-    parser.add_argument('--seconds', type=float, default=30.0, help='of motion at 1 kHz')
-    seconds = parser.parse_args().seconds
-    rng = np.random.default_rng(1)
-    arm = panda()
-    made = motion(arm, seconds / 60.0, rng)
-    measured = replace(made, q=made.q + POSITION_NOISE * rng.normal(size=made.q.shape))
-    print(f'{arm.robot.name}, {seconds:g} s at 1 kHz; Python {platform.python_version()}, one run')
-    print_update_times(arm, measured)
+    for title, options in (
+        ('default, 1', {}),
+        ('no search, 1', {'false_alarm_time': None}),
+        ('default, 0.999', {'forgetting': 0.999}),
+        ('every sample, 1', {'row_rate': RATE}),
+    ):
+        settings = OnlineSettings(cutoff=CUTOFF, **options)
+        print(f'{title:20s}  {update_times(arm, measured, settings)}', flush=True)
 
 
 if __name__ == '__main__':
