@@ -17,6 +17,7 @@ import subprocess
 import sys
 from tempfile import TemporaryDirectory
 import textwrap
+from typing import Any
 
 import armid_ros as ar
 from armid_ros.nodes.live import LiveDiagnosis, LiveSettings
@@ -68,13 +69,11 @@ def candidates() -> Figure:
     rows = found.document()['candidates'][:10][::-1]
     names = [' '.join([row['name'].replace('_', ' '), 'in', *row['joints']]) for row in rows]
     named = [row['name'] in found.names for row in rows]
-    figure = Figure(figsize=(WIDTH, 3.2), layout='constrained')
-    axes = figure.subplots()
+    figure, axes = _figure(3.2)
     colours = [BLUE if one else GREY for one in named]
     axes.barh(names, [100.0 * max(row['share'], 0.0) for row in rows], color=colours)
     axes.set(xlabel='share of the held-out gap that each takes alone [%]', xlim=(0, 100))
-    axes.spines[['top', 'right']].set_visible(False)
-    return figure
+    return _plain(figure)
 
 
 def deviations() -> Figure:
@@ -93,8 +92,7 @@ def deviations() -> Figure:
             )
             if name.name in true
         ]
-    figure = Figure(figsize=(WIDTH, 2.8), layout='constrained')
-    axes = figure.subplots()
+    figure, axes = _figure(2.8)
     x = np.linspace(-4.0, 4.0, 200)
     held = 100.0 * np.mean(np.abs(off) < stats.norm.ppf(0.975))
     axes.hist(off, bins=np.arange(-4.0, 4.2, 0.4), density=True, color=ORANGE, label='repeats')
@@ -117,8 +115,7 @@ def exo_cycle() -> Figure:
     """Draw hip, knee and feet of the leg pair over a cycle, errors with those of the source."""
     cycle = gait_cycle(walking_pair(), read_gait())
     soft = cycle.pair.with_stiffness(0.8 * cycle.pair.stiffness)
-    figure = Figure(figsize=(WIDTH, 6.2), layout='constrained')
-    panels = figure.subplots(3, 2, height_ratios=(2, 1.2, 2))
+    figure, panels = _figure(6.2, 3, 2, height_ratios=(2, 1.2, 2))
     for column, (joint, most) in enumerate((('hip', 1.5), ('knee', 2.5))):
         name = f'exo_right_{joint}'
         right, wrong = (check_cycle(cycle, name, 200.0, cycle.torques(k)) for k in (None, soft))
@@ -143,13 +140,11 @@ def exo_cycle() -> Figure:
         )
         axes.set(title=('exoskeleton', 'wearer')[column], ylabel='ground, up [N]')
         axes.set_xlabel('gait cycle of the right leg')
-    for axes in panels.ravel():
-        axes.spines[['top', 'right']].set_visible(False)
     for axes in (panels[0, 0], panels[1, 1], panels[2, 0]):
         axes.legend(
             frameon=False, fontsize=7, loc='best' if axes is not panels[2, 0] else 'upper left'
         )
-    return figure
+    return _plain(figure)
 
 
 def growth() -> Figure:
@@ -158,8 +153,7 @@ def growth() -> Figure:
     axes_names = list(dict.fromkeys(row['over'] for row in document['jobs']))
     jobs = list(dict.fromkeys(row['job'] for row in document['jobs']))
     colours = dict(zip(jobs, (GREY, BLUE, ORANGE, '#4a9c6d', '#8a5ca8'), strict=True))
-    figure = Figure(figsize=(WIDTH, 4.6), layout='constrained')
-    panels = figure.subplots(2, len(axes_names), sharey='row', squeeze=False)
+    figure, panels = _figure(4.6, 2, len(axes_names), sharey='row', squeeze=False)
     for row in document['jobs']:
         upper, lower = panels[:, axes_names.index(row['over'])]
         name = f'{row["job"]}, slope {row["slope"]:.1f}'
@@ -183,8 +177,7 @@ def growth() -> Figure:
 def reliability() -> Figure:
     """Draw the share of right first names of the diagnosis over their stated probability."""
     found = json.loads((RESULTS / 'probabilities.json').read_text(encoding='utf-8'))
-    figure = Figure(figsize=(WIDTH, 3.2), layout='constrained')
-    axes = figure.subplots()
+    figure, axes = _figure(3.2)
     axes.plot([0, 1], [0, 1], color=GREY, lw=1, label='calibrated')
     for mean, right, count in bins(found):
         low, high = stats.binomtest(round(right * count), count).proportion_ci(method='wilson')
@@ -193,9 +186,8 @@ def reliability() -> Figure:
         axes.annotate(f'{count} names', (mean, right), (-8, 0), ha='right', **TEXT)
     axes.set(xlabel='probability of the first name', ylabel='share of names that are right')
     axes.set(xlim=(0.4, 1.0), ylim=(0.4, 1.02))
-    axes.spines[['top', 'right']].set_visible(False)
     axes.legend(frameon=False, loc='lower right')
-    return figure
+    return _plain(figure)
 
 
 def excitation() -> Figure:
@@ -216,8 +208,7 @@ def currents() -> Figure:
     """Draw a current of the log next to the torque that it is converted to."""
     log = np.genfromtxt('log.csv', delimiter=',', names=True)
     run = ar.read_recording('log.csv', 'my_arm.urdf', effort='amps_{}', effort_scale=GAIN)
-    figure = Figure(figsize=(WIDTH, 3.0), layout='constrained')
-    panels = figure.subplots(2, 1, sharex=True)
+    figure, panels = _figure(3.0, 2, 1, sharex=True)
     panels[0].plot(1e-3 * log['t_ms'], log['amps_2'], color=GREY)
     panels[1].plot(run.t, run.tau[:, 1], color=BLUE)
     panels[0].set(ylabel='amps_2 [A]', xlim=(0.0, 10.0))
@@ -229,8 +220,7 @@ def comparison() -> Figure:
     """Draw the difference of each parameter in standard deviations."""
     found = ar.compare('monday_result', 'friday_result').core.changes
     size = [abs(one.deviations) for one in found]
-    figure = Figure(figsize=(WIDTH, 4.2), layout='constrained')
-    axes = figure.subplots()
+    figure, axes = _figure(4.2)
     names = [f'{one.parameter.name}, {one.parameter.joint}' for one in found]
     axes.barh(names, size, color=[ORANGE if one.changed else GREY for one in found])
     axes.set(xscale='log', xlabel='difference in standard deviations; orange: changed')
@@ -241,8 +231,7 @@ def comparison() -> Figure:
 
 def bodies() -> Figure:
     """Draw the masses of links as described, and of a fit without and with bodies."""
-    figure = Figure(figsize=(WIDTH, 2.6), layout='constrained')
-    axes, robot = figure.subplots(), ar.load_robot('my_arm.urdf')
+    (figure, axes), robot = _figure(2.6), ar.load_robot('my_arm.urdf')
     for place, (label, colour, masses) in enumerate(
         (
             ('as described', GREY, robot.rigid_parameters[::10]),
@@ -271,8 +260,7 @@ def own_effect() -> Figure:
     elbow = run.joints.index('elbow')
     angle = run.q[:, elbow]
     noise = run.tau[:, elbow] - ar.simulate(known, 'plan/excitation.yaml').tau[:, elbow]
-    figure = Figure(figsize=(WIDTH, 2.8), layout='constrained')
-    axes, grid = figure.subplots(), np.linspace(angle.min(), angle.max(), 100)
+    (figure, axes), grid = _figure(2.8), np.linspace(angle.min(), angle.max(), 100)
     axes.plot(angle[::20], (1.5 * angle**3 + noise)[::20], '.', color=GREY, ms=2, label='residual')
     axes.plot(grid, 1.5 * grid**3, color=BLUE, label='hose: 1.5 N m/rad³ q³')
     axes.set(xlabel='angle of elbow [rad]', ylabel='torque [N m]')
@@ -292,8 +280,7 @@ def learned() -> Figure:
     """Draw the torque of a worn gear over the angle."""
     x = np.linspace(-1.5, 2.0, 300)
     share = (x - 0.6) / 0.2
-    figure = Figure(figsize=(WIDTH, 2.4), layout='constrained')
-    axes = figure.subplots()
+    figure, axes = _figure(2.4)
     axes.plot(x, share * np.exp(-(share**2)), color=BLUE)
     axes.axvspan(0.2, 1.0, color=ORANGE, alpha=0.2, label='worn place')
     axes.set(xlabel='angle of elbow [rad]', ylabel='torque [N m]')
@@ -306,8 +293,7 @@ def limits() -> Figure:
     plan = ar.design_excitation('my_arm.urdf', duration=20.0)
     used = plan.core.limits_used(plan.arm)
     joints = plan.arm.robot.joints
-    figure = Figure(figsize=(WIDTH, 2.6), layout='constrained')
-    axes = figure.subplots()
+    figure, axes = _figure(2.6)
     for place, ((name, share), colour) in enumerate(
         zip(used.items(), (BLUE, ORANGE, GREY, 'black'), strict=False)
     ):
@@ -337,8 +323,7 @@ def springs() -> Figure:
     clean = [run_elastic(plant, loop, plan) for plan in plans]
     runs = [sensors.measure(run, rng) for run in clean]
     found = identify_two_inertia(runs, shipped.parameters, loop)
-    figure = Figure(figsize=(WIDTH, 2.8), layout='constrained')
-    panels = figure.subplots(1, 2, sharey=True)
+    figure, panels = _figure(2.8, 1, 2, sharey=True)
     for k, (axes, joint, own) in enumerate(zip(panels, found.joints, found.measured, strict=True)):
         seen = (own.frequency > 5.0) & (own.frequency < 80.0)
         frequency = own.frequency[seen]
@@ -395,8 +380,7 @@ def live() -> Figure:
     elbow = arm.robot.index('elbow')
     before = [one.gap.before[elbow] for one in answers]
     after = [one.gap.after[elbow] for one in answers]
-    figure = Figure(figsize=(WIDTH, 2.6), layout='constrained')
-    axes = figure.subplots()
+    figure, axes = _figure(2.6)
     axes.plot(ends, before, 'o-', color=ORANGE, label='model as given')
     axes.plot(ends, after, 'o-', color=BLUE, label='with what is named')
     axes.axvline(came, color=GREY, lw=1)
@@ -423,8 +407,7 @@ def online() -> Figure:
             times.append(t)
             values.append((found.values[index], 1.96 * found.std[index]))
     value, reach = np.array(values).T
-    figure = Figure(figsize=(WIDTH, 2.6), layout='constrained')
-    axes = figure.subplots()
+    figure, axes = _figure(2.6)
     axes.fill_between(times, value - reach, value + reach, color=BLUE, alpha=0.2, label='95 %')
     axes.plot(times, value, color=BLUE, label='estimate')
     axes.axhline(0.3, color=GREY, label='true')
@@ -479,8 +462,7 @@ def control() -> Figure:
 
 def _boxes(texts: list[str]) -> Figure:
     """Return texts in boxes from left to right, with arrows between them."""
-    figure = Figure(figsize=(WIDTH, 1.1), layout='constrained')
-    axes = figure.subplots()
+    figure, axes = _figure(1.1)
     for place, text in enumerate(texts):
         style = {'boxstyle': 'round,pad=0.5', 'fc': 'white', 'ec': BLUE}
         axes.text(place, 0.0, text, ha='center', va='center', fontsize=8, bbox=style)
@@ -512,6 +494,12 @@ def _terminal(lines: list[str]) -> Figure:
     return figure
 
 
+def _figure(height: float, *panels: int, **options: Any) -> tuple[Figure, Any]:
+    """Return a figure as wide as a column of text, and its panels."""
+    figure = Figure(figsize=(WIDTH, height), layout='constrained')
+    return figure, figure.subplots(*panels, **options)
+
+
 def _plain(figure: Figure) -> Figure:
     """Return a figure without the upper and right lines of its frames."""
     for axes in figure.axes:
@@ -527,29 +515,12 @@ def _sized(drawn: np.ndarray) -> Figure:
 
 
 PICTURES = {
-    'bodies.png': bodies,
-    'candidates.png': candidates,
-    'chain.png': chain,
-    'comparison.png': comparison,
-    'control.png': control,
-    'currents.png': currents,
-    'damaged.png': damaged,
-    'deviations.png': deviations,
-    'excitation.png': excitation,
-    'exo_cycle.png': exo_cycle,
-    'fleet.png': fleet,
-    'growth.png': growth,
-    'installed.png': installed,
-    'learned.png': learned,
-    'limits.png': limits,
-    'live.png': live,
-    'online.png': online,
-    'own_effect.png': own_effect,
-    'payload.png': payload,
-    'recording.png': recording,
-    'refused.png': refused,
-    'reliability.png': reliability,
-    'springs.png': springs,
+    f'{picture.__name__}.png': picture
+    for picture in (
+        *(bodies, candidates, chain, comparison, control, currents, damaged, deviations),
+        *(excitation, exo_cycle, fleet, growth, installed, learned, limits, live, online),
+        *(own_effect, payload, recording, refused, reliability, springs),
+    )
 }
 
 
