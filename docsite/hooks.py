@@ -20,15 +20,6 @@ from docsite.schemas import schemas_page
 from docsite.speed import speed_page
 
 ROOT = Path(__file__).parents[1]
-#: Modules below armid_ros that explain gaps, find faults of data and plan motions for a diagnosis.
-BESIDE_THE_DIAGNOSIS = (
-    'identification/assess/data_faults.py',
-    'identification/assess/sensor_faults.py',
-    'identification/fitting/held_out.py',
-    'identification/rows/signals.py',
-    'identification/rows/stamps.py',
-    'excitation/feasibility.py',
-)
 NOTEBOOKS = ROOT / 'examples' / 'notebooks'
 
 
@@ -40,10 +31,7 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
         'reference/commands.md': commands_page(),
         'reference/effects.md': effects_page(),
         'reference/examples.md': examples_page(ROOT / 'examples'),
-        'reference/numbers.md': numbers_page(
-            ROOT / 'armid_ros' / 'diagnosis',
-            [ROOT / 'armid_ros' / place for place in BESIDE_THE_DIAGNOSIS],
-        ),
+        'reference/numbers.md': numbers_page(ROOT / 'armid_ros' / 'diagnosis'),
         'reference/nodes.md': nodes_page(_taken(files, reference / 'nodes.md')),
         'reference/files.md': schemas_page(_taken(files, reference / 'files.md')),
         'reference/speed.md': speed_page(ROOT / 'benchmarks' / 'results' / 'speed.json'),

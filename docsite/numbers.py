@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 import ast
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import fields
 import inspect
 from pathlib import Path
@@ -18,18 +18,8 @@ from docsite.markdown import cell, table
 _ENTRY = re.compile(r'^(?P<names>\w+(?:, \w+)*) : (?P<type>.+)$')
 
 
-def numbers_page(package: Path, more: Sequence[Path] = ()) -> str:
-    """
-    Return the page.
-
-    Parameters
-    ----------
-    package : Path
-        Folder of the diagnosis.
-    more : sequence of Path
-        Folders and modules beside it whose numbers decide as well.
-
-    """
+def numbers_page(package: Path) -> str:
+    """Return the page of the numbers in the folder of the diagnosis, and of those it imports."""
     meaning = _meanings(inspect.cleandoc(Thresholds.__doc__ or ''))
     rows = [
         (f'`{field.name}`', f'{field.default:g}', cell(meaning.get(field.name, '')))
@@ -38,7 +28,7 @@ def numbers_page(package: Path, more: Sequence[Path] = ()) -> str:
     ]
     others = [
         (f'`{name}`', cell(value), cell(why), f'`{path}`')
-        for path, name, value, why in _others(package, more)
+        for path, name, value, why in _others(package)
     ]
     return '\n'.join(
         [
@@ -63,15 +53,23 @@ def numbers_page(package: Path, more: Sequence[Path] = ()) -> str:
     )
 
 
-def _others(package: Path, more: Sequence[Path]) -> Iterator[tuple[str, str, str, str]]:
+def _others(package: Path) -> Iterator[tuple[str, str, str, str]]:
     """Yield files, names, values and comments of all numbers except thresholds."""
+    wanted: dict[str, set[str]] = {}
+    for path in sorted(package.rglob('*.py')):
+        text = path.read_text(encoding='utf-8')
+        for name, value, why in constants(text):
+            yield path.relative_to(package).as_posix(), name, value, why
+        for node in ast.walk(ast.parse(text)):
+            if isinstance(node, ast.ImportFrom) and node.module:
+                wanted.setdefault(node.module, set()).update(alias.name for alias in node.names)
     root = package.parents[1]
-    for folder, home in ((package, package), *((one, root) for one in more)):
-        for path in _modules(folder):
-            place = path.relative_to(home).as_posix()
+    for module, names in sorted(wanted.items()):
+        path = root.joinpath(*module.split('.')).with_suffix('.py')
+        if path.is_file() and package not in path.parents:
             for name, value, why in constants(path.read_text(encoding='utf-8')):
-                yield place, name, value, why
-    yield from _borrowed([package, *more], root)
+                if name in names:
+                    yield path.relative_to(root).as_posix(), name, value, why
 
 
 def _meanings(docstring: str) -> dict[str, str]:
@@ -99,26 +97,6 @@ def constants(source: str) -> Iterator[tuple[str, str, str]]:
             above.insert(0, lines[first].removeprefix('#:').strip())
             first -= 1
         yield ast.unparse(node.targets[0]).strip('()'), ast.unparse(node.value), ' '.join(above)
-
-
-def _modules(place: Path) -> list[Path]:
-    """Return the modules of a folder, or the module itself."""
-    return [place] if place.is_file() else sorted(place.rglob('*.py'))
-
-
-def _borrowed(packages: Sequence[Path], root: Path) -> Iterator[tuple[str, str, str, str]]:
-    """Yield files, names, values and comments of the numbers in other packages."""
-    wanted: dict[str, set[str]] = {}
-    for path in (path for package in packages for path in _modules(package)):
-        for node in ast.walk(ast.parse(path.read_text(encoding='utf-8'))):
-            if isinstance(node, ast.ImportFrom) and node.module:
-                wanted.setdefault(node.module, set()).update(alias.name for alias in node.names)
-    for module, names in sorted(wanted.items()):
-        path = root.joinpath(*module.split('.')).with_suffix('.py')
-        if path.is_file() and not set(packages) & {path, *path.parents}:
-            for name, value, why in constants(path.read_text(encoding='utf-8')):
-                if name in names:
-                    yield path.relative_to(root).as_posix(), name, value, why
 
 
 def _is_numbers(node: ast.expr) -> bool:

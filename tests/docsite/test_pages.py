@@ -101,7 +101,7 @@ def test_every_option_that_a_page_names_exists(page):
         if not code.startswith(('python -m', 'python3 -m', 'colcon ', 'pip '))
     ]
     named = {option for code in said for option in re.findall(r'(?<!\S)--[a-z][\w-]*', code)}
-    assert named <= {*options(), '--ros-args', '--slice'}  # of ROS 2, of the benchmark
+    assert named <= {*options(), '--ros-args'}
 
 
 def test_a_block_that_fails_is_noticed(tmp_path):
