@@ -13,25 +13,34 @@ and the motions that determine four springs.
 from __future__ import annotations
 
 import argparse
+from dataclasses import replace
 
 from armid_ros.errors import IdentificationError
+from armid_ros.identification.ties.problem import Inertias, interaction_problem
+from armid_ros.identification.ties.recorded import recorded_interaction_problem
+from armid_ros.identification.ties.stiffness import identify_interaction, Interaction
+from armid_ros.motion import Motion
 from armid_ros.papers.exo.plant.gait import read_gait
 from armid_ros.papers.exo.plant.gait_cycle import driving_torque, gait_cycle
 from armid_ros.papers.exo.plant.leg_pair import (
     exercise,
     EXERCISES,
     leg_pair,
+    pair_torques,
     PairMotion,
     stepping,
+    TiedPair,
 )
 from armid_ros.papers.exo.plant.walkers import walking_pair
+from armid_ros.recording import Recording
 from armid_ros.robots.ties import SEGMENTS
 import numpy as np
 
-from benchmarks.exo_noise import find_springs, TORQUE_NOISE, with_torques
 from benchmarks.pair_in_mujoco import walk_in_mujoco
 
 STIFFNESS = 1e4
+#: Noise of the torques of the machine [N m].
+TORQUE_NOISE = 0.5
 PAIR = leg_pair(STIFFNESS)
 
 
@@ -104,6 +113,60 @@ def motions_of_four_springs() -> None:
             continue
         shown = ' '.join(f'{196.0 * std / STIFFNESS:6.2f}' for std in found.std)
         print(f'{name:11s} {shown}', flush=True)
+
+
+def find_springs(
+    pair: TiedPair,
+    motions: PairMotion,
+    degrees: float,
+    seed: int,
+    *,
+    inertias: Inertias = 'known',
+    separate: bool = False,
+) -> Interaction:
+    """Draw noise, and identify springs from poses, or from 1000 samples on as a recording."""
+    own, other = measured(motions, degrees, np.random.default_rng(seed))
+    if len(own) < 1000:
+        problem = interaction_problem(
+            pair,
+            own,
+            other,
+            noise=(np.radians(degrees), TORQUE_NOISE),
+            inertias=inertias,
+            separate=separate,
+        )
+        return identify_interaction(problem)
+    return identify_interaction(
+        recorded_interaction_problem(
+            pair,
+            recorded(own),
+            recorded(other),
+            inertias=inertias,
+            separate=separate,
+        )
+    )
+
+
+def with_torques(pair: TiedPair, motions: PairMotion) -> PairMotion:
+    """Return a motion with exact torques of the machine."""
+    return PairMotion(motions.own.with_torque(pair_torques(pair, *motions).tau), motions.other)
+
+
+def measured(motions: PairMotion, degrees: float, rng: np.random.Generator) -> PairMotion:
+    """Return a motion with exact torques and added sensor noise."""
+    own, other = (
+        replace(m, q=m.q + np.radians(degrees) * rng.normal(size=m.q.shape)) for m in motions
+    )
+    assert own.tau is not None
+    tau = own.tau + TORQUE_NOISE * rng.normal(size=own.tau.shape)
+    return PairMotion(own.with_torque(tau), other)
+
+
+def recorded(motion: Motion, start_ns: int = 0) -> Recording:
+    """Return a motion as a recording."""
+    return Recording(
+        joints=motion.joints, t=motion.t, q=motion.q, tau=motion.tau, start_ns=start_ns
+    )
 
 
 if __name__ == '__main__':

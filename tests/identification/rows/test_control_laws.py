@@ -16,7 +16,7 @@ from armid_ros.model import inverse_dynamics
 import numpy as np
 import pytest
 
-from benchmarks.real_days import hand_guided, payload
+from benchmarks.real_changes import hand_guided, payload
 from tests.identification.conftest import multisine, recorded
 
 

@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from benchmarks.exo_noise import find_springs, measured, recorded, with_torques
+from benchmarks.exo import find_springs, measured, recorded, with_torques
 
 STIFFNESS = 1.0e4
 

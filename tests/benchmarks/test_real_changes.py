@@ -5,7 +5,7 @@
 import numpy as np
 import pytest
 
-from benchmarks.real_days import DAYS
+from benchmarks.real_changes import DAYS
 
 pytestmark = [pytest.mark.real_data, pytest.mark.slow]
 
