@@ -53,7 +53,7 @@ def diagnosed(sets: int, first: int = 0) -> None:
     cases = [(k, segments) for k in STIFFNESSES for segments in HIDDEN]
     for number, (k, segments) in enumerate(cases[:sets]):
         recordings = recorded_pair(partner, Straps(segments, k), first + number)
-        found = _diagnosis(partner, recordings)
+        found = diagnosis_of(partner, recordings)
         named = {tie.name for finding in found.findings for tie in finding.ties}
         z = expected_z(recordings, k)
         visible = {name for name in segments if z[name] >= _VISIBLE}
@@ -69,7 +69,7 @@ def diagnosed(sets: int, first: int = 0) -> None:
         if not ok:
             print(f'  {k:g} N/m at {", ".join(segments)}: {found.verdict} {_said(found)}')
     for number in range(sets):
-        found = _diagnosis(partner, recorded_pair(partner, Straps(), first + 1000 + number))
+        found = diagnosis_of(partner, recorded_pair(partner, Straps(), first + 1000 + number))
         body = number % 2 == 1 and [f.name for f in found.findings] == ['link_inertia']
         alarms += bool(found.findings) and not body
         if found.findings or found.verdict != 'consistent':
@@ -85,8 +85,8 @@ def diagnosed(sets: int, first: int = 0) -> None:
 def expected_z(recordings: list[Recording], stiffness: float) -> dict[str, float]:
     """Return the expected z-score of a stiffness by segment, if all segments may be tied."""
     exo = load_robot('exoskeleton_legs')
-    used = conditioning(recordings, SignalSettings())
-    used = band_of_motion(recordings, used, SignalSettings())
+    settings = SignalSettings()
+    used = band_of_motion(recordings, conditioning(recordings, settings), settings)
     problem = stacked(
         [
             together_interaction_problem(exo, recording, used, inertias='free', separate=True)
@@ -108,10 +108,10 @@ def recorded_pair(partner: Partner, straps: Straps, seed: int) -> list[Recording
     return recordings
 
 
-def _diagnosis(partner: Partner, recordings: list[Recording]) -> Diagnosis:
-    arm = ArmModel(load_robot('exoskeleton_legs'))
-    settings = DiagnosisSettings(partner=partner)
-    return diagnose(arm, recordings, settings=settings, rng=np.random.default_rng(0))
+def diagnosis_of(partner: Partner, recordings: list[Recording]) -> Diagnosis:
+    """Return the diagnosis of the exoskeleton with a partner."""
+    arm, rng = ArmModel(load_robot('exoskeleton_legs')), np.random.default_rng(0)
+    return diagnose(arm, recordings, settings=DiagnosisSettings(partner=partner), rng=rng)
 
 
 def _said(found: Diagnosis) -> str:

@@ -47,6 +47,8 @@ KNOWN = (
     'coulomb_friction:coulomb_torque=0.2',
     'torque_offset:torque_offset=0.05',
 )
+#: The arm with the effects that the diagnosis knows.
+ARM = ArmModel.of(ROBOT, effects=KNOWN)
 #: Time before the effect appears, and longest accepted time until it is named [s].
 BEFORE, WANTED = 20.0, 30.0
 #: Duration of the motion from which the node measures the misfit of the model [s].
@@ -107,19 +109,14 @@ class Unhurried:
         """Do nothing, as there is no process."""
 
 
-def known_arm() -> ArmModel:
-    """Return the arm with the effects that the diagnosis knows."""
-    return ArmModel.of(ROBOT, effects=KNOWN)
-
-
-def drawn(arm: ArmModel, along: Motion, kind: tuple[str, str], rng: np.random.Generator) -> str:
+def drawn(along: Motion, kind: tuple[str, str], rng: np.random.Generator) -> str:
     """Return an effect of typical size with the share `SHARE` of the torque of a joint."""
     name, quantity = kind
     largest = next(own.typical[1] for own in CATALOGUE[name].quantities if own.name == quantity)
-    torque, unit = arm.torque(along), 1e-3
+    torque, unit = ARM.torque(along), 1e-3
     for _ in range(_TRIES):
         joint = str(rng.choice(ROBOT.joints))
-        more = arm.with_effect(*parse_effect(f'{name}@{joint}:{quantity}={unit}', ROBOT))
+        more = ARM.with_effect(*parse_effect(f'{name}@{joint}:{quantity}={unit}', ROBOT))
         column = ROBOT.joints.index(joint)
         of_joint = np.sqrt(np.mean(torque[:, column] ** 2))
         of_unit = np.sqrt(np.mean((more.torque(along) - torque)[:, column] ** 2)) / unit
@@ -145,7 +142,7 @@ class Bench:
             resolution=[2.4e-5],
             start=','.join(repr(float(q)) for q in along.q[0]),
         )
-        self.live = LiveDiagnosis(known_arm(), LiveSettings(learning=LEARNING))
+        self.live = LiveDiagnosis(ARM, LiveSettings(learning=LEARNING))
         self.helper = Unhurried()
         self.node = stage.add(LiveDiagnosisNode, self.live, self.helper)
         self._stage = stage
@@ -169,11 +166,6 @@ class Bench:
             if self.node.take_answer():
                 yield count / RATE
 
-    def set_effect(self, text: str) -> None:
-        """Add an effect to the running arm."""
-        (result,) = self.plant.set_parameters([Parameter('effects', value=[*KNOWN, text])])
-        assert result.successful, result.reason
-
     @property
     def proposed(self) -> list[list[str]]:
         """Effects that the node proposes, with their joints."""
@@ -184,12 +176,13 @@ def draw(number: int, seed: int) -> tuple[bool, str]:
     """Let an effect appear in a running arm; return whether it is named, and a line about it."""
     rng = np.random.default_rng(number + 1000 * seed)
     along = working_motion(BEFORE + WANTED + 6.0, rng.uniform(1.0, 2.0), rng)
-    effect = drawn(known_arm(), along, KINDS[number % len(KINDS)], rng)
+    effect = drawn(along, KINDS[number % len(KINDS)], rng)
     name, _, place = effect.partition(':')[0].partition('@')
     with Stage() as stage:
         nodes = Bench(stage, along)
         early = any(nodes.proposed for _ in nodes.run(BEFORE))
-        nodes.set_effect(effect)
+        (done,) = nodes.plant.set_parameters([Parameter('effects', value=[*KNOWN, effect])])
+        assert done.successful, done.reason
         delay = next((t for t in nodes.run(WANTED) if nodes.proposed), np.nan)
         right = not early and nodes.proposed[:1] == [[name, place]]
         verdict = 'right' if right else 'WRONG'

@@ -15,7 +15,6 @@ tests/hidden/lived/README.md.
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 import traceback
@@ -81,7 +80,13 @@ def main() -> None:
     parser.add_argument('--probabilities', type=Path, help='file for those of names, as JSON')
     parser.add_argument('--processes', type=int, default=2)
     options = parser.parse_args()
-    cases = select(options.kind, options.cases, options.only)
+    first, _, last = options.cases.partition(':')
+    question = options.kind.removeprefix(options.kind.partition('/')[0])
+    cases = [
+        k
+        for k in range(int(first or 0), int(last or COUNTS[question]))
+        if not options.only or specify(options.kind, k).cause in options.only
+    ]
     what = f'lived, {options.kind}, {len(cases)} cases'
     what += f', only {" ".join(options.only)}' if options.only else ''
     what += ', model alone' if options.model_alone else ''
@@ -100,14 +105,6 @@ def main() -> None:
     )
     if options.probabilities:
         write_json(options.probabilities, probabilities(judged))
-
-
-def select(kind: str, cases: str = ':', only: Sequence[str] = ()) -> list[int]:
-    """Return the numbers of the cases in a range such as '0:24' that have some causes."""
-    first, _, last = cases.partition(':')
-    question = kind.removeprefix(kind.partition('/')[0])
-    numbers = range(int(first or 0), int(last or COUNTS[question]))
-    return [k for k in numbers if not only or specify(kind, k).cause in only]
 
 
 if __name__ == '__main__':

@@ -9,16 +9,15 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from scipy.stats import binomtest
 
 
-def wilson(hits: int, total: int, z: float = 1.96) -> tuple[float, float]:
+def wilson(hits: int, total: int) -> tuple[float, float]:
     """Return the 95 % interval of a rate (Wilson 1927)."""
     if total == 0:
         return 0.0, 1.0
-    p = hits / total
-    centre = (p + z**2 / (2 * total)) / (1 + z**2 / total)
-    half = z / (1 + z**2 / total) * np.sqrt(p * (1 - p) / total + z**2 / (4 * total**2))
-    return float(max(centre - half, 0.0)), float(min(centre + half, 1.0))
+    low, high = binomtest(hits, total).proportion_ci(method='wilson')
+    return float(low), float(high)
 
 
 @dataclass(frozen=True)

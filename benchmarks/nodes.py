@@ -34,13 +34,10 @@ from rclpy.experimental import EventsExecutor
 
 from benchmarks.real_recordings import example_robot
 
+#: Description with seven joints and a gripper.
+PANDA = str(example_robot('panda_description/urdf/panda.urdf'))
 EFFECTS = ('viscous_friction', 'coulomb_friction', 'torque_offset')
 MS = 10**6
-
-
-def panda():
-    """Return the path of a URDF with seven joints and a gripper."""
-    return str(example_robot('panda_description/urdf/panda.urdf'))
 
 
 def short_run(robot, period, n_periods):
@@ -69,11 +66,6 @@ def process(context, node, *parameters):
         running.wait()
 
 
-def lost(first, last, count):
-    """Return the number of missing messages between two stamps, for one message per ms."""
-    return round((last - first) / MS) + 1 - count
-
-
 def resident(running):
     """Return the memory of a process [MB]."""
     lines = Path(f'/proc/{running.pid}/status').read_text().splitlines()
@@ -82,7 +74,7 @@ def resident(running):
 
 def at_one_kilohertz(seconds, folder):
     """Identify, diagnose and record an arm at 1 kHz; print losses, memory and update times."""
-    robot = load_robot(panda())
+    robot = load_robot(PANDA)
     save_excitation(short_run(robot, 8.0, max(1, int(seconds / 8.0))), folder / 'run.yaml')
     with private_context() as context, steady():
         executor = EventsExecutor(context=context)
@@ -99,13 +91,13 @@ def at_one_kilohertz(seconds, folder):
         excitation = process(
             context,
             'excitation_publisher',
-            f'robot:={panda()}',
+            f'robot:={PANDA}',
             f'file:={folder / "run.yaml"}',
             'floor:=none',
             'executor:=events',
         )
-        arm = process(context, 'simulated_arm', f'robot:={panda()}', 'executor:=events')
-        live = process(context, 'live_diagnosis', f'robot:={panda()}', 'executor:=events')
+        arm = process(context, 'simulated_arm', f'robot:={PANDA}', 'executor:=events')
+        live = process(context, 'live_diagnosis', f'robot:={PANDA}', 'executor:=events')
         with recorder as recording_it, excitation as moving, live as diagnosing:
             ours = {'recorder': recording_it, 'publisher': moving, 'live diagnosis': diagnosing}
             memory = []
@@ -124,7 +116,8 @@ def at_one_kilohertz(seconds, folder):
                     assert not stopped, f'ended early: {stopped}'
             for _ in range(1000):
                 executor.spin_once(timeout_sec=0.001)
-        missing = lost(first, node.last_stamp_ns, node.received - early)
+        due = round((node.last_stamp_ns - first) / MS) + 1
+        missing = due - (node.received - early)
         executor.remove_node(node)
         executor.shutdown()
     recording = read_recording(folder / 'bag', joints=robot.joints)

@@ -13,7 +13,6 @@ processor.
 from __future__ import annotations
 
 from collections.abc import Callable
-from importlib.metadata import files
 import time
 
 from armid_ros.arm import ArmModel
@@ -30,6 +29,8 @@ from armid_ros.simulation import (
 from armid_ros.simulation.run import SimulatedRun
 import numpy as np
 
+from benchmarks.real_recordings import example_robot
+
 REACH = 60.0
 SECONDS = 0.5
 REPETITIONS = 100
@@ -37,9 +38,7 @@ REPETITIONS = 100
 
 def main() -> None:
     """Print a table per arm."""
-    panda = next(
-        str(entry.locate()) for entry in files('example-robot-data') if entry.name == 'panda.urdf'
-    )
+    panda = str(example_robot('panda_description/urdf/panda.urdf'))
     for name, source in (('humanoid arm, 6 joints', 'humanoid_arm'), ('Panda, 7 joints', panda)):
         report(name, load_robot(source))
 
