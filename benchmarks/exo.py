@@ -36,7 +36,7 @@ from armid_ros.recording import Recording
 from armid_ros.robots.ties import SEGMENTS
 import numpy as np
 
-from benchmarks.pair_in_mujoco import walk_in_mujoco
+from tests.papers.exo.pair_in_mujoco import walk_in_mujoco
 
 STIFFNESS = 1e4
 #: Noise of the torques of the machine [N m].

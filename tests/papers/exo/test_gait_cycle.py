@@ -9,7 +9,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from benchmarks.pair_in_mujoco import walk_in_mujoco
+from tests.papers.exo.pair_in_mujoco import walk_in_mujoco
 
 #: Reach of the errors over a cycle [deg]; the source has 1.5 and 2.5.
 REACH = {'exo_right_hip': 0.05, 'exo_right_knee': 0.1}

@@ -17,7 +17,7 @@ from armid_ros.papers.exo.plant.torque_driven import drive_by_torque, splined
 import numpy as np
 import pytest
 
-from benchmarks.pair_in_mujoco import drive_in_mujoco
+from tests.papers.exo.pair_in_mujoco import drive_in_mujoco
 
 RATE = 100.0
 #: How far joints are off with springs that are 20 % too soft [deg].
