@@ -7,7 +7,7 @@ from armid_ros.fleet.plan import FleetSettings, plan_fleet
 from armid_ros.fleet.run import identify_fleet
 import pytest
 
-from benchmarks.fleet import EFFECTS, generate, ROBOT
+from tests.golden.simulated_fleet import EFFECTS, generate, ROBOT
 
 SETTINGS = FleetSettings(EFFECTS)
 URDF = str(ROBOT)

@@ -6,8 +6,8 @@ import json
 
 import pytest
 
-from benchmarks.fleet import generate, ROBOT
 from tests.cli.conftest import armid
+from tests.golden.simulated_fleet import generate, ROBOT
 
 pytestmark = pytest.mark.slow
 

@@ -20,8 +20,8 @@ import pandas
 import polars
 import pytest
 
-from benchmarks.fleet import EFFECTS
 from docsite.schemas import faults
+from tests.golden.simulated_fleet import EFFECTS
 
 from .conftest import identified, SETTINGS, URDF
 

@@ -13,7 +13,7 @@ from armid_ros.fleet.watch import watch_fleet, write_watch
 import pyarrow as pa
 import pytest
 
-from benchmarks.fleet import generate
+from tests.golden.simulated_fleet import generate
 
 from .conftest import identified, SETTINGS, URDF
 

@@ -17,10 +17,10 @@ import shutil
 import armid_ros as ar
 import numpy as np
 
-from benchmarks.fleet import generate
 from benchmarks.multisine import multisine
 from benchmarks.real_recordings import EMPS_URDF
 from docsite.desk import ARM, FRICTION, LOAD, write_log
+from tests.golden.simulated_fleet import generate
 
 SPRING = 'joint_spring@shoulder:spring_stiffness=2'
 DAYS = {

@@ -23,7 +23,7 @@ import numpy as np
 
 from benchmarks.multisine import multisine
 
-ROBOT = Path(__file__).parents[1] / 'examples' / 'arm.urdf'
+ROBOT = Path(__file__).parents[2] / 'examples' / 'arm.urdf'
 EFFECTS = 'viscous_friction,coulomb_friction,torque_offset'
 RATE = 200.0
 FIRST_DAY = datetime.datetime(2026, 1, 1, 8, tzinfo=datetime.UTC)
