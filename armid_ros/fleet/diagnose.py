@@ -18,9 +18,7 @@ from contextlib import ExitStack
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from armid_ros import ArmModel
-from armid_ros.api.diagnosis import diagnose
-from armid_ros.api.identification import identify
+from armid_ros import ArmModel, diagnose, identify
 from armid_ros.errors import ArmidError, FleetError
 from armid_ros.fleet.bags import folder_of
 from armid_ros.fleet.plan import document, kind_arm

@@ -20,7 +20,7 @@ import json
 from typing import Any
 import uuid
 
-from armid_ros import ArmModel
+from armid_ros import ArmModel, load_robot
 from armid_ros.errors import ArmidError, FleetError
 from armid_ros.files import json_text, reading
 from armid_ros.files.cells import listed
@@ -35,7 +35,6 @@ from armid_ros.identification.rows.signals import conditioning
 from armid_ros.model import BaseParameters, random_motion
 from armid_ros.recording import ReadSettings, Recording
 from armid_ros.recording.reader import read_pieces
-from armid_ros.robots import robot_from_urdf
 import numpy as np
 
 
@@ -287,9 +286,7 @@ def kind_arm(store: Store, facts: Mapping[str, Any], key: str) -> ArmModel:
     urdf = store.read(f'robots/{key}.urdf')
     if urdf is None:
         raise FleetError(f'{store.url}/robots/{key}.urdf: there is no such description')
-    robot = robot_from_urdf(
-        urdf.decode(), gravity=facts['gravity'], joints=facts['joints'], source=facts['robot']
-    )
+    robot = load_robot(urdf.decode(), gravity=facts['gravity'], joints=facts['joints'])
     return ArmModel.of(robot, effects=facts['effects'])
 
 

@@ -14,8 +14,8 @@ from armid_ros.cli.terminal import progress
 import click
 
 if TYPE_CHECKING:
+    from armid_ros import Robot
     from armid_ros.motion import FloatArray
-    from armid_ros.robots import Robot
 
 
 @click.command(

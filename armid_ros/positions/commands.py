@@ -8,6 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from armid_ros import Robot
 from armid_ros.errors import RecordingError
 from armid_ros.files import reading
 from armid_ros.positions.loop import CommandedMotion
@@ -17,7 +18,6 @@ from armid_ros.recording.columns import ColumnSettings
 from armid_ros.recording.message_types import JOINT_STATE, store_for
 from armid_ros.recording.reader import is_table, read_recording
 from armid_ros.recording.source import DEFAULT, listed, Topic
-from armid_ros.robots import Robot
 import numpy as np
 
 #: Ending of the message types of a joint_trajectory_controller. Their fields are joint_names,

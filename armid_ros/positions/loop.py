@@ -17,13 +17,12 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
 
-from armid_ros import ArmModel
+from armid_ros import ArmModel, Robot
 from armid_ros.errors import ModelError
 from armid_ros.estimate import ParameterName
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.recording import Recording
 from armid_ros.recording.recording import GAP_PERIODS
-from armid_ros.robots import Robot
 from armid_ros.simulation.closed_loop import CompiledLoop, run
 from armid_ros.simulation.controller import Controller, LinearFeedback
 from armid_ros.simulation.plant import Plant

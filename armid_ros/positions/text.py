@@ -7,11 +7,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+from armid_ros import Robot
 from armid_ros.api.table import Summary
 from armid_ros.estimate import measured
 from armid_ros.positions.fit import MAX_RESIDUAL_TO_NOISE, PositionFit, Run
 from armid_ros.recording import Recording
-from armid_ros.robots import Robot
 import numpy as np
 
 SCHEMA = 'armid/positions/1'
