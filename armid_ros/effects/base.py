@@ -19,24 +19,18 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar, Self, TYPE_CHECKING
+from typing import Any, ClassVar, Protocol, Self
 
-from armid_ros.effects.action import Action
+from armid_ros.effects.action import Action, Displacement
 from armid_ros.effects.quantities import joint_unit, places_among, Quantity, Shape
 from armid_ros.effects.traits import TRAITS, Traits
 from armid_ros.errors import meant, ModelError
 from armid_ros.estimate import ParameterName
+from armid_ros.model import LinkFrames
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.robots import Robot
 import numpy as np
 import numpy.typing as npt
-
-if TYPE_CHECKING:
-    from armid_ros.arm.arm_model import ArmModel as Arm
-else:
-    Arm = Any  # the arm model imports the effects
-
-__all__ = ['Arm', 'Effect', 'Unexplained']
 
 
 @dataclass(frozen=True)
@@ -238,7 +232,7 @@ class Effect(ABC):
         ----------
         unexplained : Unexplained
             The residual that the shape should explain.
-        arm : ArmModel
+        arm : Arm
             The arm without the effect.
 
         """
@@ -294,7 +288,7 @@ class Effect(ABC):
         ----------
         motion : Motion
             The recorded motion; a whole stretch without gaps, unless the effect is instantaneous.
-        arm : ArmModel
+        arm : Arm
             The arm model, with or without this effect.
 
         Returns
@@ -327,7 +321,7 @@ class Effect(ABC):
         ----------
         values : ndarray, shape (P,)
             Parameter values.
-        arm : ArmModel
+        arm : Arm
             The arm, with the preceding effects applied.
 
         """
@@ -381,3 +375,58 @@ class Unexplained:
     residual: FloatArray
     weight: FloatArray
     nuisance: FloatArray
+
+
+class Arm(Protocol):
+    """Protocol of a rigid body with effects, such as `armid_ros.arm.ArmModel`."""
+
+    @property
+    def robot(self) -> Robot:
+        """The described robot."""
+
+    @property
+    def body(self) -> Robot:
+        """Return the rigid body with effects, such as a payload or a changed gravity."""
+
+    @property
+    def middle_frames(self) -> LinkFrames:
+        """Frames of all links in the middle of the range of motion."""
+
+    def values_of(self, effect: Effect) -> FloatArray:
+        """Return the values of an effect, shape (P_e,)."""
+
+    def action(self) -> Action:
+        """Return the merged action of all effects."""
+
+    def link_motion(self, motion: Motion) -> Motion:
+        """Return the true motion of the links for a recorded motion."""
+
+    def link_frames(self, motion: Motion) -> LinkFrames:
+        """Return the frames of all links along a recorded motion."""
+
+    def smoothed(self, motion: Motion) -> Motion:
+        """Return a recorded motion without frequencies beyond its band."""
+
+    def load(self, motion: Motion) -> FloatArray:
+        """Return the torque of the rigid body along a motion of the links, (N, n) [N m]."""
+
+    def load_derivatives(self, motion: Motion) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Differentiate the load by position, velocity, acceleration, each (N, n, n)."""
+
+    def body_columns(self, motion: Motion) -> FloatArray:
+        """Return the regressor of the load along a recorded motion, (N, n, 10 n)."""
+
+    def gravity_columns(self, motion: Motion) -> FloatArray:
+        """Differentiate the load along a recorded motion by gravity, (N, n, 3)."""
+
+    def joint_torque(self, motion: Motion) -> FloatArray:
+        """Return the true torques of a recorded motion, (N, n) [N m]."""
+
+    def torque_before(self, effect: Effect, motion: Motion) -> FloatArray:
+        """Return the torque before the action of an effect on readings, (N, n) [N m]."""
+
+    def torque_change(self, motion: Motion, change: Displacement) -> FloatArray:
+        """Return the change of the true torque due to changes of the links' motion."""
+
+    def columns_of(self, effect: Effect, motion: Motion) -> FloatArray:
+        """Return the sensitivities of the torque readings to the parameters of an effect."""
