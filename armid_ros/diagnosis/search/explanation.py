@@ -200,11 +200,8 @@ def _unset(
 
     """
     nuisance = result.nuisance
-    rank, transform = nuisance.rank, nuisance.transform
-    values, covariance = nuisance.whole(result.under)
-    means, spread = transform @ values[:rank], transform @ covariance[:rank, :rank] @ transform.T
+    means, covariance = nuisance.whole(result.under)
     today, joints = np.flatnonzero(nuisance.rows.today).tolist(), nuisance.arm.robot.joints
-    back = np.linalg.inv(transform)
     residual = nuisance.squares_of_today(result.under)
     names = [(one.name, one.joint) for one in nuisance.base.parameters]
     for effect in unknown:
@@ -212,13 +209,13 @@ def _unset(
         if (parameter.name, parameter.joint) not in names:
             continue
         k = names.index((parameter.name, parameter.joint))
-        columns = [nuisance.columns[j][:, :, :rank] @ back[:, k] for j in today]
+        columns = [nuisance.columns[j][:, :, k] for j in today]
         square = float(sum(np.sum(x**2) for x in columns))
         count = max(sum(np.count_nonzero(x) for x in columns), 1)
         joint = joints.index(parameter.joint)
         sigma = float(nuisance.rows.sigma[-1][joint])
         rms = sigma * np.sqrt(square / count)
-        variance = float(spread[k, k])
+        variance = float(covariance[k, k])
         precision = max(float(nuisance.prior_precision[k, k]), 1e-12)  # of the prior
         odds = 0.5 * (means[k] ** 2 / variance + np.log(precision * variance))
         resolution = float(np.clip(1.0 - variance * precision, 0.0, 1.0))

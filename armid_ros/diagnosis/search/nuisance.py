@@ -42,7 +42,7 @@ _RELATIVE_PRIOR_STD = 0.25
 @dataclass(frozen=True)
 class Nuisance:
     """
-    Columns of body, friction and discrepancy, in coordinates with orthonormal body columns.
+    Columns of body, friction and discrepancy.
 
     Attributes
     ----------
@@ -52,8 +52,6 @@ class Nuisance:
         The model, with friction in all joints, given or not.
     base : BaseParameters
         The r parameters b of its body and friction.
-    transform : ndarray, shape (r, r)
-        Matrix from the coordinates x of the body columns to b, b = transform x.
     prior_precision : ndarray, shape (r, r)
         Prior precision of b.
     unset : ndarray of bool, shape (r,)
@@ -72,7 +70,6 @@ class Nuisance:
     rows: Rows
     arm: ArmModel
     base: BaseParameters
-    transform: FloatArray
     prior_precision: FloatArray
     unset: npt.NDArray[np.bool_]
     columns: tuple[FloatArray, ...]
@@ -120,13 +117,8 @@ class Nuisance:
         given = (base.independent >= rigid) & ~unset
         prior_precision[given, given] += (_RELATIVE_PRIOR_STD * values[given]) ** -2.0
         joints = range(arm.robot.n_joints)
-        flat = [x.reshape(-1, base.rank) for x in rows.weighted(columns, joints)]
-        transform = _orthonormal_transform(np.concatenate(flat), prior_precision, unset)
         functions = discrepancy_columns(rows.data, arm)
-        both = [
-            np.concatenate([x @ transform, own], axis=2)
-            for x, own in zip(columns, functions, strict=True)
-        ]
+        both = [np.concatenate(pair, axis=2) for pair in zip(columns, functions, strict=True)]
         rest = [part.residual(arm)[:, :, np.newaxis] for part in rows.data]
         weighted = rows.weighted(both, joints)
         residual = [x[:, :, 0] for x in rows.weighted(rest, joints)]
@@ -136,7 +128,6 @@ class Nuisance:
             rows,
             arm,
             base,
-            transform,
             prior_precision,
             unset,
             tuple(weighted),
@@ -147,7 +138,7 @@ class Nuisance:
     @property
     def rank(self) -> int:
         """Return the number of columns of the body."""
-        return len(self.transform)
+        return self.base.rank
 
     @cached_property
     def discrepancy(self) -> npt.NDArray[np.intp]:
@@ -168,9 +159,8 @@ class Nuisance:
     @cached_property
     def count(self) -> npt.NDArray[np.intp]:
         """Return the number of informative entries of each recording, (K,)."""
-        seen = [(w > 0.0)[:, :, np.newaxis].astype(float) for w in self.rows.weight]
-        joints = range(len(self.columns[0]))
-        return np.array([np.count_nonzero(x) for x in self.rows.weighted(seen, joints)])
+        folds = [part.fold for part in self.rows.data]
+        return np.bincount(folds, [np.count_nonzero(w) for w in self.rows.weight]).astype(int)
 
     @cached_property
     def square(self) -> FloatArray:
@@ -265,8 +255,9 @@ class Nuisance:
         unit = self.rows.amplitude[0]
         rigid = self.base.independent < len(self.arm.robot.rigid_parameters)
         scale = np.where(rigid, setting.body or 1.0, 1.0)
-        body = self.transform.T @ (self.prior_precision / np.outer(scale, scale)) @ self.transform
-        body += _MIN_PRECISION * np.eye(self.rank)
+        squares = np.diagonal(self.column_products[0], axis1=1, axis2=2).sum(axis=0)
+        body = self.prior_precision / np.outer(scale, scale)
+        body += _MIN_PRECISION * np.diag(squares[: self.rank])
         size = max(setting.shared, _MIN_PRECISION) * unit[:, np.newaxis] * self.reach
         of_causes = [one.size * one.unit for one in self.accepted]
         others = np.concatenate([size.ravel(), *of_causes]) ** -2.0
@@ -402,20 +393,3 @@ class Nuisance:
                     count = int(np.argmax(below)) if below.any() else len(correlation)
                     lengths.append(1.0 + 2.0 * float(correlation[:count].sum()))
         return max(float(np.median(lengths)) if lengths else least, 1.0)
-
-
-def _orthonormal_transform(
-    rows: FloatArray, precision: FloatArray, group: npt.NDArray[np.bool_]
-) -> FloatArray:
-    """Return the transform that makes columns (S, r) of two groups orthonormal, (r, r)."""
-    transform = np.zeros_like(precision)
-    for own in (np.flatnonzero(group), np.flatnonzero(~group)):
-        block = precision[np.ix_(own, own)]
-        scale = np.sqrt(np.sum(rows[:, own] ** 2, axis=0) + np.diag(block))
-        scale = np.where(scale > 0.0, scale, 1.0)
-        scaled = rows[:, own] / scale
-        size, axes = np.linalg.eigh(scaled.T @ scaled + block / np.outer(scale, scale))
-        transform[np.ix_(own, own)] = (
-            axes / np.sqrt(np.maximum(size, 1e-14)) / scale[:, np.newaxis]
-        )
-    return transform

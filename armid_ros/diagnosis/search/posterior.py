@@ -164,7 +164,7 @@ class JointFit:
 
     def arm_at(self, named: Sequence[NamedEffect], means: FloatArray) -> ArmModel:
         """Return the arm with the named causes, and with fitted body and friction if stated."""
-        change = self.nuisance.transform @ means[: self.nuisance.rank]
+        change = means[: self.nuisance.rank]
         arm, base, theta = self.arm, self.nuisance.base, self.arm.theta
         if self.stated and np.any(change):
             arm = arm.with_theta(base.lift(base.values(theta) + change, theta))

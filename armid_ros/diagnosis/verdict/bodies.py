@@ -27,12 +27,6 @@ import numpy as np
 _MAX_LOSS_RATIO = 1.05
 
 
-def as_placed_bodies(explanation: Explanation) -> tuple[Explanation, tuple[str, ...]]:
-    """Return the explanation with loads on outer links and possible bodies, and notes on names."""
-    found, notes = as_bodies(on_outer_link(explanation))
-    return found, notes if found.steps else ()
-
-
 def is_same_body(one: Trial, other: Trial, robot: Robot) -> bool:
     """
     Return whether two causes are one load, on the link before or after a turning joint.
@@ -112,6 +106,8 @@ def as_bodies(explanation: Explanation) -> tuple[Explanation, tuple[str, ...]]:
             bodily.chi2_per_row <= np.maximum(_MAX_LOSS_RATIO * explanation.chi2_per_row, 1.0)
         ):
             return bodily, ()
+    if not explanation.steps:
+        return explanation, ()
     return explanation, (
         'no physically consistent links explain the data as well: the fitted inertias contain a '
         'part of the cause, and a simulation with the patched model may fail',
@@ -121,14 +117,14 @@ def as_bodies(explanation: Explanation) -> tuple[Explanation, tuple[str, ...]]:
 def _products(problem: JointFit, fitted: Fitted) -> tuple[FloatArray, float]:
     """Return the products of the base columns and their target, and the number of rows."""
     nuisance, base = problem.nuisance, problem.nuisance.base
-    rank, back = nuisance.rank, np.linalg.inv(nuisance.transform)
+    rank = nuisance.rank
     then, now = (base.values(x.theta[: len(base.standard)]) for x in (problem.arm, fitted.arm))
     patched = problem.with_model(fitted.arm)
     products = np.zeros((rank + 1, rank + 1))
     for k, today in enumerate(nuisance.rows.today):
         values = now if today else then
-        square = back.T @ patched.column_products[0][k][:rank, :rank] @ back
-        residual = back.T @ patched.column_products[1][k][:rank]
+        square = patched.column_products[0][k][:rank, :rank]
+        residual = patched.column_products[1][k][:rank]
         target = residual + square @ values
         power = patched.power[k] + (residual + target) @ values
         products += np.block([[square, target[:, np.newaxis]], [target, power]])
