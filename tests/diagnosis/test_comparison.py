@@ -174,5 +174,5 @@ def test_a_value_that_motion_hardly_shows_has_a_possible_size(nuisance):
     """Gravity almost along an axis: an encoder offset of a million turns would explain a gap."""
     effect = CATALOGUE['encoder_offset'].on(nuisance.arm.robot, ('elbow',))
     columns = [np.full((*part.unsure.shape, 1), 1e-6) for part in nuisance.rows.data]
-    unit = value_unit(nuisance, effect, (0,), columns)
+    unit = value_unit(nuisance, effect, (0,), nuisance.rows.rms_today(columns))
     assert unit.item() == effect.quantities[0].largest('elbow', nuisance.arm.robot) < np.pi

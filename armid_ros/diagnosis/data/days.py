@@ -84,6 +84,14 @@ class Rows:
         count = np.sum([(self.weight[k] > 0.0).sum(axis=0) for k in self.today_parts], axis=0)
         return np.asarray(np.maximum(count, 1), dtype=float)
 
+    def rms_today(self, columns: Sequence[FloatArray]) -> FloatArray:
+        """Return the rms of columns (M, n, p) in the rows of the diagnosed day, (n, p)."""
+        squares = np.zeros(columns[0].shape[1:])
+        for k in self.today_parts:
+            moving = self.weight[k][:, :, np.newaxis] > 0.0
+            squares += np.sum(columns[k] ** 2, axis=0, where=moving)
+        return np.asarray(np.sqrt(squares / self.informative[:, np.newaxis]))
+
     @cached_property
     def torque(self) -> FloatArray:
         """Root mean square torque where joints move, shape (n,) [N m]."""

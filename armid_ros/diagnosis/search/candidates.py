@@ -19,7 +19,6 @@ from math import comb
 from types import MappingProxyType
 
 from armid_ros.arm import ArmModel
-from armid_ros.diagnosis.data.days import Rows
 from armid_ros.diagnosis.data.trajectory import Trajectory
 from armid_ros.diagnosis.search.cause import Cause
 from armid_ros.diagnosis.search.nuisance import Nuisance
@@ -169,19 +168,6 @@ class Causes:
         """Return the columns of an effect in each trajectory, (M, n, p)."""
         return [part.columns(self.nuisance.arm, effect) for part in self._predicted]
 
-    def renewed(self, cause: Cause) -> Cause:
-        """Return a cause of another comparison with products for these nuisance columns."""
-        columns = [x[:, :, list(cause.kept)] for x in self._columns(cause.effect)]
-        return cause_of(
-            self.nuisance,
-            cause.effect,
-            cause.kept,
-            columns,
-            cause.unit,
-            cause.prior,
-            cause.torque,
-        )
-
     def reshaped(self, cause: Cause, shape: FloatArray) -> Cause | None:
         """Return a cause with another shape; None if the shape is impossible or has no torque."""
         try:
@@ -204,7 +190,7 @@ class Causes:
 
         """
         rows, robot = self.nuisance.rows, self.nuisance.arm.robot
-        torque = _torque_of(columns, rows)
+        torque = rows.rms_today(columns)
         seen = torque.any(axis=0)
         resting = [~columns[k].any(axis=(1, 2)) for k in rows.today_parts]
         taut = float(np.mean(np.concatenate(resting))) < _MIN_SHARE_AT_REST
@@ -215,26 +201,23 @@ class Causes:
             effect,
             tuple(kept[k] for k in np.flatnonzero(seen).tolist()),
             [x[:, :, seen] for x in columns],
-            _unit(effect, kept, torque, rows, robot)[seen],
+            value_unit(self.nuisance, effect, kept, torque)[seen],
             log_prior(effect, robot, self.changed)
             + HOW_OFTEN[self.prior.get(effect.name, 'usual')],
             torque[:, seen],
         )
 
 
-def _torque_of(columns: Sequence[FloatArray], rows: Rows) -> FloatArray:
-    """Return the rms torque per unit of each column on the diagnosed day, (n, p) [N m]."""
-    squares = np.zeros((len(rows.torque), columns[0].shape[2]))
-    for k in rows.today_parts:
-        moving = rows.weight[k][:, :, np.newaxis] > 0.0
-        squares += np.sum(columns[k] ** 2, axis=0, where=moving)
-    return np.asarray(np.sqrt(squares / rows.informative[:, np.newaxis]))
-
-
-def _unit(
-    effect: Effect, kept: Sequence[int], torque: FloatArray, rows: Rows, robot: Robot
+def value_unit(
+    nuisance: Nuisance, effect: Effect, kept: Sequence[int], torque: FloatArray
 ) -> FloatArray:
-    """Return values whose torque equals that of the joint, limited to plausible values."""
+    """
+    Return values whose torque equals that of the joint, limited to plausible values, (p,).
+
+    The torque per unit is the root mean square on the diagnosed day, (n, p) [N m].
+
+    """
+    rows, robot = nuisance.rows, nuisance.arm.robot
     spread = effect.spread(robot)
     if len(spread) == len(effect.owners) * len(effect.quantities):
         most = [q.largest(owner, robot) for owner in effect.owners for q in effect.quantities]
@@ -244,14 +227,6 @@ def _unit(
         spread = (float(robot.rigid_parameters[::10].sum()) * _BODY_SIZES)[list(kept)]
     largest = 1.0 / np.maximum(np.max(torque / rows.torque[:, np.newaxis], axis=0), 1e-12)
     return np.asarray(np.minimum(largest, np.where(spread > 0.0, spread, np.inf)))
-
-
-def value_unit(
-    nuisance: Nuisance, effect: Effect, kept: Sequence[int], columns: Sequence[FloatArray]
-) -> FloatArray:
-    """Return the unit of the values of an effect, (p,), from its columns (M, n, p)."""
-    rows = nuisance.rows
-    return _unit(effect, kept, _torque_of(columns, rows), rows, nuisance.arm.robot)
 
 
 def cause_of(

@@ -122,7 +122,9 @@ class CauseComparison:
         nuisance = self.nuisance
         for one in before.nuisance.accepted:
             if not one.effect.joints:
-                nuisance = nuisance.and_cause(self.catalogue.renewed(one), one.size)
+                cause = self.catalogue.reshaped(one, np.array(one.effect.shape))
+                assert cause is not None  # it had torques in the other gravity as well
+                nuisance = nuisance.and_cause(cause, one.size)
         under = self._likeliest(nuisance)
         return replace(before, accepted=accepted, nuisance=nuisance, under=under)
 

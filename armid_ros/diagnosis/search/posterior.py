@@ -259,7 +259,7 @@ class JointFit:
                 for k, part in enumerate(rows.data)
             ]
             only = [x[:, :, : len(kept)] for x in columns]
-            unit = value_unit(self.nuisance, own.effect, own.kept, only)
+            unit = value_unit(self.nuisance, own.effect, own.kept, rows.rms_today(only))
             # without a default, a shape is a position of 0.1 rad or m
             least = [abs(s.default) or 0.1 for s in own.effect.shapes]
             size = np.tile(least, len(own.effect.owners))
