@@ -250,13 +250,10 @@ def _as_diagnosis(
         gap,
     )
     word, doubt = doubted(word, doubt, found, given, before)
-    worst_data = max(
-        zip(both, of_residual, strict=True), key=lambda one: float(one[1].ratio.max())
-    )[0]
+    worst = int(np.argmax([one.ratio.max() for one in of_residual]))
     new = np.max([np.zeros(arm.robot.n_joints), *(one.ratio for one in laws)], axis=0) > 1.0
-    left = locate_remaining_gap(explanation, worst_data, settings, new)
-    explained = unseen or evidence
-    places = locate_explained(explanation, explained, settings) if found else left
+    left = locate_remaining_gap(explanation, both[worst], settings, new)
+    places = locate_explained(explanation, unseen or evidence, settings) if found else left
     explainer.tell(1.0, word.word)
     share = settings.thresholds.headline
     small = [one for one in found if settings.everything and one.share < share]
