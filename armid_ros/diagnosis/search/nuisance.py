@@ -255,9 +255,9 @@ class Nuisance:
         unit = self.rows.amplitude[0]
         rigid = self.base.independent < len(self.arm.robot.rigid_parameters)
         scale = np.where(rigid, setting.body or 1.0, 1.0)
-        squares = np.diagonal(self.column_products[0], axis1=1, axis2=2).sum(axis=0)
+        squares = np.diagonal(self.column_products[0], axis1=1, axis2=2).sum(axis=0)[: self.rank]
         body = self.prior_precision / np.outer(scale, scale)
-        body += _MIN_PRECISION * np.diag(squares[: self.rank])
+        body += _MIN_PRECISION * np.diag(np.where(squares > 0.0, squares, 1.0))
         size = max(setting.shared, _MIN_PRECISION) * unit[:, np.newaxis] * self.reach
         of_causes = [one.size * one.unit for one in self.accepted]
         others = np.concatenate([size.ravel(), *of_causes]) ** -2.0
