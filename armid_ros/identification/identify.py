@@ -36,7 +36,6 @@ from armid_ros.identification.physical.fit_among_bodies import (
 from armid_ros.identification.rows.checks import (
     beyond_limits,
     check_motion,
-    check_stamps,
     check_torque,
     too_short_to_tell,
 )
@@ -55,7 +54,7 @@ from armid_ros.identification.rows.signals import (
     no_stretch,
     SignalSettings,
 )
-from armid_ros.identification.rows.stamps import check_recordings
+from armid_ros.identification.rows.stamps import check_recordings, uneven_stamps
 from armid_ros.identification.rows.temperature import at_mean_temperature
 from armid_ros.model import BaseParameters
 from armid_ros.motion import FloatArray
@@ -375,19 +374,18 @@ def _require_samples(
     used: Conditioning,
 ) -> None:
     """Raise an error for fewer than two torques per parameter."""
-    samples = sum(len(part.motion) for part in columns)
     filtered = {part.source for part in columns}
     for recording in recordings:
         if recording.source not in filtered:
-            check_stamps([recording], used)
             raise no_stretch(recording, used)
     if sum(part.tau.size for part in columns) < 2 * theory.rank:
-        check_stamps(recordings, used)
-        raise IdentificationError(
-            f'{recordings[0].source}: {samples} samples remain after filtering at '
-            f'{used.cutoff_hz:g} Hz and decimation by {used.decimation}; {theory.rank} parameters '
-            'need more: record longer, or lower --decimation'
+        uneven = filter(None, (uneven_stamps(one, used.cutoff_hz) for one in recordings))
+        few = (
+            f'{recordings[0].source}: {sum(len(part.motion) for part in columns)} samples remain '
+            f'after filtering at {used.cutoff_hz:g} Hz and decimation by {used.decimation}; '
+            f'{theory.rank} parameters need more: record longer, or lower --decimation'
         )
+        raise IdentificationError(next(uneven, few))
 
 
 def _remarks(fit: FittedValues, theory: BaseParameters) -> tuple[str, ...]:

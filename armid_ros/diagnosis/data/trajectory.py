@@ -17,7 +17,7 @@ from functools import cached_property
 from armid_ros.arm import ArmModel
 from armid_ros.arm.memoized_arm import rigid_rows
 from armid_ros.effects import Effect
-from armid_ros.identification.rows.checks import check_stamps, moving
+from armid_ros.identification.rows.checks import moving
 from armid_ros.identification.rows.period import find_period
 from armid_ros.identification.rows.regression import Stretch
 from armid_ros.identification.rows.signals import (
@@ -179,7 +179,6 @@ def trajectories(
         slowest = _REVERSAL_NOISE * velocity_error(recording, used)
         motions = list(segments(recording, used))
         if not motions:
-            check_stamps([recording], used)
             raise no_stretch(recording, used)
         sensors = None
         if recording.partner is not None and arm is not None:

@@ -77,9 +77,8 @@ def sensor_faults(
         Filters.
 
     """
-    band_hz = min(used.kept_hz, *(part.motion.band_hz for part in rows))
     for one in recordings:
-        uneven = uneven_stamps(one, used.cutoff_hz, band_hz)
+        uneven = uneven_stamps(one, used.cutoff_hz)
         if uneven:
             yield Fault(f'in {uneven}', 'poor')
         if one.report.restarted:

@@ -9,8 +9,6 @@ from collections.abc import Iterable, Sequence
 from armid_ros.arm import ArmModel
 from armid_ros.errors import IdentificationError
 from armid_ros.identification.rows.regression import Regression, REST_SPEED
-from armid_ros.identification.rows.signals import Conditioning
-from armid_ros.identification.rows.stamps import uneven_stamps
 from armid_ros.model import inverse_dynamics, regressor
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.recording import Recording
@@ -96,14 +94,6 @@ def too_short_to_tell(recordings: Sequence[Recording]) -> tuple[str, ...]:
     """Return a note if the total time of recordings is short."""
     duration = sum(recording.duration for recording in recordings)
     return (f'{duration:.2g} s is short; record 20 s or more',) if duration < 5.0 else ()
-
-
-def check_stamps(recordings: Sequence[Recording], used: Conditioning) -> None:
-    """Raise an error for uneven timestamps if little data remains."""
-    for recording in recordings:
-        uneven = uneven_stamps(recording, used.cutoff_hz, used.kept_hz)
-        if uneven:
-            raise IdentificationError(uneven)
 
 
 def moving(motions: Iterable[Motion]) -> npt.NDArray[np.bool_]:

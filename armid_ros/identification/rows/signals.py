@@ -18,7 +18,7 @@ from functools import cached_property
 from typing import Literal
 
 from armid_ros.errors import IdentificationError
-from armid_ros.identification.rows.stamps import check_recordings
+from armid_ros.identification.rows.stamps import check_recordings, uneven_stamps
 from armid_ros.model import points_motion
 from armid_ros.motion import FloatArray, Motion, MovingPoints, read_only
 from armid_ros.recording import Recording
@@ -236,7 +236,10 @@ def _shortest(used: Conditioning) -> float:
 
 
 def no_stretch(recording: Recording, used: Conditioning) -> IdentificationError:
-    """Return the error for recordings without a long enough stretch, with the required length."""
+    """Return the error for a recording without a long enough stretch, with the cause."""
+    uneven = uneven_stamps(recording, used.cutoff_hz)
+    if uneven:
+        return IdentificationError(uneven)
     spans = [recording.t[part[[0, -1]]] for part in unbroken(recording, used.rate_hz)]
     longest = max(float(last - first) for first, last in spans)
     left = longest - _shortest(used) + _CUTOFF_PERIODS / used.cutoff_hz

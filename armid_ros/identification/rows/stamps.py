@@ -10,14 +10,17 @@ from armid_ros.errors import IdentificationError
 from armid_ros.recording import Recording
 import numpy as np
 
-#: Share of uneven time steps above which stamps are uneven. A step is uneven if it differs by half
-#: of the median or more, or is less than half of the mean.
+#: Share of short time steps above which stamps are uneven, and of equal stamps above which they
+#: are rounded.
 _UNEVEN_SHARE = 0.05
 
 
-def uneven_stamps(recording: Recording, cutoff_hz: float, band_hz: float) -> str:
+def uneven_stamps(recording: Recording, cutoff_hz: float) -> str:
     """
     Return a message on time stamps that are too uneven; empty otherwise.
+
+    Lost samples only make steps longer; varying delays of stamps make short steps too. Windows of
+    50 stamps are compared with an even grid: jitter, but no slow drift of the clock.
 
     Parameters
     ----------
@@ -25,29 +28,19 @@ def uneven_stamps(recording: Recording, cutoff_hz: float, band_hz: float) -> str
         The data.
     cutoff_hz : float
         Cut-off frequency of the position filter [Hz].
-    band_hz : float
-        Highest frequency of motion in the rows [Hz].
 
     """
-    steps = np.diff(recording.t)
-    if len(steps) == 0:
+    steps, window = np.diff(recording.t), 50
+    if len(recording) < window or np.mean(steps < 0.5 * np.mean(steps)) <= _UNEVEN_SHARE:
+        return ''
+    windows = recording.t[: len(recording) // window * window].reshape(-1, window).T
+    line = np.linalg.qr(np.column_stack([np.ones(window), np.arange(window)]))[0]
+    squares = np.mean((windows - line @ (line.T @ windows)) ** 2, axis=0)
+    # largest harmless error due to jitter, as a share of a signal at the cut-off
+    if not 2.0 * np.pi * cutoff_hz * float(np.sqrt(np.median(squares))) > 0.1:
         return ''
     median = float(np.median(steps))
     uneven = float(np.mean(np.abs(steps - median) > 0.5 * median))
-    jitter = float(np.sqrt(np.mean(np.minimum(np.abs(steps - median), median) ** 2)))
-    # largest harmless error due to jitter, as a share of a signal at the upper end of the band
-    harmless = 0.1
-    # Lost samples only make steps longer; varying delays of stamps make short steps too. Windows
-    # of 50 stamps are compared with an even grid: jitter, but no slow drift of the clock.
-    window, deviation = 50, 0.0
-    if len(recording) >= window and np.mean(steps < 0.5 * np.mean(steps)) > _UNEVEN_SHARE:
-        windows = recording.t[: len(recording) // window * window].reshape(-1, window).T
-        line = np.linalg.qr(np.column_stack([np.ones(window), np.arange(window)]))[0]
-        squares = np.mean((windows - line @ (line.T @ windows)) ** 2, axis=0)
-        deviation = float(np.sqrt(np.median(squares)))
-    jitters = uneven > _UNEVEN_SHARE and 2.0 * np.pi * band_hz * jitter > harmless
-    if not jitters and not 2.0 * np.pi * cutoff_hz * deviation > harmless:
-        return ''
     return (
         f'{recording.source or "recording"}: {100 * uneven:.0f} % of the time stamps are uneven '
         'by more than half a period; record with the stamps of the driver'
@@ -109,18 +102,16 @@ def two_senders(recording: Recording) -> str:
     """
     Return a message on positions that alternate between two tracks; empty otherwise.
 
-    A message has another sender than its neighbours if some joint is far from both, the two are
-    near each other, and the step is faster than usual motion. Such messages form a separate track;
-    values of a faulty encoder are scattered.
+    A message has another sender than its neighbours if some joint is far from both, and the two
+    are near each other. Such messages form a separate track; values of a faulty encoder are
+    scattered.
 
     """
     t, q = recording.t, recording.q
-    # fewer contradicted messages, or less than 1 %, are faulty samples
-    fewest = max(20, 0.01 * len(t))
     if len(t) < 40:
         return ''
-    # rows of each joint whose message is far from both neighbours in the same direction, with
-    # the step and its sign; joint by joint, as the arrays of one fit into the cache
+    # rows of each joint whose message is far from both neighbours in the same direction; joint by
+    # joint, as the arrays of one fit into the cache
     found = []
     for joint in range(recording.n_joints):
         steps = np.diff(q[:, joint])
@@ -128,27 +119,13 @@ def two_senders(recording: Recording) -> str:
         step = np.minimum(np.abs(before), np.abs(after))
         # a step below 1e-3 [rad or m] may be noise at rest
         apart = step > np.maximum(1e-3, 5.0 * np.abs(across))
-        rows = np.flatnonzero(apart & (before * after > 0.0))
-        found.append((rows, step[rows], before[rows] > 0.0))
-    if sum(len(rows) for rows, *_ in found) < fewest:
+        found.append(np.flatnonzero(apart & (before * after > 0.0)))
+    # fewer contradicted messages, or less than 1 %, are faulty samples
+    if len(np.unique(np.concatenate(found))) < max(20, 0.01 * len(t)):
         return ''
-    # a speed that each joint seldom exceeds, from recorded velocities if available
-    time = t[2:] - t[:-2]
-    usual = np.median(np.abs(q[2:] - q[:-2]) / time[:, np.newaxis], axis=0)
-    if recording.dq is not None and np.any(recording.dq):
-        usual = np.percentile(np.abs(recording.dq), 99, axis=0)
-    for joint, parts in enumerate(found):
-        fast = parts[1] > usual[joint] * time[parts[0]]
-        found[joint] = tuple(part[fast] for part in parts)
-    if len(np.unique(np.concatenate([rows for rows, *_ in found]))) < fewest:
-        return ''
-    joint = int(np.argmax([len(rows) for rows, *_ in found]))
-    rows, step, side = found[joint]
-    jump = float(np.median(step))
-    own = [np.abs(np.diff(q[rows[one] + 1, joint])) for one in (side, ~side) if one.sum() > 1]
-    # a jump between two senders is at least three times as large as the steps of one sender
-    if not own or 3.0 * float(np.median(np.concatenate(own))) > jump:
-        return ''
+    joint = int(np.argmax([len(rows) for rows in found]))
+    rows = found[joint]
+    jump = float(np.median(np.abs(q[rows + 1, joint] - q[rows, joint])))
     # A second sender of less than a fifth of the messages sends between those of the first. If
     # gaps remain without its messages, these are faults of an encoder.
     if len(rows) < 0.2 * len(t) and np.median(t[rows + 2] - t[rows]) > 1.5 * recording.period:

@@ -122,10 +122,7 @@ class ErrorModel:
         # the largest acceleration of an arm is twice its 95 % quantile, which is 1.96 standard
         # deviations of a normal variable
         white, smooth = np.sqrt(self.white), np.sqrt(1.0 - self.white) * (2.0 * 1.96)
-        tails = self.quantile * self.growth(noise, acceleration)
-        return np.asarray(
-            self.size * np.minimum(tails, self.quantile * white * noise + smooth * acceleration)
-        )
+        return np.asarray(self.size * (self.quantile * white * noise + smooth * acceleration))
 
     @cached_property
     def limits_of_a_period(self) -> FloatArray:
