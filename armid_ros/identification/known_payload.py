@@ -19,6 +19,7 @@ from pathlib import Path
 from armid_ros.arm import ArmModel
 from armid_ros.errors import IdentificationError, meant
 from armid_ros.files.cells import listed, parted
+from armid_ros.identification.rows.checks import residual_of_fit
 from armid_ros.identification.rows.regression import predictions, regressions
 from armid_ros.identification.rows.signals import conditioning, segments, SignalSettings
 from armid_ros.motion import FloatArray
@@ -221,15 +222,14 @@ def _gain(
     """Return the coefficient of the known torque, its std, and the 95 % half-width."""
     scale = np.linalg.norm(columns, axis=0)
     columns = columns[:, scale > 0.0] / scale[scale > 0.0]
-    # The coefficient is that of the column's residual after the other columns (Frisch, Waugh).
-    column = known - columns @ np.linalg.lstsq(columns, known, rcond=1e-10)[0]
+    # the coefficient is that of the column's residual after the other columns (Frisch, Waugh)
+    column, target = residual_of_fit(np.column_stack([known, tau]), columns).T
     size = float(column @ column)
     # the joint's own columns explain the torque of the payload
     if size <= 1e-8 * float(known @ known):
         return 1.0, np.inf, np.inf
-    gain = float(column @ tau) / size
-    residual = tau - gain * known
-    residual = residual - columns @ np.linalg.lstsq(columns, residual, rcond=1e-10)[0]
+    gain = float(column @ target) / size
+    residual = target - gain * column
     scores = np.bincount(np.unique(blocks, return_inverse=True)[1], weights=column * residual)
     count = len(scores)
     std = float(np.sqrt(count / (count - 1.0) * np.sum(scores**2)) / size)
