@@ -123,19 +123,10 @@ class ParameterFile:
 
     def information(self, parameters: Sequence[ParameterName]) -> FloatArray | None:
         """
-        Return the information matrix of the standard parameters.
+        Return the information matrix of the P standard parameters of a model, (P, P).
 
-        It is zero in directions that the values do not determine.
-
-        Parameters
-        ----------
-        parameters : sequence of ParameterName
-            The P parameters of a model, rigid ones and those of effects.
-
-        Returns
-        -------
-        ndarray, shape (P, P), or None
-            None if the file does not have it.
+        It is zero in directions that the values do not determine, such as those of effects that
+        the file does not have. None if the file has no covariance.
 
         """
         if self.covariance is None or len(self.terms) < len(self.values):

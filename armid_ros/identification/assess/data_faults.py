@@ -49,25 +49,8 @@ def check_data(
     """
     Check recordings for faults of the data before a diagnosis.
 
-    Parameters
-    ----------
-    arm : ArmModel
-        Model to compare the data with.
-    recordings : sequence of Recording
-        The unprocessed recordings.
-    used : Conditioning
-        Filters.
-    data : sequence of Stretch
-        The data in rows.
-    before : sequence of Recording
-        Baseline, whose torques have the unit of the model.
-
-    Returns
-    -------
-    faults : list of str
-        Faults that make a diagnosis meaningless, with remedies.
-    notes : list of str
-        Notes for the user.
+    Returns faults that make a diagnosis meaningless, with remedies, and notes. `data` are the
+    recordings in rows; the torques of the baseline `before` have the unit of the model.
 
     """
     sensors = list(sensor_faults(arm, recordings, data, used))
@@ -123,16 +106,8 @@ def mistaken_recordings(
     """
     Return the mistakes in names, signs or units of each recording, with remedies.
 
-    A mistake that is in every recording is found by `check_data`.
-
-    Parameters
-    ----------
-    arm : ArmModel
-        The model.
-    recordings : sequence of (Recording, ndarray of bool, shape (n,))
-        Recordings, and joints that may be wrong there because other recordings differ.
-    used : Conditioning
-        Filters.
+    Each recording comes with the joints, (n,), that may be wrong there because other recordings
+    differ. A mistake that is in every recording is found by `check_data`.
 
     """
     found = []
@@ -150,18 +125,9 @@ def unit_faults(
     Return notes on the unit of torques, by a model with friction or by a baseline.
 
     If the torque of a joint is mostly friction, as in a wrist, the fitted friction hides a wrong
-    unit; see `mistakes`. A model with known friction, or a baseline, reveals the unit.
-    Errors of the model's masses are the same in the baseline and cancel.
-
-    Parameters
-    ----------
-    arm : ArmModel
-        The model.
-    motions : sequence of Motion
-        Filtered motions with torque.
-    before : sequence of Motion
-        Filtered motions of a baseline, to which factors are relative. Without it, factors of
-        most joints may be due to wrong masses of the model and are no fault.
+    unit; see `mistakes`. A model with known friction, or a baseline, reveals the unit. Errors of
+    the model's masses are the same in the baseline and cancel. Without a baseline, factors of most
+    joints may be due to wrong masses of the model and are no fault.
 
     """
     factors, robot = _factors_since(arm, motions, before), arm.robot

@@ -79,7 +79,7 @@ def grade(
     held_out: Sequence[Recording] = (),
 ) -> Grade:
     """
-    Grade an identification.
+    Grade an identification by its recordings, and by predictions of held-out ones.
 
     Parameters
     ----------
@@ -87,12 +87,10 @@ def grade(
         The identification.
     description : ArmModel
         Model before the identification.
-    recordings : sequence of Recording
-        Recordings of the fit.
+    recordings, held_out : sequence of Recording
+        Recordings of the fit, and those of `validation`.
     validation : mapping of str to sequence of Fit
-        Predictions of recordings that were not used for fitting, by recording.
-    held_out : sequence of Recording
-        The recordings of `validation`.
+        Predictions of held-out recordings, by recording.
 
     """
     every, _ = without_damage([*recordings, *held_out], result.used)
@@ -242,9 +240,9 @@ def beyond_noise(errors: FloatArray, fits: Sequence[Fit], used: Conditioning) ->
 
     The noise is computed from the median of second differences (Gasser, Sroka and Jennen-Steinmetz
     1986): torques of motion change little from row to row, and friction jumps in few rows only.
-    Noise enters twice: in a row, and in its prediction, which is as uncertain as a measurement
-    at a leverage of one (Hoaglin and Welsch 1978). An error as large as the sensor's is no error
-    of the model.
+    Noise enters twice: in a row, and in its prediction, which is as uncertain as a measurement at
+    a leverage of one (Hoaglin and Welsch 1978). An error as large as the sensor's is no error of
+    the model.
 
     Parameters
     ----------

@@ -105,23 +105,10 @@ def shared_mistakes(
     robot: Robot, recordings: Sequence[Recording], used: Conditioning, *, refit: bool = True
 ) -> list[tuple[Mistake, tuple[str, ...]]]:
     """
-    Find the mistakes in recordings, grouped by kind and joint.
+    Find the mistakes in recordings with torques, grouped by kind and joint.
 
-    Parameters
-    ----------
-    robot : Robot
-        Robot of the description.
-    recordings : sequence of Recording
-        Data with torques.
-    used : Conditioning
-        Filters that the recordings are identified with.
-    refit : bool
-        Whether a mistake counts that only a fitted body reveals.
-
-    Returns
-    -------
-    list of (Mistake, tuple of str)
-        The mistake in the recording with the largest error, and the sources of all of them.
+    Returns the mistake in the recording with the largest error, and the sources of all of them.
+    Without `refit`, a mistake does not count that only a fitted body reveals.
 
     """
     by_kind: dict[tuple[object, ...], list[tuple[str, Mistake]]] = {}
@@ -153,23 +140,10 @@ def find_mistake(
     robot: Robot, recording: Recording, used: Conditioning, *, refit: bool = True
 ) -> Mistake | None:
     """
-    Find the most likely mistake in a recording.
+    Find the most likely mistake in a recording with torques, filtered as for the identification.
 
-    Parameters
-    ----------
-    robot : Robot
-        Robot of the description.
-    recording : Recording
-        Data with torques.
-    used : Conditioning
-        Filters that the recording is identified with.
-    refit : bool
-        Whether a mistake counts that only a fitted body reveals.
-
-    Returns
-    -------
-    Mistake or None
-        None if the recorded data fit best, or if errors of the links may be the cause.
+    None if the recorded data fit best, or if errors of the links may be the cause. Without
+    `refit`, a mistake does not count that only a fitted body reveals.
 
     """
     slow = slow_motions([recording], used)
@@ -285,15 +259,6 @@ def torque_delay(robot: Robot, recording: Recording, used: Conditioning) -> Dela
     column is the rate of the rigid-body torque; friction with several presliding lengths is a
     nuisance. In a reversed motion, the rigid-body torque is the same, but its rate and friction
     have the opposite sign. Errors of described masses therefore do not look like a delay.
-
-    Parameters
-    ----------
-    robot : Robot
-        Robot of the description.
-    recording : Recording
-        Data with torques.
-    used : Conditioning
-        Filters that the recording is identified with.
 
     """
     longest = 0.3  # longest delay that is tested [s]

@@ -151,18 +151,8 @@ def common_values(motion: Motion, fixed: FloatArray, columns: FloatArray) -> Flo
     """
     Fit values that all joints share, such as gravity, with friction and drives as nuisance.
 
-    Parameters
-    ----------
-    motion : Motion
-        N samples with torque.
-    fixed : ndarray, shape (N, n)
-        Known part of the torque [N m or N].
-    columns : ndarray, shape (N, n, k)
-        Regressor of the values.
-
-    Returns
-    -------
-    ndarray, shape (k,)
+    The motion has N samples with torque, of which `fixed`, (N, n) [N m or N], is known. The
+    regressor of the k values has shape (N, n, k). Returns the values, (k,).
 
     """
     assert motion.tau is not None

@@ -65,16 +65,8 @@ def sensor_faults(
     """
     Yield faults of clocks and sensors, and undriven joints at another position.
 
-    Parameters
-    ----------
-    arm : ArmModel
-        Model to compare the data with.
-    recordings : sequence of Recording
-        The recordings, with torques and without damaged samples (`damage`).
-    rows : sequence of Stretch
-        The data in rows.
-    used : Conditioning
-        Filters.
+    The recordings have torques, and no damaged samples (`damage`); `rows` are the same data in
+    rows.
 
     """
     for one in recordings:
@@ -197,16 +189,7 @@ def units_beyond_drives(
     Yield notes on torques in another unit, by the limits of the drives.
 
     There is no note if most joints exceed their limits, or if the described links need as much
-    torque: then the described limits are wrong.
-
-    Parameters
-    ----------
-    robot : Robot
-        Robot of the description.
-    recordings : sequence of Recording
-        Recordings to check, with torques.
-    motions : sequence of Motion
-        Filtered motions of the recordings.
+    torque along the filtered motions: then the described limits are wrong.
 
     """
     measured = [recording.tau for recording in recordings if recording.tau is not None]
@@ -346,17 +329,8 @@ def held_elsewhere(
     Yield undriven joints off their described position, if the torque error is relevant.
 
     If such a joint moves, or carries driven joints at another position, the arm differs from the
-    model. The size of this error is the change of the described torque along the recorded motion,
-    over the measured torque.
-
-    Parameters
-    ----------
-    robot : Robot
-        Robot of the description.
-    recordings : sequence of Recording
-        Recordings with the ranges of all other joints.
-    motions : sequence of Motion
-        Motions of the driven joints, with torques.
+    model. The size of this error is the change of the described torque along the recorded motions
+    of the driven joints, over the measured torque.
 
     """
     for joint in held_joints(robot):

@@ -282,25 +282,11 @@ def simulate_held_out(
     progress: Progress = lambda share, what: None,
 ) -> tuple[tuple[ForwardValidation, ...], tuple[str, ...]]:
     """
-    Simulate two models in closed loop along held-out recordings.
+    Simulate two models in closed loop along recordings that neither was fitted to.
 
-    Parameters
-    ----------
-    before, after : ArmModel
-        Description and identified arm; the second one defines the feedback of both.
-    used : Conditioning
-        Filters.
-    held_out : sequence of Recording
-        Data that neither model was fitted to.
-    progress : callable, optional
-        Called with the finished share, 0 to 1, and the present task.
-
-    Returns
-    -------
-    pairs : tuple of ForwardValidation
-        Results, one per simulated recording.
-    left_out : tuple of str
-        Omitted tests, with reasons.
+    Returns a result per simulated recording, and omitted tests with reasons. The second model
+    defines the feedback of both. `progress` is called with the finished share, 0 to 1, and the
+    present task.
 
     """
     if not held_out:

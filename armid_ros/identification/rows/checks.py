@@ -52,19 +52,7 @@ SILENT = 'the torque of every joint is constant; fill in effort'
 
 def check_motion(robot: Robot, recordings: Sequence[Recording]) -> tuple[str, ...]:
     """
-    Raise an error for recordings without usable motion.
-
-    Parameters
-    ----------
-    robot : Robot
-        Robot of the recordings.
-    recordings : sequence of Recording
-        Recordings to check.
-
-    Returns
-    -------
-    tuple of str
-        Notes, such as joints that are at rest throughout.
+    Return notes on recordings, such as joints at rest; raise an error without usable motion.
 
     Raises
     ------
@@ -174,15 +162,8 @@ def driven_by_friction(robot: Robot, motions: Sequence[Motion]) -> str:
     """
     Return an error on joints whose torque clearly has the opposite sign of friction, or ''.
 
-    The described torque, weight and inertia are fitted per joint and subtracted. The residual of
-    a wrist is friction, the only evidence for the sign of its torque.
-
-    Parameters
-    ----------
-    robot : Robot
-        The description.
-    motions : sequence of Motion
-        Motions of the recordings, with torques.
+    The described torque, weight and inertia are fitted per joint and subtracted. The residual of a
+    wrist is friction, the only evidence for the sign of its torque.
 
     """
     found, whole = [], joined(motions)
@@ -213,25 +194,11 @@ def laws_of_controllers(
 
     Gravity compensation outputs the weight of the arm while a hand moves it; energy shaping
     outputs a constant torque in the direction of motion. Such a torque does not contain the torque
-    of inertia. A fit then attributes everything to friction, or finds an arm without mass.
+    of inertia. A fit then attributes everything to friction, or finds an arm without mass. If only
+    some joints follow such a law, the model lacks their inertia instead, and there is no message.
 
-    If only some joints follow such a law, the model lacks their inertia instead. There is no
-    result if the motion is too short to test most joints.
-
-    Parameters
-    ----------
-    robot : Robot
-        The arm.
-    motion : Motion
-        Filtered motion with the torque filtered alike, R samples of n joints.
-    informative : ndarray of bool, shape (R, n)
-        False where a joint is at rest.
-
-    Returns
-    -------
-    tuple of str
-        A sentence for each such joint, with the remedy; none if any driven joint obeys no law, or
-        if at least as many joints cannot be tested.
+    The motion has R samples, with the torque filtered alike; `informative`, (R, n), is false where
+    a joint is at rest. There is no message if at least as many joints cannot be tested.
 
     """
     # rows where a joint reverses, and three on either side, which filters smear
@@ -341,15 +308,8 @@ def torque_factors(arm: ArmModel, motions: Sequence[Motion]) -> tuple[FloatArray
     """
     Regress measured torques on those of a model, after an offset is removed.
 
-    If the model has no effects, friction is removed as well. Otherwise only samples in motion
-    are used, as friction holds a joint at rest with any torque.
-
-    Parameters
-    ----------
-    arm : ArmModel
-        The model, or the described body alone.
-    motions : sequence of Motion
-        The data, with torques.
+    If the model has no effects, friction is removed as well. Otherwise only samples in motion are
+    used, as friction holds a joint at rest with any torque.
 
     Returns
     -------

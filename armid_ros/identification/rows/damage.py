@@ -32,17 +32,11 @@ def without_damage(
     recordings: Sequence[Recording], used: Conditioning
 ) -> tuple[list[Recording], tuple[str, ...]]:
     """
-    Interpolate across damaged samples.
+    Interpolate across damaged samples; return the recordings, and notes on the damage.
 
     A torque sample is damaged if it changes a filtered row by more than noise does. Before any
-    fit, the noise is assumed as a share of the spread of the torque.
-
-    Returns
-    -------
-    list of Recording
-        Repaired recordings; a recording without damage is the same object.
-    tuple of str
-        Notes on the damage: recording, number of samples, and the first of them.
+    fit, the noise is assumed as a share of the spread of the torque. A recording without damage is
+    the same object.
 
     """
     peak = float(np.max(used.taps) / np.sum(used.taps))

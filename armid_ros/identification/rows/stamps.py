@@ -17,17 +17,10 @@ _UNEVEN_SHARE = 0.05
 
 def uneven_stamps(recording: Recording, cutoff_hz: float) -> str:
     """
-    Return a message on time stamps that are too uneven; empty otherwise.
+    Return a message on time stamps too uneven for a cut-off of positions [Hz]; empty otherwise.
 
     Lost samples only make steps longer; varying delays of stamps make short steps too. Windows of
     50 stamps are compared with an even grid: jitter, but no slow drift of the clock.
-
-    Parameters
-    ----------
-    recording : Recording
-        The data.
-    cutoff_hz : float
-        Cut-off frequency of the position filter [Hz].
 
     """
     steps, window = np.diff(recording.t), 50

@@ -60,16 +60,8 @@ def friction_per_kelvin(arm: ArmModel, estimate: Estimate, scatter: FloatArray) 
     """
     Return a note on each joint with its relative slopes of friction with temperature.
 
-    The 95 % intervals are those of noise, or those of the differences between recordings if wider.
-
-    Parameters
-    ----------
-    arm : ArmModel
-        The identified model.
-    estimate : Estimate
-        Estimate of its parameters.
-    scatter : ndarray, shape (K, r)
-        Jackknife changes of the estimated values without each recording.
+    The 95 % intervals are those of noise, or those of the differences between recordings if wider:
+    `scatter`, (K, r), has the jackknife changes of the estimated values without each recording.
 
     """
     rows = {(name.name, name.joint): k for k, name in enumerate(estimate.parameters)}

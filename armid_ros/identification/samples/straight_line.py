@@ -259,14 +259,7 @@ class NoiseLevel:
         """
         Measure the usual errors of the first samples, some of which may be damaged.
 
-        Parameters
-        ----------
-        innovations : sequence of Innovation
-            The prediction errors.
-        moves : ndarray, shape (k, m)
-            Differences between successive samples.
-        period : float
-            Sampling period [s].
+        `moves`, (k, m), are the differences between successive samples; the period is in s.
 
         """
         self.add_steps(moves)
