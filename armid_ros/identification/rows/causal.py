@@ -351,20 +351,15 @@ class RowNoise:
     @classmethod
     def of(cls, period: float, motion_pole: float, row_pole: float) -> RowNoise:
         """Return the noise behind motion filter and row filter, given their poles [rad/s]."""
-        # integrate the squared gain of both filters over frequency, both signs [Hz]
-        nyquist = 0.5 / period
-        f = np.linspace(0.0, min(nyquist, 20.0 * row_pole / (2.0 * np.pi)), 4001)
-        w = 2.0 * np.pi * f
-        power = 1.0 / ((1.0 + (w / motion_pole) ** 2) * (1.0 + (w / row_pole) ** 2)) ** 3
-        bandwidth = float(2.0 * np.trapezoid(power, f))
-        gain = float(np.sqrt(period * bandwidth))
-        # the largest value of the impulse response of both filters in series [1/s]
-        ratio = motion_pole / row_pole  # time in units of the row filter
-        response = signals.impulse(
+        # impulse response of both filters in series, over and in units of the row filter's pole;
+        # its square has the integral of the squared gain over all frequencies (Parseval)
+        ratio = motion_pole / row_pole
+        times, response = signals.impulse(
             ([], [-ratio] * 3 + [-1.0] * 3, ratio**3), T=np.linspace(0, 20, 401)
         )
-        peak = float(row_pole * np.max(response[1]))
-        return cls(bandwidth, gain, gain / (period * peak))
+        bandwidth = float(row_pole * np.trapezoid(response**2, times))
+        gain = float(np.sqrt(period * bandwidth))
+        return cls(bandwidth, gain, gain / (period * row_pole * float(np.max(response))))
 
     def independent(self, step: float) -> float:
         """Return the number of independent observations in a row, `step` [s] after the last."""

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from armid_ros.errors import IdentificationError
 from armid_ros.recording import Recording
 import numpy as np
+from scipy import signal
 
 #: Share of short time steps above which stamps are uneven, and of equal stamps above which they
 #: are rounded.
@@ -27,8 +28,7 @@ def uneven_stamps(recording: Recording, cutoff_hz: float) -> str:
     if len(recording) < window or np.mean(steps < 0.5 * np.mean(steps)) <= _UNEVEN_SHARE:
         return ''
     windows = recording.t[: len(recording) // window * window].reshape(-1, window).T
-    line = np.linalg.qr(np.column_stack([np.ones(window), np.arange(window)]))[0]
-    squares = np.mean((windows - line @ (line.T @ windows)) ** 2, axis=0)
+    squares = np.mean(signal.detrend(windows, axis=0) ** 2, axis=0)
     # largest harmless error due to jitter, as a share of a signal at the cut-off
     if not 2.0 * np.pi * cutoff_hz * float(np.sqrt(np.median(squares))) > 0.1:
         return ''
