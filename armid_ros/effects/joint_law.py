@@ -60,7 +60,7 @@ class JointLaw(Effect):
     def columns(self, motion: Motion, arm: Arm) -> FloatArray:
         """Return the law along a motion, shape (N, n, P)."""
         side = arm.link_motion(motion) if self.on_links else motion
-        own = self.indices(motion.joints)
+        own, _ = _flat_places(self.joints, motion.joints, len(self.quantities))
         states = (part[:, own] for part in (side.q, side.dq, direction(side)))
         return _placed(self, motion, self.law(JointStates(motion.t[:, np.newaxis], *states)))
 
@@ -119,7 +119,7 @@ def joint_columns(effect: Effect, motion: Motion, *quantities: FloatArray) -> Fl
         Zero where a parameter belongs to another joint.
 
     """
-    own = effect.indices(motion.joints)
+    own, _ = _flat_places(effect.joints, motion.joints, len(quantities))
     return _placed(effect, motion, [values[:, own] for values in quantities])
 
 
@@ -151,7 +151,7 @@ def _placed(effect: Effect, motion: Motion, quantities: Sequence[FloatArray]) ->
     """Return the columns of quantities of the joints of an effect, each (N, k)."""
     size = len(quantities) * len(effect.joints)
     columns = np.zeros((len(motion), motion.n_joints * size))
-    places = _flat_places(effect.joints, motion.joints, len(quantities))
+    _, places = _flat_places(effect.joints, motion.joints, len(quantities))
     for place, values in zip(places, quantities, strict=True):
         columns[:, place] = values
     return columns.reshape(len(motion), motion.n_joints, size)
@@ -160,8 +160,8 @@ def _placed(effect: Effect, motion: Motion, quantities: Sequence[FloatArray]) ->
 @lru_cache(maxsize=1024)
 def _flat_places(
     joints: tuple[str, ...], among: tuple[str, ...], count: int
-) -> tuple[npt.NDArray[np.intp], ...]:
-    """Return the columns of each quantity in a flattened sample."""
+) -> tuple[npt.NDArray[np.intp], tuple[npt.NDArray[np.intp], ...]]:
+    """Return indices of joints, and of the columns of each quantity in a flattened sample."""
     own = np.array(places_among(joints, among), dtype=np.intp)
     size = count * len(own)
-    return tuple(own * size + np.arange(first, size, count) for first in range(count))
+    return own, tuple(own * size + np.arange(first, size, count) for first in range(count))
