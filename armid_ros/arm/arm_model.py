@@ -226,11 +226,6 @@ class ArmModel:
         """Return the frames of all links along a recorded motion."""
         return LinkFrames.of(self.robot, self.link_motion(motion).q)
 
-    @cached_property
-    def middle_frames(self) -> LinkFrames:
-        """Frames of all links in the middle of the range of motion."""
-        return LinkFrames.in_the_middle(self.robot)
-
     def load(self, motion: Motion) -> FloatArray:
         """Return the torque of the rigid body along a motion of the links, (N, n) [N m]."""
         return inverse_dynamics(self.body, self.felt(motion))

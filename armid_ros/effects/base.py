@@ -388,10 +388,6 @@ class Arm(Protocol):
     def body(self) -> Robot:
         """Return the rigid body with effects, such as a payload or a changed gravity."""
 
-    @property
-    def middle_frames(self) -> LinkFrames:
-        """Frames of all links in the middle of the range of motion."""
-
     def values_of(self, effect: Effect) -> FloatArray:
         """Return the values of an effect, shape (P_e,)."""
 

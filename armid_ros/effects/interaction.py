@@ -121,8 +121,9 @@ class HumanInteraction(Attached):
     shapes = _ATTACHMENT_SHAPES
 
     def _anchor(self, arm: Arm) -> Anchor:
+        frames = LinkFrames.in_the_middle(arm.robot)
         points = zip(self.joints, self._attachments, strict=True)
-        middle = np.stack([arm.middle_frames.places(joint, point) for joint, point in points], 1)
+        middle = np.stack([frames.places(joint, point) for joint, point in points], axis=1)
         return lambda t: (middle, np.zeros((1, 1, 3)))
 
     def _columns(
