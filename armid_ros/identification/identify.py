@@ -294,7 +294,7 @@ def _among_bodies(
     asked = replace(settings, physical=known)
     theory, fit = _fitted(arm, theory, data, asked, rng)
     try:
-        found = fit_to_bodies(arm, fit, *data[2:], asked.least_squares, known, rng)
+        found = fit_to_bodies(arm, fit, *data[2:], asked.least_squares, known)
     except IdentificationError:
         if settings.physical is not None:
             raise

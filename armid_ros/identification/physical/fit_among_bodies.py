@@ -19,11 +19,11 @@ from typing import Any
 from armid_ros.arm import ArmModel
 from armid_ros.errors import IdentificationError
 from armid_ros.estimate import ParameterName
-from armid_ros.identification.fitting.identifiability import bounds, excited
+from armid_ros.identification.fitting.identifiability import bounds
 from armid_ros.identification.fitting.least_squares import informative_solution, Method, solve
-from armid_ros.identification.fitting.nonlinear import agree, FittedValues, through, torques
+from armid_ros.identification.fitting.nonlinear import agree, FittedValues, linearised, torques
 from armid_ros.identification.physical.physical_program import Box, box_conditions, PhysicalProgram
-from armid_ros.identification.rows.regression import regressions, weighted_rows
+from armid_ros.identification.rows.regression import weighted_rows
 from armid_ros.identification.rows.signals import Conditioning, TORQUE_RESOLUTION
 from armid_ros.model import BaseParameters
 from armid_ros.model.pseudo_inertia import Consistency, link_parameters, pseudo_inertia
@@ -216,7 +216,6 @@ def fit_to_bodies(
     used: Conditioning,
     method: Method,
     settings: PhysicalSettings,
-    rng: np.random.Generator,
 ) -> tuple[FittedValues, PhysicalCertificate]:
     """
     Fit physically consistent links, starting at an unconstrained fit.
@@ -235,8 +234,6 @@ def fit_to_bodies(
         See ``solve``.
     settings : PhysicalSettings
         Further knowledge of masses and shapes.
-    rng : numpy.random.Generator
-        Generator of the random states from which base parameters are found.
 
     Returns
     -------
@@ -251,18 +248,12 @@ def fit_to_bodies(
         return fit, certificate
     for passes in range(1, 8):
         promised = tuple(part.torque(fit.values) for part in fit.problem)
-        predicted = torques(fit.arm, recordings, used)
+        problem, predicted = linearised(fit.arm, fit.base, recordings, used)
         fit = replace(fit, predicted=predicted, passes=free.passes + passes)
         if agree(fit.problem, fit.solution.weights, promised, predicted):
             return replace(fit, settled=free.settled), certificate
-        # linearise about the fit in the parameters that are identifiable there, and solve
-        theory = fit.arm.base_parameters(rng)
-        columns = regressions(fit.arm, theory.independent, recordings, used)
-        base, problem = excited(theory, columns)
-        values = base.values(fit.arm.theta)
-        problem = through(problem, fit.predicted, values)
-        solution = solve(problem, method, bounds(fit.arm, base))
-        fit = replace(fit, base=base, values=values, problem=problem, solution=solution)
+        solution = solve(problem, method, bounds(fit.arm, fit.base))
+        fit = replace(fit, problem=problem, solution=solution)
         fit, certificate = _bodies(arm, fit, settings)
     predicted = torques(fit.arm, recordings, used)
     return replace(fit, predicted=predicted, settled=False), certificate
