@@ -18,12 +18,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import Any
 
 from armid_ros.arm import ArmModel
 from armid_ros.errors import ArmidError, IdentificationError
-from armid_ros.identification.fitting.instruments import check_noise, linear_problem, NoiseCheck
+from armid_ros.identification.fitting.instruments import check_noise, NoiseCheck
+from armid_ros.identification.fitting.nonlinear import linearised
 from armid_ros.identification.identify import Identification
 from armid_ros.identification.rows.signals import Conditioning, decimate, segments
 from armid_ros.motion import FloatArray, Motion
@@ -254,9 +254,8 @@ def verify(
     # number of simulations with enough samples in total for the bias of encoder noise
     repeats = 300_000 // max(1, sum(len(recording) for recording in recordings))
     try:
-        linear = result.passes == 1
         noise = check_noise(
-            partial(linear_problem, result.arm, result.base, used=result.used, linear=linear),
+            lambda some: linearised(result.arm, result.base, some, result.used)[0],
             result.estimate,
             result.settings.least_squares,
             recordings,

@@ -23,7 +23,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
-from armid_ros.arm import ArmModel
 from armid_ros.errors import IdentificationError
 from armid_ros.estimate import Estimate
 from armid_ros.identification.fitting.covariance import noise_products, sandwich
@@ -36,14 +35,13 @@ from armid_ros.identification.fitting.nonlinear import (
     torques,
     ungrouped,
 )
-from armid_ros.identification.rows.regression import Regression, regressions, weighted_rows
+from armid_ros.identification.rows.regression import Regression, weighted_rows
 from armid_ros.identification.rows.signals import (
     Conditioning,
     even_positions,
     mean_spectrum,
     unbroken,
 )
-from armid_ros.model import BaseParameters
 from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording
 import numpy as np
@@ -77,18 +75,18 @@ def fit_by_instruments(
         Filters.
 
     """
-    base, free, linear = fit.base, ungrouped(fit.arm, fit.base), fit.passes == 1
+    base, free = fit.base, ungrouped(fit.arm, fit.base)
     limits, weights = bounds(fit.arm, base), fit.solution.weights
     calm = _smoothed(recordings, used)
     # the torque of an arm may be nonlinear in its parameters
     for _ in range(4):
-        exact = linear_problem(fit.arm, base, calm, used, linear=linear)
+        exact, _ = linearised(fit.arm, base, calm, used)
         found = _by_instruments(fit.problem, [part.columns for part in exact], weights, limits)
         step = np.abs(found.values - fit.values) / np.sqrt(np.diag(found.covariance))
         solution = replace(fit.solution, values=found.values, covariance=found.covariance)
         arm = moved(fit.arm, base, found.values, free)
         fit = replace(fit, arm=arm, values=found.values, solution=solution)
-        if linear:
+        if fit.passes == 1:
             return replace(fit, predicted=torques(arm, recordings, used))
         problem, predicted = linearised(arm, base, recordings, used)
         fit = replace(fit, problem=problem, predicted=predicted)
@@ -157,20 +155,6 @@ def _smoothed(recordings: Sequence[Recording], used: Conditioning) -> list[Recor
             q[part] = signal.sosfiltfilt(sections, recording.q[part], axis=0, padlen=edge)
         calm.append(replace(recording, q=q, dq=None))
     return calm
-
-
-def linear_problem(
-    arm: ArmModel,
-    base: BaseParameters,
-    recordings: Sequence[Recording],
-    used: Conditioning,
-    *,
-    linear: bool,
-) -> Sequence[Regression]:
-    """Return the linear problem of an arm, with a constant term if its torque is nonlinear."""
-    if linear:
-        return regressions(arm, base.independent, recordings, used)
-    return linearised(arm, base, recordings, used)[0]
 
 
 @dataclass(frozen=True)
@@ -276,7 +260,7 @@ def check_noise(
     Parameters
     ----------
     problem_of : callable
-        Function that returns the linear problem of recordings; see `linear_problem`.
+        Function that returns the linear problem of recordings.
     estimate : Estimate
         Estimate of the identification.
     method : {'ols', 'wls', 'irls'}

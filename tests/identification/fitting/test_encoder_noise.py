@@ -1,14 +1,10 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 from dataclasses import replace
-from functools import partial
 
 from armid_ros.identification import IdentificationSettings, identify, SignalSettings
-from armid_ros.identification.fitting.instruments import (
-    check_noise,
-    linear_problem,
-    position_noise,
-)
+from armid_ros.identification.fitting.instruments import check_noise, position_noise
+from armid_ros.identification.fitting.nonlinear import linearised
 import numpy as np
 import pytest
 
@@ -29,8 +25,9 @@ def checked(arm, structure, motion, torque_noise, position_noise, seed=0):
 
 
 def noise_check(result, recording, seed, repeats):
-    linear = result.passes == 1
-    problem_of = partial(linear_problem, result.arm, result.base, used=result.used, linear=linear)
+    def problem_of(some):
+        return linearised(result.arm, result.base, some, result.used)[0]
+
     fitted = result.estimate, result.settings.least_squares, [recording], result.used
     return check_noise(problem_of, *fitted, rng=np.random.default_rng(seed), repeats=repeats)
 
