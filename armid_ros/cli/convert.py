@@ -96,9 +96,9 @@ def _table(
 
 def _bag(path: Path, out: Path | None) -> None:
     from armid_ros.cli import options
+    from armid_ros.recording import copy_bag
     from armid_ros.recording.bag import is_ros1, topics
     from armid_ros.recording.columns import refuse_columns
-    from armid_ros.recording.copying import copy_bag
 
     refuse_columns(path, columns.settings(), copied=True)
     if out is None:

@@ -149,6 +149,6 @@ def _of_some_size(text: str, robot: Robot) -> tuple[Effect, FloatArray]:
 def recover(file: Path, out: Path) -> None:
     """Repair a recording whose writer was killed; the file itself does not change."""
     from armid_ros.cli import options
-    from armid_ros.recording import recover as run
+    from armid_ros.recording import copy_bag
 
-    say(run(file, out, options.read_settings()).describe())
+    say(copy_bag(file, out, options.read_settings()).describe())

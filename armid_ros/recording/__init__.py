@@ -10,7 +10,7 @@ raw messages for the nodes. ROS is not needed.
 """
 
 from armid_ros.recording.bag import topics
-from armid_ros.recording.copying import recover
+from armid_ros.recording.copying import copy_bag
 from armid_ros.recording.joint_state.encoder import (
     joint_state_cdr,
     write_joint_states,
@@ -41,7 +41,7 @@ __all__ = [
     'BagWriter',
     'write_joint_trajectory',
     'read_waypoints',
-    'recover',
+    'copy_bag',
     'write_joint_states',
     'joint_state_cdr',
     'Topic',

@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-import os
 from pathlib import Path
 
 from armid_ros.errors import RecordingError
@@ -55,17 +54,17 @@ class Copied:
         )
 
 
-def recover(file: str | Path, out: str | Path, settings: ReadSettings = DEFAULT) -> Copied:
+def copy_bag(path: str | Path, out: str | Path, settings: ReadSettings = DEFAULT) -> Copied:
     """
-    Copy the readable part of an MCAP file into a complete bag, with index and metadata.yaml.
+    Copy the readable messages of a bag into a complete bag, with index and metadata.yaml.
 
-    Complete chunks are copied if their checksum is correct. If the file ends inside a chunk, the
+    Complete chunks are copied if their checksum is correct. If a file ends inside a chunk, the
     messages before the end are copied.
 
     Parameters
     ----------
-    file : str or Path
-        The file, which is not changed. A directory with a single .mcap file may be given instead.
+    path : str or Path
+        A bag or a file of a bag of ROS 2, or the .bag of ROS 1; it is not changed.
     out : str or Path
         Bag directory to create; it must not exist.
     settings : ReadSettings
@@ -74,64 +73,21 @@ def recover(file: str | Path, out: str | Path, settings: ReadSettings = DEFAULT)
     Raises
     ------
     RecordingError
-        If the file is not an MCAP file, has no message, or ``out`` exists.
-
-    """
-    path = Path(file)
-    if path.is_dir():
-        files = sorted(path.glob('*.mcap'))
-        if len(files) != 1:
-            listed = ', '.join(file.name for file in files) or 'none'
-            raise RecordingError(
-                f'{path}: a directory stands for its only .mcap file, but it has {listed}; '
-                'recover files one by one'
-            )
-        path = files[0]
-    if not os.path.lexists(path):
-        raise RecordingError(f'{path}: there is no such file')
-    with Bag(path, settings) as bag:
-        if next(bag.messages(), None) is None:
-            raise RecordingError(
-                f'{path}: there is no message to recover; {bag.damage or "the file is whole"}'
-            )
-        return _copied(bag, out)
-
-
-def copy_bag(path: Path, out: Path, settings: ReadSettings = DEFAULT) -> Copied:
-    """
-    Copy a bag message by message.
-
-    Parameters
-    ----------
-    path : Path
-        The .bag of ROS 1, or a bag of ROS 2.
-    out : Path
-        Bag directory to create; it must not exist.
-    settings : ReadSettings
-        Which checks are made when the bag is read, and the memory limit.
-
-    Raises
-    ------
-    RecordingError
-        If the bag cannot be read, or has no type that ROS 2 has.
+        If the bag cannot be read, has no message of a type that ROS 2 has, or ``out`` exists.
 
     """
     with Bag(path, settings) as bag:
-        return _copied(bag, out)
-
-
-def _copied(bag: Bag, out: str | Path) -> Copied:
-    """Write the topics and messages of a bag to a new bag."""
-    topics = bag.topics()
-    left_out = tuple(
-        f'{one.name} ({one.type_name})' for one in topics if one.encoding == UNREADABLE
-    )
-    if len(left_out) == len(topics):
-        raise RecordingError(
-            f'{bag.path}: no topic has a message type of ROS 2; left out: '
-            f'{"; ".join(left_out) or "the bag is empty"}'
+        topics = bag.topics()
+        left_out = tuple(
+            f'{one.name} ({one.type_name})' for one in topics if one.encoding == UNREADABLE
         )
-    with whole_bag(out) as writer:
-        writer.copy(bag)
+        if next(bag.messages(), None) is None:
+            unknown = f'ROS 2 has no type of {"; ".join(left_out)}' if left_out else ''
+            raise RecordingError(
+                f'{path}: there is no message to copy; '
+                f'{bag.damage or unknown or "the file is whole"}'
+            )
+        with whole_bag(out) as writer:
+            writer.copy(bag)
     start, end = writer.time_range
     return Copied(bag.path, writer.path, writer.topics, bag.damage, (end - start) * 1e-9, left_out)

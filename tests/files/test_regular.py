@@ -10,7 +10,7 @@ from armid_ros.excitation import load_environment, load_excitation
 from armid_ros.files import read_text, regular
 from armid_ros.identification.parameters_file import read_parameters
 from armid_ros.papers.exo.plant.gait import read_gait
-from armid_ros.recording import read_recording, recover
+from armid_ros.recording import copy_bag, read_recording
 from armid_ros.recording.bag import Bag
 from armid_ros.recording.tables import open_table
 from armid_ros.robots import load_robot
@@ -28,7 +28,7 @@ READERS = {
     'bag.db3': Bag,
     'bag.mcap.zstd': Bag,
     'bag.db3.zstd': lambda path: read_recording(path, joints=['a']),
-    'cut.mcap': lambda path: recover(path, path.parent / 'out'),
+    'cut.mcap': lambda path: copy_bag(path, path.parent / 'out'),
     'metadata.yaml': lambda path: Bag(path.parent),
     'bag.bag': Bag,
     **{f'table.{end}': open_table for end in ('csv', 'csv.gz', 'npz', 'mat', 'h5', 'parquet')},

@@ -8,10 +8,10 @@ import struct
 from armid_ros.errors import RecordingError
 from armid_ros.recording import (
     BagWriter,
+    copy_bag,
     read_recording,
     read_robot_description,
     ReadSettings,
-    recover,
     topics,
     write_recording,
 )
@@ -61,7 +61,7 @@ def test_a_damaged_chunk_is_left_out_and_said_with_its_time(bag, tmp_path):
     assert 0 < left.sum() < 300
     np.testing.assert_array_equal(got.q, recording.q[left])
     assert len(list(iter_raw(path))) == left.sum()
-    report = recover(path, tmp_path / 'out')
+    report = copy_bag(path, tmp_path / 'out')
     assert report.damage and report.messages == left.sum()
     again = read_recording(tmp_path / 'out', joints=JOINTS)
     np.testing.assert_array_equal(again.tau, recording.tau[left])
@@ -140,7 +140,7 @@ def test_a_message_logged_after_2262_is_left_out_and_said(make_swing, tmp_path):
         change(path, fifth + field, b'\xff' * 8)
         crc = chunk.begin - 8 - len(chunk.compression) - 8
         change(path, crc, bytes(4))  # no checksum
-        report = recover(path, tmp_path / f'out{field}')
+        report = copy_bag(path, tmp_path / f'out{field}')
         assert report.messages == 299 and '2262' in report.damage
         assert len(read_recording(path, joints=JOINTS)) == 299
 
@@ -225,7 +225,7 @@ def test_a_recovered_bag_is_whole(bag, tmp_path, assert_same):
         cut.write_bytes(content[:size])
         as_read = read_recording(cut, joints=JOINTS)
         out = tmp_path / f'recovered{number}'
-        report = recover(cut, out)
+        report = copy_bag(cut, out)
         assert cut.read_bytes() == content[:size]
         again = read_recording(out, joints=JOINTS)
         assert_same(again, recording, slice(0, len(as_read)))
@@ -245,12 +245,12 @@ def test_recovery_keeps_types_qos_and_times(swinging, stamps, messages_of, tmp_p
         )
         writer.write('/own', bytes(12), 6000, 5500)
         path = writer.file
-    report = recover(path, tmp_path / 'out')
+    report = copy_bag(path, tmp_path / 'out')
     assert list(iter_raw(tmp_path / 'out')) == list(iter_raw(tmp_path / 'bag'))
     assert topics(tmp_path / 'out') == topics(tmp_path / 'bag')
     assert read_robot_description(tmp_path / 'out') == '<robot/>'
     assert 'whole' in report.describe()
-    assert recover(tmp_path / 'bag', tmp_path / 'again').messages == 2
+    assert copy_bag(tmp_path / 'bag', tmp_path / 'again').messages == 2
 
 
 def test_recovery_refuses_what_it_cannot_do(swinging, tmp_path):
@@ -264,5 +264,5 @@ def test_recovery_refuses_what_it_cannot_do(swinging, tmp_path):
         (writer.file, tmp_path / 'out', 'empty_0.mcap: '),
     ):
         with pytest.raises(RecordingError, match=fact):
-            recover(source, out)
+            copy_bag(source, out)
     assert not (tmp_path / 'out').exists()
