@@ -254,7 +254,7 @@ def read_recording(
 
 def topics_of(path: Path, settings: ReadSettings = DEFAULT) -> tuple[Topic, ...]:
     """Return the topics of a bag; empty for a table."""
-    return () if reader.is_table(path) else reader.bag_contents(path, settings)
+    return () if reader.is_table(path) else reader.topics(path, settings)
 
 
 def _numbers(given: _Numbers) -> tuple[float, ...]:

@@ -96,8 +96,8 @@ def _table(
 
 def _bag(path: Path, out: Path | None) -> None:
     from armid_ros.cli import options
-    from armid_ros.recording import copy_bag
-    from armid_ros.recording.bag import is_ros1, topics
+    from armid_ros.recording import copy_bag, topics
+    from armid_ros.recording.bag import is_ros1
     from armid_ros.recording.columns import refuse_columns
 
     refuse_columns(path, columns.settings(), copied=True)

@@ -9,14 +9,13 @@ raw messages for the nodes. ROS is not needed.
 
 """
 
-from armid_ros.recording.bag import topics
 from armid_ros.recording.copying import copy_bag
 from armid_ros.recording.joint_state.encoder import (
     joint_state_cdr,
     write_joint_states,
     write_recording,
 )
-from armid_ros.recording.reader import read_recording, read_robot_description
+from armid_ros.recording.reader import read_recording, read_robot_description, topics
 from armid_ros.recording.recording import (
     given_twice,
     ReadReport,

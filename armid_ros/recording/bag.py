@@ -36,20 +36,6 @@ _STORAGES: dict[str, type[Source]] = {'.mcap': McapSource, '.db3': SqliteSource}
 _COMPRESSED = ('.zstd', '.zst')
 
 
-def topics(path: str | Path, settings: ReadSettings = DEFAULT) -> tuple[Topic, ...]:
-    """
-    Return the topics of a bag, with types, definitions, QoS and counts.
-
-    Raises
-    ------
-    RecordingError
-        If the path is not a readable bag.
-
-    """
-    with Bag(path, settings) as bag:
-        return bag.topics()
-
-
 class Bag(Source):
     """Source of the messages of all files of a bag; a context manager."""
 

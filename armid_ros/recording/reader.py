@@ -317,9 +317,8 @@ def _decoded(bag: Bag, topic: Topic, decoder: JointStateDecoder) -> Iterator[Joi
 
 def choose_topics(bag: Bag, joints: Sequence[str] | None, wanted: str | None) -> tuple[Topic, ...]:
     """Return the topic to read, or several topics that together name all joints."""
-    topics = bag.topics()
-    candidates = [topic for topic in topics if topic.type_name == JOINT_STATE]
-    candidates = candidates or [topic for topic in topics if holds_joint_state(topic)]
+    there = [topic for topic in bag.topics() if holds_joint_state(topic)]
+    candidates = [topic for topic in there if topic.type_name == JOINT_STATE] or there
     if wanted is not None or not candidates:
         return (bag.topic_of(JOINT_STATE, wanted, holds_joint_state),)
     if joints is None or len(candidates) == 1:
@@ -353,9 +352,11 @@ def named_joints(bag: Bag, topic: Topic) -> tuple[str, ...]:
     return decoder.names_seen
 
 
-def bag_contents(path: str | Path, settings: ReadSettings = DEFAULT) -> tuple[Topic, ...]:
+def topics(path: str | Path, settings: ReadSettings = DEFAULT) -> tuple[Topic, ...]:
     """
-    Return the topics of a bag; topics of JointState with their joint names.
+    Return the topics of a bag, with types, definitions, QoS and counts.
+
+    Topics of JointState have the names of their joints, too.
 
     Raises
     ------

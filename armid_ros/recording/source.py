@@ -98,7 +98,7 @@ class Topic:
         Serialisation of the messages: 'cdr' in ROS 2, `UNREADABLE` if the source cannot return
         them.
     joints : tuple of str
-        Joints that its first messages name; set by `bag_contents`.
+        Joints that its first messages name; set by `topics`.
 
     """
 

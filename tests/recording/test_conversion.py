@@ -3,9 +3,8 @@
 """A JointState inside another message or compressed is read; one of another schema is refused."""
 
 from armid_ros.errors import RecordingError
-from armid_ros.recording import read_recording
+from armid_ros.recording import read_recording, topics
 from armid_ros.recording.message_types import JOINT_STATE, JOINT_STATE_HASH, message_type
-from armid_ros.recording.reader import bag_contents
 from mcap.writer import Writer as McapFileWriter
 import numpy as np
 import pytest
@@ -100,7 +99,7 @@ def test_what_holds_a_joint_state_is_read(made, swinging, stamps, tmp_path, asse
     read = read_recording(path, joints=JOINTS)
     assert_same(read, swinging)
     assert read.report.clean
-    assert any(topic.joints == JOINTS for topic in bag_contents(path))
+    assert any(topic.joints == JOINTS for topic in topics(path))
 
 
 def test_the_type_hash_is_that_of_ros():

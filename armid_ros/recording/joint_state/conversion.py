@@ -36,7 +36,17 @@ def joint_state_blocks(bag: Bag, topic: Topic) -> Iterator[MessageBlock]:
         If messages are not in CDR, or the bag defines JointState in another way than ROS 2.
 
     """
-    require_standard(bag, topic)
+    where = f'{bag.path}: {topic.name}'
+    if topic.encoding != 'cdr':
+        raise RecordingError(
+            f"{where} is serialised as '{topic.encoding}'; CDR of ROS 2 can be read: record it "
+            'with ros2 bag record'
+        )
+    if not _standard(topic.message_type):
+        raise RecordingError(
+            f'{where}: the bag defines {JOINT_STATE} in another way than ROS 2; record the type '
+            'of sensor_msgs'
+        )
     if topic.type_name == JOINT_STATE:
         yield from bag.blocks(topic.name)
         return
@@ -52,21 +62,6 @@ def joint_state_blocks(bag: Bag, topic: Topic) -> Iterator[MessageBlock]:
             except Exception:  # the decoder will count such messages as malformed
                 messages.append(bytes(4))
         yield MessageBlock.joined(messages, block.log_time, block.publish_time)
-
-
-def require_standard(bag: Bag, topic: Topic) -> None:
-    """Raise a RecordingError unless the JointState of a topic is that of ROS 2 in CDR."""
-    where = f'{bag.path}: {topic.name}'
-    if topic.encoding != 'cdr':
-        raise RecordingError(
-            f"{where} is serialised as '{topic.encoding}'; CDR of ROS 2 can be read: record it "
-            'with ros2 bag record'
-        )
-    if not _standard(topic.message_type):
-        raise RecordingError(
-            f'{where}: the bag defines {JOINT_STATE} in another way than ROS 2; record the type '
-            'of sensor_msgs'
-        )
 
 
 def _inside(described: MessageType) -> str:

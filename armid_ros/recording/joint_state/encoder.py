@@ -131,7 +131,7 @@ def write_recording(
     Raises
     ------
     RecordingError
-        The bag exists already, or names and columns do not agree.
+        The bag exists already, or a stamp is negative.
 
     Examples
     --------
@@ -143,11 +143,6 @@ def write_recording(
 
     """
     joints = tuple(measured.joints)
-    if measured.q.shape != (len(measured.t), len(joints)):
-        raise RecordingError(
-            f'{path}: {len(measured.t)} samples of {len(joints)} joints ({", ".join(joints)}) '
-            f'cannot be written from an array of shape {measured.q.shape}'
-        )
     if start_ns is None:
         start_ns = int(getattr(measured, 'start_ns', 0)) or 10**9
     stamps = start_ns + np.rint(np.asarray(measured.t) * 1e9).astype(np.int64)

@@ -161,18 +161,13 @@ def choose(
         return family
     assert joints is not None
     fit = ', '.join(column.name for column in members.values())
-    if all(label.isdigit() for label in labels):
-        problem = (
-            f'{len(found)} columns fit ({fit}), and there are {len(joints)} joints '
-            f'({", ".join(joints)}); name the columns in the order of the joints, with commas'
-        )
-    else:
-        lacking = ', '.join(joint for joint in joints if joint not in names)
-        problem = (
-            f'{fit} fit, and no column is that of {lacking}; columns are matched by joint name '
-            'or number: see --rename and --joints'
-        )
-    raise RecordingError(f"{table.source}: for {quantity}, '{pattern}': {problem}")
+    lacking = ', '.join(joint for joint in joints if joint not in names)
+    raise RecordingError(
+        f"{table.source}: for {quantity}, '{pattern}': {fit} fit, and no column is that of "
+        f'{lacking}; columns are matched to the {len(joints)} joints by name, or by number if '
+        'there is one for each: name them in the order of the joints, with commas, or see '
+        '--rename and --joints'
+    )
 
 
 def guess(
