@@ -18,6 +18,7 @@ from armid_ros.errors import TrajectoryError
 from armid_ros.motion import FloatArray, freeze, Motion
 from armid_ros.robots.robot import Robot
 import numpy as np
+from scipy.interpolate import PPoly
 
 #: Tolerance beyond a position limit, as a share of the range between the limits.
 LIMIT_TOLERANCE = 1e-6
@@ -50,7 +51,7 @@ class Reference:
     dq: FloatArray | None = None
     ddq: FloatArray | None = None
     tau: FloatArray | None = None
-    _coefficients: FloatArray = field(init=False, repr=False)
+    _curves: tuple[Any, ...] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         """Freeze and check the waypoints, and compute the polynomials between them."""
@@ -90,7 +91,10 @@ class Reference:
             )
         if self.ddq is not None and self.dq is None:
             raise TrajectoryError('trajectory: it has accelerations but no velocities')
-        object.__setattr__(self, '_coefficients', _polynomials(self.t, self.q, self.dq, self.ddq))
+        if len(self.t) > 1:
+            position = _curve(self.t, self.q, self.dq, self.ddq)
+            curves = (position, position.derivative(), position.derivative(2))
+            object.__setattr__(self, '_curves', curves)
 
     @classmethod
     def of(cls, motion: Motion) -> Reference:
@@ -124,18 +128,11 @@ class Reference:
         if len(self.t) == 1:
             q = np.broadcast_to(self.q[0], (len(t), len(self.joints)))
             return Motion(self.joints, t, q, np.zeros_like(q), np.zeros_like(q), tau)
-        segment = np.clip(np.searchsorted(self.t, t, side='right') - 1, 0, len(self.t) - 2)
-        span = (self.t[segment + 1] - self.t[segment])[:, np.newaxis]
-        outside = ((t < self.t[0]) | (t > self.t[-1]))[:, np.newaxis]
-        u = np.clip((t - self.t[segment])[:, np.newaxis] / span, 0.0, 1.0)
-        u = np.repeat(u, len(self.joints), axis=1)  # twice as fast as with a column
-        q, dq, ddq = np.zeros((3, *u.shape))
-        for c in self._coefficients[::-1]:
-            ddq = ddq * u + 2.0 * dq
-            dq = dq * u + q
-            q = q * u + c.take(segment, axis=0)
+        inside = ((t >= self.t[0]) & (t <= self.t[-1]))[:, np.newaxis]
+        within = np.clip(t, self.t[0], self.t[-1])
+        q, dq, ddq = (curve(within) for curve in self._curves)
         q = np.where((t >= self.t[-1])[:, np.newaxis], self.q[-1], q)
-        dq, ddq = (np.where(outside, 0.0, x) for x in (dq / span, ddq / span**2))
+        dq, ddq = (np.where(inside, rate, 0.0) for rate in (dq, ddq))
         return Motion(self.joints, t, q, dq, ddq, tau)
 
     def for_robot(self, robot: Robot) -> Reference:
@@ -258,26 +255,21 @@ def limit_slack(robot: Robot) -> FloatArray:
     return np.asarray(LIMIT_TOLERANCE * np.where(np.isfinite(span), span, 1.0))
 
 
-def _polynomials(
-    t: FloatArray, q: FloatArray, dq: FloatArray | None, ddq: FloatArray | None
-) -> FloatArray:
-    """Return coefficients (6, K - 1, n) of u^0 to u^5, u = (t - t_k) / (t_k+1 - t_k)."""
-    c = np.zeros((6, len(t) - 1, q.shape[1]))
-    span = np.diff(t)[:, np.newaxis]
-    way = np.diff(q, axis=0)
-    c[0] = q[:-1]
-    if dq is None:
-        c[1] = way
-        return c
-    v0, v1 = span * dq[:-1], span * dq[1:]
-    c[1] = v0
-    if ddq is None:
+def _curve(t: FloatArray, q: FloatArray, dq: FloatArray | None, ddq: FloatArray | None) -> PPoly:
+    """Return the piecewise polynomial through waypoints, with a shape (N, n) at N times."""
+    span, way = np.diff(t)[:, np.newaxis], np.diff(q, axis=0)
+    c = np.zeros((6, *way.shape))  # coefficients of u^0 to u^5, u = (t - t_k) / (t_k+1 - t_k)
+    c[0], c[1] = q[:-1], way
+    if dq is not None:
+        v0, v1 = span * dq[:-1], span * dq[1:]
+        c[1] = v0
         c[2] = 3.0 * way - 2.0 * v0 - v1
         c[3] = -2.0 * way + v0 + v1
-        return c
-    a0, a1 = span**2 * ddq[:-1] / 2.0, span**2 * ddq[1:] / 2.0
-    c[2] = a0
-    c[3] = 10.0 * way - 6.0 * v0 - 4.0 * v1 - 3.0 * a0 + a1
-    c[4] = -15.0 * way + 8.0 * v0 + 7.0 * v1 + 3.0 * a0 - 2.0 * a1
-    c[5] = 6.0 * way - 3.0 * (v0 + v1) - a0 + a1
-    return c
+        if ddq is not None:
+            a0, a1 = span**2 * ddq[:-1] / 2.0, span**2 * ddq[1:] / 2.0
+            c[2] = a0
+            c[3] = 10.0 * way - 6.0 * v0 - 4.0 * v1 - 3.0 * a0 + a1
+            c[4] = -15.0 * way + 8.0 * v0 + 7.0 * v1 + 3.0 * a0 - 2.0 * a1
+            c[5] = 6.0 * way - 3.0 * (v0 + v1) - a0 + a1
+    c /= span ** np.arange(6)[:, np.newaxis, np.newaxis]
+    return PPoly(c[::-1], t)
