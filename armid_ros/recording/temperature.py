@@ -27,12 +27,6 @@ TEMPERATURE = 'sensor_msgs/msg/Temperature'
 _DYNAMIC_JOINT_STATE = 'control_msgs/msg/DynamicJointState'
 #: Topic of temperatures in the bags that are written.
 TOPIC = '/joint_temperatures'
-#: Units of wrong temperatures, with factor and offset of their conversion to degC.
-_OTHER_UNITS = {
-    'kelvin': (1.0, -273.15),
-    'tenths of a degree': (0.1, 0.0),
-    'degrees Fahrenheit': (1.0 / 1.8, -32.0 / 1.8),
-}
 #: Shortest time between two temperatures of a joint that are kept [s].
 _MIN_INTERVAL = 0.1
 
@@ -68,16 +62,9 @@ def temperatures(
         t, value = t[there], value[there]
         strange = np.flatnonzero((value < lowest) | (value > highest))
         if len(strange):
-            wrong = float(value[strange[0]])
-            units = [
-                f'{unit} ({factor * wrong + offset:.0f} degC)'
-                for unit, (factor, offset) in _OTHER_UNITS.items()
-                if lowest <= factor * wrong + offset <= highest
-            ]
-            seems = f'; it seems to be in {" or ".join(units)}' if units else ''
             raise RecordingError(
-                f'{name}: the temperature at {t[strange[0]]:.3f} s is {wrong:g}, which has to be '
-                f'from {lowest:g} to {highest:g} degC{seems}. Write it in degC, or leave '
+                f'{name}: the temperature at {t[strange[0]]:.3f} s is {value[strange[0]]:g}, and '
+                f'has to be from {lowest:g} to {highest:g} degC; convert it to degC, or leave '
                 'temperatures out with --temperature none'
             )
         _, first = np.unique(np.floor(t / _MIN_INTERVAL), return_index=True)

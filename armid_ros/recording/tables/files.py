@@ -300,7 +300,12 @@ def _columns(path: Path) -> tuple[Arrays, dict[str, Sequence[str]]]:
         elif types.is_string(field.type) or types.is_large_string(field.type):
             words[name] = [one or '' for one in column.to_pylist()]
         elif types.is_list(field.type) or types.is_fixed_size_list(field.type):
-            lists = np.array(column.to_pylist())  # of equal lengths
+            try:
+                lists = np.array(column.to_pylist())
+            except ValueError:
+                raise RecordingError(
+                    f'{path}: column {name}: its lists differ in length, or some are missing'
+                ) from None
             if lists.dtype.kind == 'U':
                 words |= {f'{name}[{k}]': one.tolist() for k, one in enumerate(lists.T)}
             else:

@@ -221,5 +221,5 @@ def test_a_table_has_columns_of_temperatures(tmp_path):
     found = read_recording(tmp_path / 'run.csv')
     np.testing.assert_allclose(found.temperature.at([1.0]), [[26.0, 31.0]])
     (tmp_path / 'run.csv').write_text('\n'.join(rows).replace(',31', ',310'))
-    with pytest.raises(RecordingError, match=r'run.csv: column joint_temperatures_1: .*kelvin'):
+    with pytest.raises(RecordingError, match=r'run.csv: column joint_temperatures_1: .*310.*degC'):
         read_recording(tmp_path / 'run.csv')
