@@ -7,11 +7,15 @@ import itertools
 import time
 from typing import Any, TypeVar
 
+from armid_ros.arm import ArmModel
+from armid_ros.excitation import Excitation, Limits, random_feasible
 from armid_ros.nodes.qos import LATCHED
 from armid_ros.nodes.running.domains import private_context
 from armid_ros.nodes.running.real_time import RealTime
+from armid_ros.robots import load_robot
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+import numpy as np
 import pytest
 from rcl_interfaces.msg import Log
 from rclpy.context import Context
@@ -152,6 +156,14 @@ class Bench:
     def diagnostics(self) -> list[DiagnosticArray]:
         """Return a list to which diagnostics are appended."""
         return self.listen(DiagnosticArray, '/diagnostics')
+
+
+@pytest.fixture(scope='session')
+def excitation() -> Excitation:
+    """Return a short excitation of the shipped arm."""
+    robot, rng = load_robot('humanoid_arm'), np.random.default_rng(3)
+    limits = Limits.of(robot, speed='medium')
+    return Excitation(random_feasible(ArmModel(robot), limits, 2.0, 3, rng), 1, 0.5)
 
 
 @pytest.fixture

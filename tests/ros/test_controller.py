@@ -3,14 +3,7 @@
 """The excitation publisher in front of a trajectory controller, with what can go wrong there."""
 
 from armid_ros.arm import ArmModel
-from armid_ros.excitation import (
-    Excitation,
-    Limits,
-    random_feasible,
-    save_excitation,
-    transfer_limits,
-    TransferPlanner,
-)
+from armid_ros.excitation import save_excitation, transfer_limits, TransferPlanner
 from armid_ros.excitation.schedule import excitation_text
 from armid_ros.nodes.excitation_publisher import ExcitationPublisherNode
 from armid_ros.nodes.qos import LATCHED, STREAM
@@ -25,13 +18,6 @@ from tests.ros.controller import Controller, SECOND
 
 ROBOT = load_robot('humanoid_arm')
 HOME = (ROBOT.lower + ROBOT.upper) / 2.0
-
-
-@pytest.fixture(scope='module')
-def excitation():
-    rng = np.random.default_rng(3)
-    limits = Limits.of(ROBOT, speed='medium')
-    return Excitation(random_feasible(ArmModel(ROBOT), limits, 2.0, 3, rng), 1, 0.5)
 
 
 @pytest.fixture(params=['topic', 'action'])

@@ -20,17 +20,7 @@ from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectory
 
 from tests.ros.controller import Controller, joint_state, SECOND, seconds_of
-from tests.ros.test_controller import (
-    begun,
-    excitation,
-    free_planner,
-    HOME,
-    publisher,
-    ROBOT,
-    waiting,
-)
-
-__all__ = ['excitation']
+from tests.ros.test_controller import begun, free_planner, HOME, publisher, ROBOT, waiting
 
 JOINTS = ROBOT.joints
 #: Times at which an arm is reported that stands until 100 s [s].

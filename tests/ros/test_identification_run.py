@@ -14,9 +14,7 @@ from diagnostic_msgs.msg import DiagnosticStatus
 import pytest
 
 from tests.ros.controller import Controller
-from tests.ros.test_controller import excitation, HOME, publisher, ROBOT
-
-__all__ = ['excitation']
+from tests.ros.test_controller import HOME, publisher, ROBOT
 
 
 class Programs:

@@ -18,9 +18,7 @@ import pytest
 from rclpy.action import ActionClient, ActionServer, CancelResponse, GoalResponse
 
 from tests.ros.controller import Controller, NAME
-from tests.ros.test_controller import begun, excitation, HOME, publisher, ROBOT, set_parameter
-
-__all__ = ['excitation']
+from tests.ros.test_controller import begun, HOME, publisher, ROBOT, set_parameter
 
 
 @pytest.fixture
