@@ -19,7 +19,6 @@ from armid_ros.report.blocks import (
     ContentSection,
     DataTable,
     FactList,
-    Fold,
     next_steps_section,
     Origin,
     Paragraph,
@@ -27,11 +26,10 @@ from armid_ros.report.blocks import (
     VerdictSection,
 )
 from armid_ros.report.judgement import judge
-from armid_ros.report.notation import counted, digits, plain, pretty, robot_label, sentence
+from armid_ros.report.notation import counted, digits, plain, robot_label, sentence
 from armid_ros.report.page import Page, Section
 from armid_ros.report.parameter_tables import (
     arm_facts,
-    full_label,
     not_as_described,
     parameter_section,
 )
@@ -40,7 +38,6 @@ from armid_ros.report.sections.data_quality import data_quality_section
 from armid_ros.report.sections.fit import by_recording, error_bars, fit_section, forward_section
 from armid_ros.report.statistics import residual_section, torque_reach, whiteness_section
 from armid_ros.robots import Robot
-import numpy as np
 
 #: Colour of each grade.
 TONES = {'good': 'good', 'poor': 'fair', 'unusable': 'bad'}
@@ -189,16 +186,6 @@ def _noise_section(robot: Robot, check: NoiseCheck) -> ContentSection:
             robot.joints, check.position_noise, robot.position_units, strict=True
         )
     )
-    names = check.instrumental.parameters
-    rows = [
-        (
-            full_label(names[k], robot.links),
-            f'{check.bias[k]:.2g} {pretty(names[k].unit)}',
-            f'{check.bias_std[k]:.1g}',
-            f'{check.relative_bias[k]:+.2f}',
-        )
-        for k in np.argsort(-np.abs(check.relative_bias))[:6]
-    ]
     return ContentSection(
         'Encoder noise',
         [
@@ -209,9 +196,6 @@ def _noise_section(robot: Robot, check: NoiseCheck) -> ContentSection:
             ),
             BulletList(
                 [(sentence(text), 'fine' if fine else 'warn') for text, fine in check.findings()]
-            ),
-            Fold(
-                'The largest biases', [DataTable(('Parameter', 'Bias', '±', 'Bias / std'), rows)]
             ),
         ],
     )
