@@ -52,7 +52,7 @@ from armid_ros.identification.rows.checks import check_held_out
 from armid_ros.identification.rows.temperature import friction_per_kelvin
 from armid_ros.recording import Recording, require_once
 from armid_ros.recording.curves import draw_joints
-from armid_ros.report.identification_report import Assessment, identification_report
+from armid_ros.report.identification_report import identification_report
 from armid_ros.report.judgement import judge, residual_trends, USE
 from armid_ros.report.notation import counted, digits, plain, pretty
 from armid_ros.report.parameter_tables import estimate_text, full_label, joint_columns
@@ -200,11 +200,12 @@ class IdentificationResult(ShownModel):
         without_place = {name: one.without_place for name, one in self.exports.items()}
         return identification_report(
             self.core,
+            self.graded,
             description=self.description,
-            recordings=self.recordings,
+            recordings=[*self.recordings, *self.held_out],
             validation=self.validation,
-            validation_recordings=self.held_out,
-            assessment=Assessment(self.verification, self.graded, exports=without_place),
+            verification=self.verification,
+            exports=without_place,
             origin=origin.of(source_of(self.description.robot)),
         )
 

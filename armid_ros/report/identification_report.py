@@ -6,11 +6,9 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
 
 from armid_ros.arm import ArmModel
 from armid_ros.identification import Fit, Grade, Identification, PhysicalCertificate, Verification
-from armid_ros.identification import grade as graded
 from armid_ros.identification.fitting.instruments import NoiseCheck
 from armid_ros.identification.fitting.least_squares import IN_WORDS
 from armid_ros.recording import Recording
@@ -43,35 +41,15 @@ from armid_ros.robots import Robot
 TONES = {'good': 'good', 'poor': 'fair', 'unusable': 'bad'}
 
 
-@dataclass(frozen=True)
-class Assessment:
-    """
-    Tests, grade and exports of an identification.
-
-    Attributes
-    ----------
-    verification : Verification or None
-        Test for encoder noise, and simulations.
-    grade : Grade or None
-        Grade; computed if it is None.
-    exports : mapping of str to sequence of str
-        Exported files, and the values that each cannot contain.
-
-    """
-
-    verification: Verification | None = None
-    grade: Grade | None = None
-    exports: Mapping[str, Sequence[str]] = field(default_factory=dict)
-
-
 def identification_report(
     result: Identification,
+    grade: Grade,
     *,
     description: ArmModel,
     recordings: Sequence[Recording],
     validation: Mapping[str, Sequence[Fit]],
-    validation_recordings: Sequence[Recording] = (),
-    assessment: Assessment | None = None,
+    verification: Verification | None = None,
+    exports: Mapping[str, Sequence[str]] | None = None,
     origin: ResultOrigin = DEFAULT_ORIGIN,
 ) -> str:
     """
@@ -81,33 +59,32 @@ def identification_report(
     ----------
     result : Identification
         The identified model.
+    grade : Grade
+        Its grade.
     description : ArmModel
         The model before the identification, to compare parameters with.
     recordings : sequence of Recording
-        Training data.
+        Training data and held-out data.
     validation : mapping of str to sequence of Fit
         Predictions of recordings that were not used for fitting, by recording.
-    validation_recordings : sequence of Recording
-        Those recordings.
-    assessment : Assessment, optional
-        Tests and exports of the identification.
+    verification : Verification, optional
+        Test for encoder noise, and simulations.
+    exports : mapping of str to sequence of str, optional
+        Exported files, and the values that each cannot contain.
     origin : ResultOrigin
         Robot, files, versions, settings, seed.
 
     """
-    described, assessment = result.arm.robot, assessment or Assessment()
-    verification, grade = assessment.verification, assessment.grade
-    training = by_recording(result.training)
+    described, training = result.arm.robot, by_recording(result.training)
     held_out = [fit for fits in validation.values() for fit in fits]
     role = 'held-out' if held_out else 'training'
     shown = held_out or list(result.training)
-    if grade is None:
-        grade = graded(result, description, recordings, validation, validation_recordings)
-    every = [*recordings, *validation_recordings]
-    judgement = judge(result, validation, every, verification, grade.word == 'unusable')
+    judgement = judge(result, validation, recordings, verification, grade.word == 'unusable')
     read = [
-        *((one, 'training', training.get(one.source, ())) for one in recordings),
-        *((one, 'held-out', validation.get(one.source, ())) for one in validation_recordings),
+        (one, 'held-out', validation[one.source])
+        if one.source in validation
+        else (one, 'training', training.get(one.source, ()))
+        for one in recordings
     ]
     forward, noise = (verification.forward, verification.noise) if verification else ((), None)
     sections: list[Section] = [
@@ -130,7 +107,7 @@ def identification_report(
             result.unidentified,
             described.links,
         ),
-        *([_physical_section(result.physical, assessment.exports)] if result.physical else []),
+        *([_physical_section(result.physical, exports or {})] if result.physical else []),
         whiteness_section(described, shown, role),
         *([] if noise is None else [_noise_section(described, noise)]),
         data_quality_section(read, described),

@@ -3,20 +3,21 @@
 """The report is one file that is safe to open, complete, and works in a real browser."""
 
 from base64 import b64decode
-from dataclasses import fields, replace
+from dataclasses import replace
 from html.parser import HTMLParser
 import re
 from xml.sax.saxutils import quoteattr
 
 from armid_ros.files.output import hash_files
 from armid_ros.identification import (
+    grade,
     IdentificationSettings,
     identify,
     PhysicalSettings,
     verify,
 )
 from armid_ros.motion import Motion
-from armid_ros.report.identification_report import Assessment, identification_report
+from armid_ros.report.identification_report import identification_report
 from armid_ros.report.judgement import judge
 from armid_ros.report.provenance import Provenance, ResultOrigin, versions
 from armid_ros.report.sections.data_quality import repeatability
@@ -74,15 +75,15 @@ def report_of(case, **changes):
     made = Provenance(files, versions(), seed=5)
     given = {
         'description': case.description,
-        'recordings': case.recordings[:1],
+        'recordings': case.recordings,
         'validation': case.validation,
-        'validation_recordings': case.recordings[1:],
         'origin': ResultOrigin('humanoid_arm', provenance=made),
         **changes,
     }
-    named = [field.name for field in fields(Assessment)]
-    assessment = Assessment(**{name: given.pop(name) for name in named if name in given})
-    return identification_report(given.pop('result', case.result), assessment=assessment, **given)
+    result = given.pop('result', case.result)
+    training, held_out = case.recordings[:1], case.recordings[1:]
+    graded = grade(result, given['description'], training, given['validation'], held_out)
+    return identification_report(result, graded, **given)
 
 
 @pytest.fixture(scope='module')
@@ -117,12 +118,13 @@ def hostile():
     run, held_out = (replace(one, source=HOSTILE) for one in bench.recordings()[:2])
     result = identify(bench.named_friction(), [run], rng=np.random.default_rng(0))
     made = Provenance(settings={HOSTILE: HOSTILE}, command=HOSTILE)
+    described, validation = bench.named_friction(), {HOSTILE: result.predict([held_out])}
     return identification_report(
         result,
-        description=bench.named_friction(),
-        recordings=[run],
-        validation={HOSTILE: result.predict([held_out])},
-        validation_recordings=[held_out],
+        grade(result, described, [run], validation, [held_out]),
+        description=described,
+        recordings=[run, held_out],
+        validation=validation,
         origin=ResultOrigin(HOSTILE, provenance=made),
     )
 
