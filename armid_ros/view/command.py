@@ -4,14 +4,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 import json
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 from armid_ros.cli import columns, parameters
 from armid_ros.cli.terminal import say
-from armid_ros.errors import OutputError
 import click
 
 
@@ -49,6 +47,7 @@ def view(
     """Show a recording in rerun: the moving arm, torques, and the residual of a model."""
     from armid_ros import ArmModel
     from armid_ros.cli import options
+    from armid_ros.files import write_file
     from armid_ros.view.rerun_log import log_recording, open_stream
 
     if model is None:
@@ -64,32 +63,17 @@ def view(
             mark = tuple(dict.fromkeys(joint for one in effects for joint in one['joints']))
     for joint in mark:
         arm.robot.index(joint)
-    with _whole(out) as file:
+    with TemporaryDirectory() as folder:
+        file = None if out is None else Path(folder) / 'run.rrd'
         stream = open_stream(Path(recording.source).name or arm.robot.name, file)
         notes = log_recording(stream, arm, recording, mark)
         stream.disconnect()
+        if file is not None and out is not None:
+            out.parent.mkdir(parents=True, exist_ok=True)
+            write_file(out, file.read_bytes())
     for note in notes:
         say(f'note: {note}')
     if out is not None:
         coloured = f', coloured: {", ".join(mark)}' if mark else ''
         samples = f'{len(recording)} samples of {arm.robot.n_joints} joints'
         say(f'{out}: {samples}{coloured}; rerun {out}')
-
-
-@contextmanager
-def _whole(out: Path | None) -> Iterator[Path | None]:
-    """Yield a temporary file, and move it to its place when it is complete."""
-    if out is None:
-        yield None
-        return
-    part = out.with_name(f'.{out.name}.part')
-    try:
-        out.parent.mkdir(parents=True, exist_ok=True)
-        part.unlink(missing_ok=True)
-        part.touch(exist_ok=False)
-        yield part
-        part.replace(out)
-    except OSError as error:
-        raise OutputError(f'{out}: cannot be written: {error.strerror}') from error
-    finally:
-        part.unlink(missing_ok=True)
