@@ -134,7 +134,7 @@ def inspect(
     found = [
         *_of_time(recording, sampling),
         *_of_units(recording, joints, robot),
-        *_of_motion(recording, joints, sampling),
+        *_of_motion(joints, sampling),
         *_of_efforts(joints, trial),
     ]
     mixed = two_senders(recording)
@@ -275,9 +275,7 @@ def _of_units(
         yield Remark('doubt', f'velocities of {", ".join(empty)} are zero while they move')
 
 
-def _of_motion(
-    recording: Recording, joints: tuple[JointFacts, ...], sampling: Sampling
-) -> Iterator[Remark]:
+def _of_motion(joints: tuple[JointFacts, ...], sampling: Sampling) -> Iterator[Remark]:
     still = [joint.name for joint in joints if joint.still]
     if len(still) == len(joints):
         yield Remark('bad', 'nothing moves')
