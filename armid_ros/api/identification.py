@@ -239,7 +239,7 @@ class IdentificationResult(ShownModel):
         read = [*self.recordings, *self.held_out]
         damaged = [one for one in read if one.report.unwrapped or not one.report.unharmed]
         unusable = self.grade == 'unusable'
-        steps = judge(core, self.validation, read, self.verification, unusable).next_steps
+        _, steps = judge(core, self.validation, read, self.verification, unusable)
         commands = 'inspect', 'diagnose', 'excite'
         named = (name for name in commands if f'armid {name}' in ''.join(steps[:1]))
         then = 'simulate' if USE in steps else next(named, '')

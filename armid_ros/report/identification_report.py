@@ -23,7 +23,7 @@ from armid_ros.report.blocks import (
     TableCell,
     VerdictSection,
 )
-from armid_ros.report.judgement import judge
+from armid_ros.report.judgement import findings_of, judge
 from armid_ros.report.notation import counted, digits, plain, robot_label, sentence
 from armid_ros.report.page import Page, Section
 from armid_ros.report.parameter_tables import (
@@ -79,7 +79,9 @@ def identification_report(
     held_out = [fit for fits in validation.values() for fit in fits]
     role = 'held-out' if held_out else 'training'
     shown = held_out or list(result.training)
-    judgement = judge(result, validation, recordings, verification, grade.word == 'unusable')
+    unusable = grade.word == 'unusable'
+    beware, steps = judge(result, validation, recordings, verification, unusable)
+    findings = findings_of(result, verification)
     read = [
         (one, 'held-out', validation[one.source])
         if one.source in validation
@@ -91,14 +93,14 @@ def identification_report(
         VerdictSection(
             grade.word,
             TONES[grade.word],
-            (*grade.reasons, *_contradictions(result, description), *judgement.sentences),
-            judgement.beware,
+            (*grade.reasons, *_contradictions(result, description), *findings),
+            beware,
             error_bars(described, training, validation, result.halves),
-            ''.join(judgement.next_steps[:1]),
+            ''.join(steps[:1]),
             origin.step,
         ),
         fit_section(described, training, validation, torque_reach(result, shown)),
-        *([next_steps_section(judgement.next_steps)] if judgement.next_steps[1:] else []),
+        *([next_steps_section(steps)] if steps[1:] else []),
         *([forward_section(described, forward)] if forward else []),
         residual_section(described, shown, role),
         parameter_section(

@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.estimate import name_in_words
@@ -26,36 +25,15 @@ USE = 'Use model.yaml for simulation and control, in the range of the recorded m
 Caution = tuple[str, str]
 
 
-@dataclass(frozen=True)
-class Judgement:
-    """
-    Judgement of an identification.
-
-    Attributes
-    ----------
-    sentences : tuple of str
-        Findings, with the position error in simulation.
-    beware : tuple of str
-        Limitations.
-    next_steps : tuple of str
-        Next steps.
-
-    """
-
-    sentences: tuple[str, ...]
-    beware: tuple[str, ...]
-    next_steps: tuple[str, ...]
-
-
 def judge(
     result: Identification,
     validation: Mapping[str, Sequence[Fit]],
     recordings: Sequence[Recording],
     verification: Verification | None = None,
     unusable: bool = False,
-) -> Judgement:
+) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """
-    Judge an identification.
+    Return the limitations of an identification, and next steps.
 
     Parameters
     ----------
@@ -95,15 +73,11 @@ def judge(
     steps = [step for _, step in findings if step]
     if held_out is not None and not steps:
         steps = [USE]
-    return Judgement(
-        sentences=tuple(_sentences(result, verification)),
-        beware=tuple(text for text, _ in findings if text),
-        next_steps=tuple(dict.fromkeys(steps)),
-    )
+    return tuple(text for text, _ in findings if text), tuple(dict.fromkeys(steps))
 
 
-def _sentences(result: Identification, verification: Verification | None) -> Iterator[str]:
-    """Yield the findings, and the position error in simulation."""
+def findings_of(result: Identification, verification: Verification | None) -> Iterator[str]:
+    """Yield what was identified, and the position error in simulation."""
     robot = result.arm.robot
     effects = [name_in_words(effect.name) for effect in result.arm.effects]
     time = sum(float(fit.motion.t[-1] - fit.motion.t[0]) for fit in result.training)

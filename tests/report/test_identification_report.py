@@ -199,8 +199,8 @@ def test_a_residual_is_no_larger_for_a_weaker_torque(case, share, noisier, warne
         )
         for fit in fits
     ]
-    judgement = judge(case.result, {'weaker': weaker}, [])
-    assert warned == any('overfits' in text for text in judgement.beware)
+    beware, _ = judge(case.result, {'weaker': weaker}, [])
+    assert warned == any('overfits' in text for text in beware)
 
 
 def test_nothing_is_loaded(page, html):
