@@ -67,13 +67,6 @@ class InspectionResult(Shown):
     core : Inspection
         Everything that the inspection found.
 
-    Examples
-    --------
-    >>> import armid_ros as ar
-    >>> found = ar.inspect('my_arm.urdf', 'monday')
-    >>> found.report('inspection.html').name
-    'inspection.html'
-
     """
 
     core: Inspection
@@ -166,8 +159,11 @@ def inspect(
     Examples
     --------
     >>> import armid_ros as ar
-    >>> ar.inspect('my_arm.urdf', 'monday').remarks
+    >>> found = ar.inspect('my_arm.urdf', 'monday')
+    >>> found.remarks
     ()
+    >>> found.report('inspection.html').name
+    'inspection.html'
 
     """
     if recording is None:  # the only argument
@@ -202,12 +198,6 @@ class CheckResult(Shown):
         Impossible and doubtful values, the worst first.
     links : LinkCheck or None
         Described and measured masses and centres of mass; None without a recording.
-
-    Examples
-    --------
-    >>> import armid_ros as ar
-    >>> print(ar.check('my_arm.urdf', 'friday').finding)
-    The URDF is 0.3... ± 0... kg too light at elbow, if the other links are right.
 
     """
 
@@ -306,6 +296,8 @@ def check(
     >>> import armid_ros as ar
     >>> ar.check('my_arm.urdf').wrong
     False
+    >>> print(ar.check('my_arm.urdf', 'friday').finding)
+    The URDF is 0.3... ± 0... kg too light at elbow, if the other links are right.
 
     """
     described = robot_of(robot)

@@ -93,7 +93,7 @@ def next_step(comparison: Comparison) -> str:
 
 def change_rows(comparison: Comparison) -> list[tuple[str, ...]]:
     """Return a row for each changed parameter, with the columns of `HEADS`."""
-    rows = []
+    rows: list[tuple[str, ...]] = []
     for change in comparison.changed:
         before, _ = estimate_text(change.before, change.before_std)
         after, _ = estimate_text(change.after, change.after_std)
