@@ -229,34 +229,17 @@
     }
   }
 
-  const quoted = (text) => `"${text.trim().replace(/\s+/g, ' ').replace(/"/g, '""')}"`;
-
-  function numbers(spec) {
-    const columns = [[spec.xlabel || 'x', spec.x]];
-    for (const {label, y, upper} of spec.series) {
-      columns.push([`${label}: ${spec.ylabel}`, y], ...(upper ? [[`${label}, upper edge`, upper]] : []));
-    }
-    const rows = spec.x.map((x, k) => columns.map(([, values]) => values[k] ?? '').join(','));
-    return [columns.map(([label]) => quoted(label)).join(','), ...rows].join('\n');
-  }
-
-  function picture(plot) {
-    const {width, height} = plot.ctx.canvas;
-    const canvas = Object.assign(document.createElement('canvas'), {width, height});
-    const ctx = canvas.getContext('2d');
-    ctx.fillStyle = colour.paper;
-    ctx.fillRect(0, 0, width, height);
-    ctx.drawImage(plot.ctx.canvas, 0, 0);
-    return canvas;
-  }
-
-  function addDownload(figure, kind, make) {
-    const button = Object.assign(document.createElement('button'), {type: 'button', className: 'tool', textContent: kind});
-    button.addEventListener('click', () => make((blob) => {
-      const link = Object.assign(document.createElement('a'), {href: URL.createObjectURL(blob), download: `chart.${kind.toLowerCase()}`});
-      link.click();
-      URL.revokeObjectURL(link.href);
-    }));
+  function addPicture(figure, plot) {
+    const button = Object.assign(document.createElement('button'), {type: 'button', className: 'tool', textContent: 'PNG'});
+    button.addEventListener('click', () => {
+      const {width, height} = plot.ctx.canvas;
+      const canvas = Object.assign(document.createElement('canvas'), {width, height});
+      const ctx = canvas.getContext('2d');
+      ctx.fillStyle = colour.paper;
+      ctx.fillRect(0, 0, width, height);
+      ctx.drawImage(plot.ctx.canvas, 0, 0);
+      Object.assign(document.createElement('a'), {href: canvas.toDataURL(), download: 'chart.png'}).click();
+    });
     figure.querySelector('.tools').append(button);
   }
 
@@ -291,8 +274,7 @@
         setLegend: [(u) => u.root.classList.toggle('idle', u.cursor.idx == null)]},
     }, data, figure);
     charts.set(figure, {plot, spec});
-    addDownload(figure, 'PNG', (done) => picture(plot).toBlob(done));
-    addDownload(figure, 'CSV', (done) => done(new Blob([numbers(spec)], {type: 'text/csv'})));
+    addPicture(figure, plot);
     touch(plot, spec);
     figure.querySelector('.reset').addEventListener('click', () => plot.setScale('x', whole(spec)));
     resizing.observe(figure);
@@ -328,6 +310,8 @@
     root.classList.remove('paper');
     repaint();
   });
+
+  const quoted = (text) => `"${text.trim().replace(/\s+/g, ' ').replace(/"/g, '""')}"`;
 
   // A button below each table copies it as CSV; a field above those of parameters filters rows.
   const csv = (table) => [...table.rows].map(
