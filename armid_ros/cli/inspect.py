@@ -46,7 +46,6 @@ def inspect(
     from armid_ros.api.inspection import InspectionResult
     from armid_ros.cli import options
     from armid_ros.files.cells import listed
-    from armid_ros.recording import read_recording
 
     staged = (
         None if out is None else options.stage(out, InspectionResult.schema, robot_source or '')
@@ -56,17 +55,8 @@ def inspect(
         robot = options.open_robot(robot_source, gravity, joints, [bag], tell=False)
     topics = topics_of(bag, options.read_settings())
     with progress('reading') as tick:
-        if robot is None:
-            recording = read_recording(
-                bag,
-                joints=listed(joints) if joints else None,
-                topic=topic,
-                columns=columns.settings(),
-                show=lambda plan: click.echo('\n'.join(plan.lines()), err=True),
-                settings=options.read_settings(),
-            )
-        else:
-            (recording,) = options.read([bag], robot, topic)
+        named = listed(joints) if joints else None
+        (recording,) = options.read([bag], robot, topic, joints=named)
         tick(0.5, 'trying to identify' if robot else 'looking')
         found = run(robot, recording, topics=topics, rng=seed)
     origin = options.origin(robot_source or '', [bag], seed)

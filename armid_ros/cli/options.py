@@ -297,8 +297,15 @@ def per_joint(text: str | None, robot: Robot, option: str) -> FloatArray | None:
         return None if text is None else values_per_joint(numbers(text), robot.joints, repr(text))
 
 
-def read(paths: Sequence[Path], robot: Robot, topic: str | None) -> list[Recording]:
-    """Read the joints of bags and tables; print guessed columns on stderr, without repeats."""
+def read(
+    paths: Sequence[Path], robot: Robot | None, topic: str | None, **known: Any
+) -> list[Recording]:
+    """
+    Read the joints of bags and tables; print guessed columns on stderr, without repeats.
+
+    Without a robot, further arguments of `read_recording` state what is known of the joints.
+
+    """
     settings, reading = columns.settings(), read_settings()
     shown: set[str] = click.get_current_context().meta.setdefault(_SHOWN, set())
 
@@ -309,16 +316,10 @@ def read(paths: Sequence[Path], robot: Robot, topic: str | None) -> list[Recordi
             click.echo('\n'.join(lines) if body not in shown else f'{lines[0]}, alike', err=True)
         shown.add(body)
 
+    if robot is not None:
+        known = {'joints': robot.joints, 'slides': list(robot.prismatic)}
     return [
-        read_recording(
-            path,
-            joints=robot.joints,
-            slides=list(robot.prismatic),
-            topic=topic,
-            columns=settings,
-            show=show,
-            settings=reading,
-        )
+        read_recording(path, topic=topic, columns=settings, show=show, settings=reading, **known)
         for path in paths
     ]
 
