@@ -333,9 +333,10 @@ class VerdictSection(Section):
     command: str = ''
 
 
-def next_steps_section(steps: Sequence[str]) -> ContentSection:
-    """Return the next steps, most useful first."""
-    return ContentSection('What to do next', [BulletList([(step, '') for step in steps], True)])
+def next_steps(steps: Sequence[str]) -> list[ContentSection]:
+    """Return a section of next steps, most useful first; none for the one of the verdict."""
+    bullets = BulletList([(step, '') for step in steps], True)
+    return [ContentSection('What to do next', [bullets])] if steps[1:] else []
 
 
 @dataclass(frozen=True)

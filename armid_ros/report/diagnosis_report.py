@@ -22,7 +22,7 @@ from armid_ros.recording import Recording
 from armid_ros.report.arm_drawing import ArmDrawing, draw_arm
 from armid_ros.report.blocks import (
     ContentSection,
-    next_steps_section,
+    next_steps,
     Origin,
     Paragraph,
     VerdictSection,
@@ -140,7 +140,7 @@ def diagnosis_report(
             sections.append(evidence_section(diagnosis))
     if learned is not None:
         sections.append(learned)
-    sections.append(next_steps_section(steps))
+    sections += next_steps(steps)
     if diagnosis.minor:
         sections.append(minor_section(diagnosis, everything))
     if diagnosis.gap is not None:

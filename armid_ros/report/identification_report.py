@@ -17,7 +17,7 @@ from armid_ros.report.blocks import (
     ContentSection,
     DataTable,
     FactList,
-    next_steps_section,
+    next_steps,
     Origin,
     Paragraph,
     TableCell,
@@ -100,7 +100,7 @@ def identification_report(
             origin.step,
         ),
         fit_section(described, training, validation, torque_reach(result, shown)),
-        *([next_steps_section(steps)] if steps[1:] else []),
+        *next_steps(steps),
         *([forward_section(described, forward)] if forward else []),
         residual_section(described, shown, role),
         parameter_section(
