@@ -113,7 +113,7 @@ def identification_report(
         whiteness_section(described, shown, role),
         *([] if noise is None else [_noise_section(described, noise)]),
         data_quality_section(read, described),
-        _input_section(result, origin.robot, list(training), list(validation)),
+        _input_section(result, origin.robot),
         Origin(origin.provenance),
     ]
     subtitle = f'{robot_label(origin.robot)} · {counted(len(training), "training recording")}'
@@ -133,9 +133,7 @@ def _contradictions(result: Identification, description: ArmModel) -> list[str]:
     ] * bool(joints)
 
 
-def _input_section(
-    result: Identification, robot: str, training: Sequence[str], validation: Sequence[str]
-) -> ContentSection:
+def _input_section(result: Identification, robot: str) -> ContentSection:
     used = result.used
     kept = used.rate_hz / used.decimation
     facts = [
@@ -146,8 +144,6 @@ def _input_section(
             f'positions below {used.cutoff_hz:.3g} Hz of {used.rate_hz:.4g} Hz; torque and model '
             f'alike, then one sample of {used.decimation} kept ({kept:.3g} Hz)',
         ),
-        ('Fitted to', ', '.join(training)),
-        ('Held out', ', '.join(validation) or 'nothing'),
         (
             'Excitation',
             f'identifies {counted(result.base.rank, "parameter")}; condition number of the '
