@@ -116,10 +116,7 @@ def excitation_report(
     if any(colour == OBSTACLE for _, colour in poses.bodies):
         colours.append(('line', ', '.join(obstacle.name for obstacle in obstacles)))
     sections: list[Section] = [
-        replace(
-            _verdict(design, arm.robot, shares, checked, collision.notes),
-            step=origin.step,
-        ),
+        _verdict(design, arm.robot, shares, checked, collision.notes, origin.step),
         ContentSection('Poses', [poses, Legend(colours)]),
         _accuracy_section(design, arm.robot.links),
         *([] if isolability is None else [isolability_section(isolability)]),
@@ -141,6 +138,7 @@ def _verdict(
     shares: Mapping[str, FloatArray],
     checked: Fitness,
     notes: Sequence[str],
+    step: str,
 ) -> VerdictSection:
     """Return the verdict: identifiable parameters, the least accurate one, and clearance."""
     settings, links, joints = design.settings, robot.links, design.limits.joints
@@ -184,7 +182,8 @@ def _verdict(
         beware.append('Not all bodies were checked for collision; see Clearance.')
     tone = 'good' if checked.word == FIT and not design.stopped else 'fair'
     tone = 'bad' if unseen or checked.word == UNFIT else tone
-    return VerdictSection('blind' if unseen else checked.word, tone, sentences, beware, bars)
+    word = 'blind' if unseen else checked.word
+    return VerdictSection(word, tone, sentences, beware, bars, step)
 
 
 def identifiable(design: Design, links: Sequence[str]) -> list[str]:
