@@ -22,19 +22,18 @@ from typing import Any
 import armid_ros as ar
 from armid_ros.nodes.live import LiveDiagnosis, LiveSettings
 from armid_ros.nodes.live.request import answer
-from armid_ros.papers.elastic.identification.interaction import ideal_response
-from armid_ros.papers.elastic.identification.three_steps import identify_two_inertia
-from armid_ros.papers.elastic.plant import (
-    ElasticSensors,
+from armid_ros.papers.elastic.experiments import (
     resonance_experiments,
     RESONANCE_GAIN,
-    run_elastic,
+    run_experiment,
 )
+from armid_ros.papers.elastic.identification.interaction import ideal_response
+from armid_ros.papers.elastic.identification.three_steps import identify_two_inertia
 from armid_ros.papers.exo.plant.gait import read_gait
 from armid_ros.papers.exo.plant.gait_cycle import check_cycle, gait_cycle
 from armid_ros.papers.exo.plant.walkers import walking_pair
 from armid_ros.robots.two_link import two_link_set
-from armid_ros.simulation.elastic import two_link_loop, two_link_plant
+from armid_ros.simulation.elastic import two_link_loop
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullLocator
 import numpy as np
@@ -318,10 +317,11 @@ def damaged() -> Figure:
 def springs() -> Figure:
     """Draw the responses of two joints with springs: measured, and with identified parameters."""
     shipped, rng = two_link_set('after'), np.random.default_rng(0)
-    plant, loop = two_link_plant(shipped.parameters), two_link_loop(shipped, RESONANCE_GAIN)
-    plans, sensors = resonance_experiments(8, rng), ElasticSensors(0.006, 0.003, 0.2)
-    clean = [run_elastic(plant, loop, plan) for plan in plans]
-    runs = [sensors.measure(run, rng) for run in clean]
+    sensors, loop = ar.Sensors(velocity_noise=0.004), two_link_loop(shipped, RESONANCE_GAIN)
+    runs = [
+        run_experiment(plan, shipped, rng, gain=RESONANCE_GAIN, sensors=sensors)
+        for plan in resonance_experiments(8, rng)
+    ]
     found = identify_two_inertia(runs, shipped.parameters, loop)
     figure, panels = _figure(2.8, 1, 2, sharey=True)
     for k, (axes, joint, own) in enumerate(zip(panels, found.joints, found.measured, strict=True)):

@@ -4,15 +4,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 from armid_ros.estimate import measured, name_in_words, parameter_table
 from armid_ros.identification.fitting.identifiability import HALF_WIDTH
-from armid_ros.motion import FloatArray
 from armid_ros.papers.elastic.identification.interaction import (
     BAND,
-    coupled_response,
     decibel_error,
     frequencies,
     ideal_response,
@@ -34,7 +31,7 @@ from armid_ros.report.blocks import (
     Paragraph,
     VerdictSection,
 )
-from armid_ros.report.charts import Chart, Role, Series
+from armid_ros.report.charts import Chart, Kind, Role, Series
 from armid_ros.report.notation import counted, digits, pretty
 from armid_ros.report.page import Page, Section, Templated
 from armid_ros.report.provenance import Provenance
@@ -184,7 +181,6 @@ def rigid_section(fit: RigidFit) -> ContentSection:
 
 #: Frequency ranges of the plots and of the comparison of responses [Hz].
 _SHOWN_BAND, _COMPARED_BAND = (2.0, 100.0), (5.0, 60.0)
-_ROLES: tuple[Role, Role] = ('residual', 'predicted')
 _SIZE = 'magnitude [dB re rad/(N m s)]'
 
 
@@ -196,105 +192,68 @@ def responses_section(result: TwoInertiaIdentification) -> ContentSection:
         'Without the torque of the other joint (decoupled), a joint is a motor and a link on a '
         'spring. Drag across a plot, or pinch it, to zoom; double-click or double-tap to reset.'
     )
-    hint = (
-        'The response of the whole arm is the mean over the poses of joint 2 in the recording, '
-        'with the other motor free. Dashed lines are the frequencies of the joint alone. Errors '
-        'are those from 5 to 60 Hz.'
-    )
-    panels = [panel for k in range(2) for panel in _joint(result, k)]
+    hint = 'Dashed lines are the frequencies of the joint alone. Errors are from 5 to 60 Hz.'
+    panels = [(joint, '', _joint(result, k)) for k, joint in enumerate(result.joints)]
     return ContentSection(
         'Frequency responses', [Paragraph(text), Panels(panels), Paragraph(hint, 'hint')]
     )
 
 
-def response_error(result: TwoInertiaIdentification, joint: int) -> float:
+def response_error(
+    result: TwoInertiaIdentification, joint: int, *, decoupled: bool = True
+) -> float:
     """Return the difference of measured and model responses of a joint, 5 to 60 Hz [dB]."""
     measured = result.measured[joint]
     seen = (measured.frequency >= _COMPARED_BAND[0]) & (measured.frequency <= _COMPARED_BAND[1])
     ideal = ideal_response(result.parameters, joint, measured.frequency[seen])[:, 0, 0]
-    return decibel_error(measured.decoupled[seen, 0], ideal)
+    found = measured.decoupled if decoupled else measured.coupled
+    return decibel_error(found[seen, 0], ideal)
 
 
-def _joint(
-    result: TwoInertiaIdentification, k: int
-) -> Iterator[tuple[str, str, Sequence[Templated]]]:
-    """Yield panels of one joint: decoupled response, and response to motor torque alone."""
-    measured, joint, parameters = result.measured[k], result.joints[k], result.parameters
+def _joint(result: TwoInertiaIdentification, k: int) -> list[Templated]:
+    """Return magnitude, phase and facts of the response of one joint."""
+    measured = result.measured[k]
     seen = (measured.frequency >= _SHOWN_BAND[0]) & (measured.frequency <= _SHOWN_BAND[1])
     own = measured.frequency[seen]
     frequency = np.unique(np.concatenate([np.geomspace(*_SHOWN_BAND, 300), own]))
-    decoupled = ideal_response(parameters, k, frequency)[:, 0, 0]
-    subspaces = result.systems[k].response(frequency)[:, 0, 0]
-    coupled = coupled_response(parameters, result.angles, frequency)[:, k]
-    at = np.searchsorted(frequency, own)
-    points, alone = np.full((2, len(frequency)), np.nan, complex)
-    points[at], alone[at] = measured.decoupled[seen, 0], measured.coupled[seen, 0]
-    low, high = (float(both[k]) for both in frequencies(parameters))
+    points = np.full((2, len(frequency)), np.nan, complex)
+    points[:, np.searchsorted(frequency, own)] = (
+        measured.decoupled[seen, 0],
+        measured.coupled[seen, 0],
+    )
+    linear = result.systems[k].response(frequency)[:, 0, 0]
+    physical = ideal_response(result.parameters, k, frequency)[:, 0, 0]
+    curves: list[tuple[str, npt.NDArray[np.complex128], Role, Kind]] = [
+        ('measured, with the other joint', points[1], 'faint', 'points'),
+        ('any linear model', linear, 'residual', 'line'),
+        ('motor, spring and link', physical, 'predicted', 'line'),
+        ('measured, decoupled', points[0], 'measured', 'points'),
+    ]
+    magnitude = [
+        Series(name, 20.0 * np.log10(np.abs(x)), role, kind) for name, x, role, kind in curves
+    ]
+    phase = [
+        Series(name, np.degrees(np.angle(x)), role, kind) for name, x, role, kind in curves[1:]
+    ]
+    low, high = (float(both[k]) for both in frequencies(result.parameters))
     marks = [
         (low, f'antiresonance {low:.1f} Hz', True),
         (high, f'resonance {high:.1f} Hz', False),
     ]
-    modelled = [('any linear model', subspaces), ('motor, spring and link', decoupled)]
-    within = (own >= _COMPARED_BAND[0]) & (own <= _COMPARED_BAND[1])
-    rows = at[within]
-    errors = (
-        response_error(result, k),
-        decibel_error(alone[rows], decoupled[rows]),
-        decibel_error(alone[rows], coupled[rows]),
-    )
-    size, compared = np.abs(alone[rows]), own[within]
-    lowest = int(np.argmin(size))
-    dip, peak = compared[lowest], compared[lowest + int(np.argmax(size[lowest:]))]
-
-    def decibel(values: npt.NDArray[np.complex128]) -> FloatArray:
-        return np.asarray(20.0 * np.log10(np.abs(values)))
-
-    def degrees(values: npt.NDArray[np.complex128]) -> FloatArray:
-        return np.asarray(np.degrees(np.angle(values)))
-
-    decoupled_charts = (
-        _chart(frequency, points, modelled, decibel, _SIZE, 260, marks),
-        _chart(frequency, points, modelled, degrees, 'phase [°]', 150, marks, last=True),
-    )
-    yield joint, 'decoupled: without the other joint', decoupled_charts
-    whole = [('whole arm, modelled', coupled), ('this joint', decoupled)]
-    alone_chart = _chart(frequency, alone, whole, decibel, _SIZE, 220, marks, last=True)
+    shared: dict[str, Any] = {'link': 'frequency', 'logarithmic': True}
     facts = [
         ('Antiresonance, resonance of the joint', f'{low:.2f} Hz, {high:.2f} Hz'),
-        ('Dip and peak as measured', f'{dip:.1f} Hz, {peak:.1f} Hz'),
-        ('Error of the joint model, decoupled', f'{errors[0]:.2f} dB rms'),
-        ('Error of the joint model, as measured', f'{errors[1]:.1f} dB rms'),
-        ('Error of the whole arm, as measured', f'{errors[2]:.1f} dB rms'),
+        ('Error of the joint model, decoupled', f'{response_error(result, k):.2f} dB rms'),
+        (
+            'Error of the joint model, with the other joint',
+            f'{response_error(result, k, decoupled=False):.1f} dB rms',
+        ),
     ]
-    yield joint, 'as measured: with the other joint', (alone_chart, FactList(facts))
-
-
-def _chart(
-    frequency: FloatArray,
-    points: npt.NDArray[np.complex128],
-    curves: Sequence[tuple[str, npt.NDArray[np.complex128]]],
-    part: Callable[[npt.NDArray[np.complex128]], FloatArray],
-    ylabel: str,
-    height: int,
-    marks: Sequence[tuple[float, str, bool]],
-    *,
-    last: bool = False,
-) -> Chart:
-    series = [
-        Series(label, part(values), role)
-        for (label, values), role in zip(curves, _ROLES, strict=True)
+    return [
+        Chart(frequency, magnitude, '', _SIZE, height=260, marks=marks, **shared),
+        Chart(frequency, phase, 'frequency [Hz]', 'phase [°]', height=150, **shared),
+        FactList(facts),
     ]
-    return Chart(
-        frequency,
-        [*series, Series('measured', part(points), 'measured', 'points')],
-        'frequency [Hz]' if last else '',
-        ylabel,
-        height=height,
-        link='frequency',
-        marks=marks if ylabel == _SIZE else [(x, '', left) for x, _, left in marks],
-        logarithmic=True,
-        legend=ylabel == _SIZE,
-    )
 
 
 def steps_section(tuning: Tuning) -> ContentSection:

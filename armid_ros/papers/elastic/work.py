@@ -13,24 +13,20 @@ from armid_ros.cli.terminal import Tick
 from armid_ros.errors import RobotError
 from armid_ros.files import Staged
 from armid_ros.motion import FloatArray
-from armid_ros.papers.elastic.plant import (
-    ElasticSensors,
+from armid_ros.papers.elastic.experiments import (
     resonance_experiments,
     RESONANCE_GAIN,
-    run_elastic,
+    run_experiment,
     step_experiments,
 )
 from armid_ros.papers.elastic.report import named_rows
 from armid_ros.recording.elastic import write_runs
 from armid_ros.recording.writer import require_new
 from armid_ros.robots import Robot
-from armid_ros.robots.two_link import (
-    two_link_set,
-    TwoLinkParameters,
-)
+from armid_ros.robots.two_link import two_link_set, TwoLinkParameters
+from armid_ros.simulation import Sensors
 from armid_ros.simulation.controller import VelocityLoop
-from armid_ros.simulation.elastic import two_link_loop, two_link_plant
-from armid_ros.simulation.sensors import LinkAccelerometers
+from armid_ros.simulation.elastic import two_link_loop
 import numpy as np
 
 #: Heads and rows of a table.
@@ -72,21 +68,17 @@ def simulate(
     for name in DEMO_BAGS:
         require_new(staged.out / name)
     resonances, steps = (staged.folder / name for name in DEMO_BAGS)
-    rng, shipped = np.random.default_rng(seed), two_link_set('after')
-    plant = two_link_plant(shipped.parameters)
-    sensors = LinkAccelerometers(robot, np.outer(radius, [1.0, 0.0, 0.0]))
+    rng, drives = np.random.default_rng(seed), two_link_set('after')
+    drives = replace(drives, assumptions={**drives.assumptions, 'accelerometer_radius': radius})
     plans = (
-        (resonances, RESONANCE_GAIN, resonance_experiments(experiments, rng), (0.006, 0.003)),
-        (steps, 1.0, step_experiments(), (0.002, 0.002)),
+        (resonances, RESONANCE_GAIN, resonance_experiments(experiments, rng), 0.004),
+        (steps, 1.0, step_experiments(), 0.002),
     )
-    for path, gain, plan, velocities in plans:
-        loop, noise = two_link_loop(shipped, gain), ElasticSensors(*velocities, 0.2)
-        runs = []
-        for number, experiment in enumerate(plan):
+    for path, gain, plan, noise in plans:
+        sensors, runs = Sensors(velocity_noise=noise, acceleration_noise=0.2), []
+        for number, reference in enumerate(plan):
             tick(number / len(plan), f'simulating {path.name}')
-            runs.append(run_elastic(plant, loop, experiment))
-        runs = [noise.measure(run, rng) for run in runs]
-        runs = [replace(run, felt=sensors.readings(run.link)) for run in runs]
+            runs.append(run_experiment(reference, drives, rng, gain=gain, sensors=sensors))
         write_runs(path, runs, robot)
     return [resonances], [steps]
 

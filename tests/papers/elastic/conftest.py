@@ -3,7 +3,7 @@
 """Experiments with the two-link arm, recorded in MuJoCo for independent tests."""
 
 from armid_ros.motion import ElasticRun
-from armid_ros.papers.elastic.plant import RESONANCE_GAIN, step_experiments
+from armid_ros.papers.elastic.experiments import RESONANCE_GAIN, step_experiments
 from armid_ros.robots.two_link import two_link_set, TwoLinkParameters
 from armid_ros.simulation.elastic import two_link_loop
 import numpy as np
@@ -12,9 +12,9 @@ import pytest
 from tests.papers.elastic.two_link_in_mujoco import (
     excitation,
     MANY,
+    measured,
     mujoco_arm,
     run_mujoco,
-    SENSORS,
 )
 
 
@@ -36,4 +36,4 @@ def runs(truth) -> list[ElasticRun]:
     """Return twelve noisy experiments of 4 s through the resonances."""
     rng = np.random.default_rng(3)
     loop, engine = two_link_loop(two_link_set('after'), RESONANCE_GAIN), mujoco_arm(truth)
-    return [SENSORS.measure(run_mujoco(engine, loop, e), rng) for e in excitation(12)]
+    return [measured(run_mujoco(engine, loop, e), rng) for e in excitation(12)]

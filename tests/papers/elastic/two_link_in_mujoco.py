@@ -11,14 +11,13 @@ beginning at the set before tuning.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from armid_ros.motion import ElasticRun, FloatArray
+from armid_ros.papers.elastic.experiments import resonance_experiments
 from armid_ros.papers.elastic.identification.response import unpack
-from armid_ros.papers.elastic.plant import (
-    ElasticSensors,
-    Experiment,
-    resonance_experiments,
-)
 from armid_ros.robots import load_robot
+from armid_ros.robots.reference import Reference
 from armid_ros.robots.two_link import ROBOT, TwoLinkParameters
 from armid_ros.simulation.controller import VelocityLoop
 from armid_ros.simulation.plant import Plant
@@ -26,7 +25,6 @@ import numpy as np
 import pinocchio as pin
 
 DT = 1e-3
-SENSORS = ElasticSensors(motor_velocity=0.006, link_velocity=0.003, link_acceleration=0.2)
 MAIN, SPRING_DAMPING = slice(0, 7), slice(11, 13)
 #: Frequencies of the printed set after tuning [Hz], motors free and locked, by pose [deg].
 FREE = {0: (31.5, 63.0), 45: (31.9, 55.7), 90: (33.3, 47.0), 135: (36.4, 42.9), 180: (38.9, 42.2)}
@@ -74,9 +72,25 @@ def modes(plant: Plant, q: FloatArray, *, locked: bool = False) -> FloatArray:
     return np.asarray(found[np.argsort(found[:, 0])])
 
 
-def excitation(count: int, seed: int = 0) -> list[Experiment]:
+def excitation(count: int, seed: int = 0) -> list[Reference]:
     """Return experiments that excite the resonances."""
     return resonance_experiments(count, np.random.default_rng(seed))
+
+
+def measured(
+    run: ElasticRun,
+    rng: np.random.Generator,
+    motor: float = 0.006,
+    link: float = 0.003,
+    acceleration: float = 0.2,
+) -> ElasticRun:
+    """Return a run with noise of the velocities [rad/s] and accelerations [rad/s^2]."""
+
+    def noisy(values: FloatArray, std: float) -> FloatArray:
+        return np.asarray(values + std * rng.standard_normal(values.shape))
+
+    links = replace(run.link, dq=noisy(run.link.dq, link), ddq=noisy(run.link.ddq, acceleration))
+    return replace(run, motor=replace(run.motor, dq=noisy(run.motor.dq, motor)), link=links)
 
 
 def mujoco_arm(parameters: TwoLinkParameters, substeps: int = 20):
@@ -123,19 +137,21 @@ def mujoco_arm(parameters: TwoLinkParameters, substeps: int = 20):
     return mujoco.MjModel.from_xml_string(text)
 
 
-def run_mujoco(model, loop: VelocityLoop, experiment: Experiment) -> ElasticRun:
-    """Run one experiment under the velocity loop, as ``run_elastic`` does."""
+def run_mujoco(model, loop: VelocityLoop, reference: Reference) -> ElasticRun:
+    """Run one experiment under the velocity loop, as ``run_experiment`` does."""
     from armid_ros.motion import Motion
     import mujoco
 
     data, substeps = mujoco.MjData(model), round(DT / model.opt.timestep)
-    data.qpos[:] = [*experiment.q, *experiment.q]
-    count = len(experiment.velocity)
+    data.qpos[:] = [*reference.q[0], *reference.q[0]]
+    t = DT * np.arange(round(reference.duration / DT))
+    wanted = reference.sample(t)
+    velocity = np.diff(wanted.q, axis=0, prepend=wanted.q[:1]) / DT
+    count, extra = len(t), np.zeros((len(t), 2)) if wanted.tau is None else wanted.tau
     q, v, a = np.empty((3, count, 4))
     tau, integral = np.empty((count, 2)), np.zeros(2)
-    extra = np.zeros((count, 2)) if experiment.torque is None else experiment.torque
     for k in range(count):
-        error = experiment.velocity[k] - data.qvel[:2]
+        error = velocity[k] - data.qvel[:2]
         integral += DT * error
         tau[k] = loop.proportional * error + loop.integral * integral + extra[k]
         data.qfrc_applied[:2] = tau[k]
@@ -143,10 +159,9 @@ def run_mujoco(model, loop: VelocityLoop, experiment: Experiment) -> ElasticRun:
         mujoco.mj_forward(model, data)
         a[k] = data.qacc
         mujoco.mj_step(model, data, substeps)
-    t = DT * np.arange(count)
-    joints = ('joint1', 'joint2')
-    motor = Motion(joints, t, q[:, :2], v[:, :2], a[:, :2], tau)
-    return ElasticRun(motor, Motion(joints, t, q[:, 2:], v[:, 2:], a[:, 2:]), experiment.velocity)
+    motor = Motion(wanted.joints, t, q[:, :2], v[:, :2], a[:, :2], tau)
+    links = Motion(wanted.joints, t, q[:, 2:], v[:, 2:], a[:, 2:])
+    return ElasticRun(motor, links, velocity)
 
 
 def errors(found: TwoLinkParameters, truth: TwoLinkParameters) -> dict[str, float]:

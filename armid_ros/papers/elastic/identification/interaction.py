@@ -22,12 +22,7 @@ from dataclasses import replace
 
 from armid_ros.errors import IdentificationError
 from armid_ros.motion import ElasticRun, FloatArray, Motion
-from armid_ros.papers.elastic.identification.subspace import (
-    Hold,
-    identify_subspace,
-    Signals,
-    StateSpace,
-)
+from armid_ros.papers.elastic.identification.subspace import Hold, Signals, StateSpace
 from armid_ros.robots.two_link import TwoLinkParameters
 import numpy as np
 import numpy.typing as npt
@@ -36,7 +31,8 @@ from scipy.signal import csd
 
 #: Number of states of motor, spring and link that the velocities determine.
 ORDER = 3
-_HOLD: tuple[Hold, Hold] = ('zero', 'first')  # drives hold their torque, links move smoothly
+#: Drives hold their torque between samples; links move smoothly.
+HOLD: tuple[Hold, Hold] = ('zero', 'first')
 
 
 def link_columns(q: FloatArray, dq: FloatArray, ddq: FloatArray) -> FloatArray:
@@ -94,6 +90,9 @@ def joint_signals(
     """
     Return inputs and outputs of one joint in all experiments.
 
+    Inputs are the torque of the motor less Coulomb friction, and the interaction torque. Outputs
+    are the velocities of motor and link. All are at the joint.
+
     Parameters
     ----------
     runs : sequence of ElasticRun
@@ -117,33 +116,6 @@ def joint_signals(
         outputs = np.column_stack([run.motor.dq[:, joint], run.link.dq[:, joint]])
         signals.append(Signals(np.column_stack(inputs), outputs))
     return signals
-
-
-def decouple(
-    runs: Sequence[ElasticRun], parameters: TwoLinkParameters
-) -> tuple[StateSpace, StateSpace]:
-    """
-    Identify both joints by subspaces, each with its interaction torque as an input.
-
-    Returns
-    -------
-    tuple of StateSpace
-        System of each joint. Inputs: torque of the motor less Coulomb friction, and interaction
-        torque. Outputs: velocities of motor and link. All are at the joint.
-
-    Raises
-    ------
-    IdentificationError
-        If the data do not determine a system; see ``identify_subspace``.
-
-    """
-    t = runs[0].motor.t
-    dt = float(t[-1] - t[0]) / (len(t) - 1)
-    first, second = (joint_signals(runs, parameters, joint, decoupled=True) for joint in range(2))
-    return (
-        identify_subspace(first, dt, ORDER, _HOLD),
-        identify_subspace(second, dt, ORDER, _HOLD),
-    )
 
 
 def measured_response(
@@ -192,39 +164,6 @@ def measured_response(
     s = 2j * np.pi * frequency * dt
     response[:, :, 0] /= ((1.0 - np.exp(-s)) / s)[:, np.newaxis]
     return np.asarray(frequency, dtype=np.float64), response
-
-
-def coupled_response(
-    parameters: TwoLinkParameters, angles: npt.ArrayLike, frequency: npt.ArrayLike
-) -> npt.NDArray[np.complex128]:
-    """
-    Return the response of each motor velocity to its own motor torque, with coupled joints.
-
-    Parameters
-    ----------
-    parameters : TwoLinkParameters
-        The arm.
-    angles : array_like, shape (S,)
-        Poses of joint 2 to take the mean over [rad]; the arm is at rest in each, and the other
-        motor is free.
-    frequency : array_like, shape (K,)
-        [Hz].
-
-    Returns
-    -------
-    ndarray of complex, shape (K, 2)
-        From motor torque to motor velocity of each joint [rad/s / (N m)].
-
-    """
-    s = 2j * np.pi * np.asarray(frequency, dtype=float)[:, np.newaxis, np.newaxis]
-    spring = np.diag(parameters.stiffness) / s + np.diag(parameters.spring_damping)
-    motor = np.diag(parameters.rotor) * s + np.diag(parameters.joint_motor_damping) + spring
-    mean = np.zeros((len(s), 2), complex)
-    for angle in (poses := np.asarray(angles, dtype=float)):
-        link = parameters.mass_matrix(angle) * s + np.diag(parameters.link_damping) + spring
-        inverse = np.linalg.inv(motor - spring @ np.linalg.solve(link, spring))
-        mean += np.diagonal(inverse, axis1=1, axis2=2) / len(poses)
-    return mean
 
 
 def decibel_error(found: npt.NDArray[np.complex128], wanted: npt.NDArray[np.complex128]) -> float:
@@ -281,7 +220,7 @@ def fit_joints(
     Parameters
     ----------
     systems : sequence of StateSpace
-        Both joints, as of ``decouple``.
+        Both joints, identified from the inputs and outputs of ``joint_signals``, decoupled.
     joints : sequence of str
         Their names.
     known : TwoLinkParameters

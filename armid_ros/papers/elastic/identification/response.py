@@ -138,38 +138,18 @@ def sensitivities(
     return found[:, :, 0].real, np.moveaxis(found.imag / _COMPLEX_STEP, 2, 3)
 
 
-def ringing(steps: Steps, parameters: TwoLinkParameters) -> FloatArray:
-    """
-    Differentiate the velocities by initial twist and initial link velocity.
-
-    Returns
-    -------
-    ndarray, shape (N, E, 4, 4)
-        Derivatives of the velocities of motors and links by initial twists of the springs [rad]
-        and the initial velocities of both links [rad/s].
-
-    """
-    values = np.tile(_point(parameters).astype(complex), (4, 1))
-    found = _simulate(steps, values, parameters.gear, 1j * _COMPLEX_STEP * np.eye(4))
-    return np.moveaxis(found.imag / _COMPLEX_STEP, 2, 3)
-
-
 def _point(parameters: TwoLinkParameters) -> FloatArray:
     return np.concatenate([unpack(parameters), parameters.coulomb])
 
 
-def _simulate(
-    steps: Steps, values: DualArray, gear: FloatArray, rest: DualArray | None = None
-) -> DualArray:
-    """Simulate E experiments with D parameter vectors and initial states each; (N, E, D, 4)."""
+def _simulate(steps: Steps, values: DualArray, gear: FloatArray) -> DualArray:
+    """Simulate E experiments from rest with D parameter vectors each; (N, E, D, 4)."""
     experiments, sets, substeps = len(steps.q), len(values), 2
     arm = _Arm(np.tile(values, (experiments, 1)), gear, steps.dt / substeps)
     size = experiments * sets
     dtype = values.dtype
     q2 = np.repeat(steps.q[:, 1], sets).astype(dtype)
     x = np.zeros((size, 6), dtype)
-    if rest is not None:
-        x[:, [0, 1, 4, 5]] = np.tile(rest, (experiments, 1))
     dv = np.zeros((size, 4), dtype)
     modes = np.zeros((size, 2), int)
     integral = np.repeat(steps.integral, sets, axis=0).astype(dtype)

@@ -7,9 +7,8 @@ Step 3b fits simulated velocity responses to the measured ones: nonlinear least 
 logarithms of the parameters, which are therefore positive. The data determine the sum of viscous
 friction of motor and link, dl + dm gear^2, but hardly the ratio. With a free ratio the fit
 diverges; a fixed ratio biases the stiffness. The ratio therefore has a prior with a standard
-deviation of a factor of two. Coulomb torques start from step 1 and are nuisance parameters. An
-arm at rest still vibrates. Its initial vibrations are treated as correlated noise of the
-velocities.
+deviation of a factor of two. Coulomb torques start from step 1 and are nuisance parameters. The
+arm is at rest before a step.
 
 """
 
@@ -23,15 +22,15 @@ from armid_ros.estimate import Estimate
 from armid_ros.identification.fitting.covariance import score_products, widened
 from armid_ros.motion import ElasticRun, FloatArray
 from armid_ros.papers.elastic.identification.interaction import (
-    decouple,
     fit_joints,
+    HOLD,
     joint_signals,
     measured_response,
+    ORDER,
 )
 from armid_ros.papers.elastic.identification.response import (
     pack,
     parameter_names,
-    ringing,
     sensitivities,
     SIZE,
     Steps,
@@ -39,7 +38,7 @@ from armid_ros.papers.elastic.identification.response import (
     velocities,
 )
 from armid_ros.papers.elastic.identification.rigid import fit_rigid, RigidFit
-from armid_ros.papers.elastic.identification.subspace import StateSpace
+from armid_ros.papers.elastic.identification.subspace import identify_subspace, StateSpace
 from armid_ros.robots.two_link import TwoLinkParameters
 from armid_ros.simulation.controller import VelocityLoop
 import numpy as np
@@ -117,7 +116,6 @@ def tune(
     # the standard deviation of the logarithms of the Coulomb torques is 0.1
     prior[[2, 3], [SIZE, SIZE + 1]] = 10.0
     weight = np.ones(measured.shape[-1])
-    whitened = _whitening(steps, start, weight)
 
     def arm(factors: FloatArray) -> TwoLinkParameters:
         values = base * np.exp(factors)
@@ -125,14 +123,13 @@ def tune(
 
     def residual(factors: FloatArray) -> FloatArray:
         simulated = velocities(steps, arm(factors))
-        residuals = whitened((simulated - measured)[..., np.newaxis] / weight[:, np.newaxis])
-        return np.concatenate([residuals.ravel(), prior @ factors])
+        return np.concatenate([((simulated - measured) / weight).ravel(), prior @ factors])
 
     def jacobian(factors: FloatArray) -> FloatArray:
         now = base * np.exp(factors)
         _, slopes = sensitivities(steps, arm(factors), np.diag(now))
-        slopes = whitened(slopes / weight[:, np.newaxis])
-        return np.vstack([slopes.reshape(-1, len(base)), prior])
+        slopes = (slopes / weight[:, np.newaxis]).reshape(-1, len(base))
+        return np.vstack([slopes, prior])
 
     factors = np.zeros(len(base))
     for _ in range(3):  # from the second pass on, every sensor is weighted by its own noise
@@ -142,7 +139,6 @@ def tune(
         factors = fit.x
         residuals = fit.fun[: -len(prior)].reshape(-1, len(weight)) * weight
         weight = np.sqrt(np.mean(residuals**2, axis=0)) + 1e-12
-        whitened = _whitening(steps, arm(factors), weight)
     after = arm(factors)
     found = unpack(after)
     rows, residuals = jacobian(factors), residual(factors)
@@ -160,28 +156,6 @@ def tune(
         velocities(steps, start),
         velocities(steps, after),
     )
-
-
-def _whitening(
-    steps: Steps, parameters: TwoLinkParameters, weight: FloatArray
-) -> Callable[[FloatArray], FloatArray]:
-    """Return a function that whitens velocities, (N, E, C, D), for the initial vibrations."""
-    # twist of the springs [rad] and velocity of the links [rad/s], some tenths of a second after
-    # a step of 1 rad/s
-    std = np.array([1e-5, 1e-5, 1e-3, 1e-3])
-    slopes = ringing(steps, parameters) * std / weight[:, np.newaxis]
-    flat = np.moveaxis(slopes, 1, 0).reshape(slopes.shape[1], -1, slopes.shape[3])
-    shapes, sizes, _ = np.linalg.svd(flat, full_matrices=False)  # of the vibrations
-    shares = 1.0 - 1.0 / np.sqrt(1.0 + sizes**2)  # that are removed
-
-    def whitened(values: FloatArray) -> FloatArray:
-        flat = np.moveaxis(values, 1, 0).reshape(values.shape[1], -1, values.shape[3])
-        part = shares[..., np.newaxis] * (shapes.transpose(0, 2, 1) @ flat)
-        count, experiments, channels, columns = values.shape
-        clean = (flat - shapes @ part).reshape(experiments, count, channels, columns)
-        return np.asarray(np.moveaxis(clean, 0, 1))
-
-    return whitened
 
 
 def _covariance(jacobian: FloatArray) -> FloatArray:
@@ -231,9 +205,9 @@ class TwoInertiaIdentification:
         Names of the joints.
     rigid : RigidFit
         Step 1.
-    measured : tuple of MeasuredJoint
+    measured : sequence of MeasuredJoint
         Measured responses without a model, for comparison.
-    systems : tuple of StateSpace
+    systems : sequence of StateSpace
         Step 2, of both joints.
     untuned : TwoLinkParameters
         Parameters after step 3a.
@@ -241,8 +215,6 @@ class TwoInertiaIdentification:
         Gain of the interaction torques in step 3a; 1 if beta and gamma are right.
     experiments : int
         Number of experiments through the resonances.
-    angles : ndarray, shape (S,)
-        Poses of joint 2 that the experiments went through [rad].
     tuning : Tuning or None
         Step 3b; None without step responses.
 
@@ -250,12 +222,11 @@ class TwoInertiaIdentification:
 
     joints: tuple[str, ...]
     rigid: RigidFit
-    measured: tuple[MeasuredJoint, MeasuredJoint]
-    systems: tuple[StateSpace, StateSpace]
+    measured: Sequence[MeasuredJoint]
+    systems: Sequence[StateSpace]
     untuned: TwoLinkParameters
     interaction_gain: FloatArray
     experiments: int
-    angles: FloatArray
     tuning: Tuning | None
 
     @property
@@ -311,20 +282,18 @@ def identify_two_inertia(
     known = replace(
         drives, alpha=alpha, beta=beta, gamma=gamma, coulomb=rigid.coulomb / drives.gear
     )
-    progress(0.05, 'step 2: decoupled joints')
-    joints, systems = runs[0].motor.joints, decouple(runs, known)
-    progress(0.35, 'measured responses')
-    t = runs[0].motor.t
+    joints, t = runs[0].motor.joints, runs[0].motor.t
     dt = float(t[-1] - t[0]) / (len(t) - 1)
     window = min(1.0, min(len(run.motor) for run in runs) * dt)
-    found: list[MeasuredJoint] = []
-    for joint in range(2):
-        signals = joint_signals(runs, known, joint, decoupled=True)
-        alone = joint_signals(runs, known, joint, decoupled=False)
+    systems, measured = [], []
+    for k, joint in enumerate(joints):
+        progress(0.05 + 0.2 * k, f'step 2: decoupled {joint}')
+        signals = joint_signals(runs, known, k, decoupled=True)
+        alone = joint_signals(runs, known, k, decoupled=False)
+        systems.append(identify_subspace(signals, dt, ORDER, HOLD))
         frequency, decoupled = measured_response(signals, dt, window=window)
         _, coupled = measured_response(alone, dt, window=window)
-        found.append(MeasuredJoint(frequency, decoupled[:, :, 0], coupled[:, :, 0]))
-    measured = found[0], found[1]
+        measured.append(MeasuredJoint(frequency, decoupled[:, :, 0], coupled[:, :, 0]))
     progress(0.45, 'step 3: physical parameters')
     untuned, gain = fit_joints(systems, joints, known)
     tuning = None
@@ -333,10 +302,6 @@ def identify_two_inertia(
         begin = untuned if start is None else replace(start, coulomb=untuned.coulomb)
         tuning = tune(steps, begin, loop)
     progress(1.0, 'done')
-    # representative poses
-    angles = np.quantile(
-        np.concatenate([run.link.q[:, 1] for run in runs]), np.linspace(0.02, 0.98, 25)
-    )
     return TwoInertiaIdentification(
-        joints, rigid, measured, systems, untuned, gain, len(runs), angles, tuning
+        joints, rigid, measured, systems, untuned, gain, len(runs), tuning
     )

@@ -4,22 +4,21 @@
 
 from dataclasses import replace
 
+from armid_ros.papers.elastic.experiments import run_experiment, step_experiments
 from armid_ros.papers.elastic.identification.response import (
     pack,
-    ringing,
     sensitivities,
     Steps,
     unpack,
     velocities,
 )
 from armid_ros.papers.elastic.identification.three_steps import tune, Tuning
-from armid_ros.papers.elastic.plant import ElasticSensors, run_elastic, step_experiments
 from armid_ros.robots.two_link import two_link_set
-from armid_ros.simulation.elastic import two_link_loop, two_link_plant
+from armid_ros.simulation.elastic import two_link_loop
 import numpy as np
 import pytest
 
-from tests.papers.elastic.two_link_in_mujoco import errors
+from tests.papers.elastic.two_link_in_mujoco import errors, measured
 
 pytestmark = pytest.mark.long
 
@@ -36,10 +35,11 @@ def experiments(clean_steps) -> Steps:
 @pytest.mark.parametrize('number', range(4))
 def test_simulation_is_that_of_the_plant(experiments, truth, number) -> None:
     """The same scheme, written for the links' equations and for any URDF."""
-    run = run_elastic(two_link_plant(truth), LOOP, step_experiments()[number])
+    reference, rng = step_experiments()[number], np.random.default_rng(0)
+    run = run_experiment(reference, two_link_set('after'), rng)
     found = velocities(experiments, truth)[:, number]
-    np.testing.assert_allclose(found[:, :2], run.motor.dq, atol=1e-9)
-    np.testing.assert_allclose(found[:, 2:], run.link.dq, atol=1e-9)
+    np.testing.assert_allclose(found[:, :2], run.motor.dq[: len(found)], atol=1e-9)
+    np.testing.assert_allclose(found[:, 2:], run.link.dq[: len(found)], atol=1e-9)
 
 
 def test_derivatives_are_exact(experiments) -> None:
@@ -62,9 +62,8 @@ def test_derivatives_are_exact(experiments) -> None:
 @pytest.fixture(scope='module')
 def tuned(clean_steps) -> Tuning:
     """Return the tuning to steps with noise of 0.002 rad/s."""
-    sensors = ElasticSensors(motor_velocity=0.002, link_velocity=0.002)
     rng = np.random.default_rng(5)
-    return tune([sensors.measure(run, rng) for run in clean_steps], START, LOOP)
+    return tune([measured(run, rng, 0.002, 0.002) for run in clean_steps], START, LOOP)
 
 
 def test_small_noise(clean_steps, truth, tuned) -> None:
@@ -82,26 +81,3 @@ def test_intervals_hold_the_truth(truth, tuned) -> None:
     off = np.abs(tuned.estimate.values - unpack(truth)) / tuned.estimate.std
     assert np.all(off < 4.0)
     assert np.sqrt(np.mean(off**2)) < 2.0
-
-
-def test_an_arm_that_still_rings_has_no_other_springs_for_it(
-    clean_steps, experiments, truth
-) -> None:
-    """Without noise deviations are tiny, and what a stand leaves is far beyond them."""
-    rng = np.random.default_rng(7)
-    rest = rng.normal(size=(len(clean_steps), 4)) * [1e-6, 1e-6, 1e-4, 1e-4]
-    seen = velocities(experiments, truth)
-    seen = seen + np.einsum('necr,er->nec', ringing(experiments, truth), rest)
-    seen = seen + 1e-6 * rng.normal(size=seen.shape)
-    runs = [
-        replace(
-            run,
-            motor=replace(run.motor, dq=seen[:, number, :2]),
-            link=replace(run.link, dq=seen[:, number, 2:]),
-        )
-        for number, run in enumerate(clean_steps)
-    ]
-    found = tune(runs, replace(truth, stiffness=1.01 * truth.stiffness), LOOP)
-    np.testing.assert_allclose(found.parameters.stiffness, truth.stiffness, rtol=1e-5)
-    off = np.abs(found.estimate.values - unpack(truth)) / found.estimate.std
-    assert np.all(off < 4.0)

@@ -8,7 +8,6 @@ from armid_ros.arm import ArmModel
 from armid_ros.effects import parse_effect
 from armid_ros.errors import TrajectoryError
 from armid_ros.motion import Motion
-from armid_ros.papers.elastic.plant import run_elastic, step_experiments
 from armid_ros.robots import load_robot
 from armid_ros.robots.two_link import two_link_set
 from armid_ros.simulation import Reference
@@ -16,8 +15,6 @@ from armid_ros.simulation.elastic import (
     elastic_joints,
     make_simulated_arm,
     shipped_arm,
-    two_link_loop,
-    two_link_plant,
 )
 from armid_ros.simulation.run import record
 from armid_ros.simulation.sensors import LinkAccelerometers
@@ -59,21 +56,6 @@ def ramp(q, velocity, duration, tau=None):
     """Return the way from a pose at constant velocity."""
     q = np.array([q, q + duration * np.asarray(velocity)])
     return Reference(TWO_LINKS.joints, np.array([0.0, duration]), q, tau=tau)
-
-
-def test_a_ramp_of_position_is_a_step_of_velocity():
-    """The loop is that of the source, so that its step responses are those that are tuned to."""
-    pose, velocity = np.array([0.0, np.pi / 4]), np.array([1.0, -1.0])
-    step = step_experiments()[2]
-    wanted = run_elastic(two_link_plant(SHIPPED.parameters), two_link_loop(SHIPPED), step)
-    arm = two_links(start=pose)
-    arm.set_trajectory(ramp(pose, velocity, 0.5))
-    samples = [arm.advance() for _ in range(500)]
-    for side, name in ((wanted.motor.dq, 'dq'), (wanted.link.dq, 'link.dq')):
-        found = [attrgetter(name)(sample) for sample in samples]
-        np.testing.assert_allclose(found, side[:500], atol=1e-10)
-    np.testing.assert_allclose([s.tau for s in samples], wanted.motor.tau[:500], atol=1e-8)
-    np.testing.assert_allclose([s.link.asked_dq for s in samples], np.tile(velocity, (500, 1)))
 
 
 def test_torque_of_a_trajectory_comes_on_top_of_the_loop():
