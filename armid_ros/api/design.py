@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -16,8 +16,8 @@ from armid_ros.excitation import (
     CollisionScene,
     design,
     DesignProblem,
-    DesignProgress,
     DesignSettings,
+    Progress,
     TransferPlanner,
     whole_period,
     with_joint_limits,
@@ -44,7 +44,7 @@ def design_excitation(
     start: FloatArray | None = None,
     after: RecordingLike | Sequence[RecordingLike] = (),
     rival: ArmModel | None = None,
-    progress: Callable[[DesignProgress], None] | None = None,
+    progress: Progress = lambda done, cost: None,
     speed: str | float = 'fast',
     criterion: str = 'D',
     target: str = 'all',
@@ -89,8 +89,8 @@ def design_excitation(
         Earlier recordings; the trajectory adds to their information.
     rival : ArmModel, optional
         With ``criterion='T'``: model with the rival effects in place of those of ``arm``.
-    progress : callable, optional
-        Called with the progress of the search.
+    progress : callable
+        Called with the share of the search that is done, and the cost of the best trajectory.
     speed : str or float
         'slow', 'medium', 'fast' or a share of the velocity and acceleration limits.
     criterion : {'D', 'A', 'E', 'condition', 'T'}
@@ -184,7 +184,7 @@ def _searched(
     earlier: Sequence[Recording],
     rng: Rng,
     rival: ArmModel | None,
-    progress: Callable[[DesignProgress], None] | None,
+    progress: Progress,
 ) -> ExcitationResult:
     """Search for the trajectory, after a check that the start pose is free of collisions."""
     planner = TransferPlanner.of(model, scene, settings.speed)

@@ -261,7 +261,7 @@ def excite(
             noise=options.per_joint(torque_noise, robot, '--torque-noise'),
             clearance=clearance,
             rng=seed,
-            progress=lambda now: tick(now.done, f'designing, cost {now.cost:.2f}'),
+            progress=lambda done, cost: tick(done, f'designing, cost {cost:.2f}'),
             **{name: value for name, value in settings.items() if value is not None},
         )
         result = replace(result, with_isolability=show_isolability)

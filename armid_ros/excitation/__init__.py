@@ -9,7 +9,7 @@ with every `Obstacle`. An `Excitation` runs the trajectory from rest to rest.
 
 """
 
-from armid_ros.excitation.design import Design, design, DesignProgress, evaluate
+from armid_ros.excitation.design import Design, design, evaluate, Progress
 from armid_ros.excitation.feasibility import random_feasible, trajectory_faults
 from armid_ros.excitation.fourier import FourierTrajectory
 from armid_ros.excitation.geometry.clearance import ClearanceModel
@@ -36,7 +36,7 @@ __all__ = [
     'Limits',
     'Obstacle',
     'DesignProblem',
-    'DesignProgress',
+    'Progress',
     'Run',
     'SPEED_CLASSES',
     'TARGETS',

@@ -21,23 +21,8 @@ from armid_ros.motion import FloatArray
 from armid_ros.robots import CollisionModel
 import numpy as np
 
-
-@dataclass(frozen=True)
-class DesignProgress:
-    """
-    Progress of a design.
-
-    Attributes
-    ----------
-    done : float
-        Share of the work done, 0 ... 1.
-    cost : float
-        Cost of the best feasible trajectory so far; see `Criterion`.
-
-    """
-
-    done: float
-    cost: float
+#: Callback with the share of the work done, 0 ... 1, and the cost of the best trajectory so far.
+Progress = Callable[[float, float], None]
 
 
 @dataclass(frozen=True)
@@ -118,7 +103,7 @@ def design(
     collision: CollisionModel | None = None,
     prior_information: FloatArray | None = None,
     rival: ArmModel | None = None,
-    progress: Callable[[DesignProgress], None] | None = None,
+    progress: Progress = lambda done, cost: None,
 ) -> Design:
     """
     Find the trajectory with the most information on the parameters.
@@ -139,8 +124,9 @@ def design(
         ``DesignProblem.information(motion).matrix`` of the recordings.
     rival : ArmModel, optional
         The model to distinguish ``arm`` from, with criterion 'T'.
-    progress : callable, optional
-        Called with the progress after every step.
+    progress : callable
+        Called after every step with the share of the work done, and with the cost of the best
+        feasible trajectory so far.
 
     Returns
     -------
@@ -169,11 +155,7 @@ def design(
         if not np.all(np.isfinite(prior)):
             raise TrajectoryError('prior information: not all entries are finite numbers')
 
-    def watch(done: float, cost: float) -> None:
-        if progress is not None:
-            progress(DesignProgress(done, cost))
-
-    search = Search(problem, clearance, prior, rng.spawn(1)[0], watch)
+    search = Search(problem, clearance, prior, rng.spawn(1)[0], progress)
     stopped = search.run()
     assert search.trajectory is not None
     excitation = placed(problem, search.trajectory)

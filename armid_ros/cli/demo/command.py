@@ -68,7 +68,7 @@ def demo(gravity: str, rate: float, hide: str, out: Path, seed: int, as_json: bo
             settings,
             rng,
             collision=collision_model(robot),
-            progress=lambda now: tick(now.done),
+            progress=lambda done, cost: tick(done),
         ).excitation
         save_excitation(excitation, new / 'excitation.yaml')
         tick(0.0, 'moving, and identifying online')
