@@ -207,24 +207,14 @@ class Fitness:
         return f'Give {needed}, or check these items yourself before the run.' if needed else ''
 
     def __str__(self) -> str:
-        """Return a sentence on the results and on the unchecked items."""
-        parts = ['no limit violated', *self.distances()]
-        sentence = f'{self.word}: {", ".join(parts)}'
-        if self.unchecked:
-            sentence += f'; not checked: {"; ".join(self.unchecked)}'
-        return sentence
+        """Return the verdict, and sentences on the results and on the unchecked items."""
+        return f'{self.word}: {" ".join(self.sentences())}'
 
     def sentences(self) -> list[str]:
         """Return sentences on limits and unchecked items, and on distances, the worse first."""
         limits = 'No limit violated'
         if self.unchecked:
             limits += f'; not checked: {"; ".join(self.unchecked)}'
-        near = ', '.join(self.distances())
-        found = [f'{text[0].upper()}{text[1:]}.' for text in (limits, near) if text]
-        return found[::-1] if self.word == UNFIT else found
-
-    def distances(self) -> list[str]:
-        """Return phrases on the smallest clearance and on the lowest point, if known."""
         parts = []
         if self.nearest is not None:
             parts.append(
@@ -239,7 +229,9 @@ class Fitness:
             parts.append(
                 f'lowest point {abs(height):.3f} m {side} the {what} ({self.lowest.link})'
             )
-        return parts
+        near = ', '.join(parts)
+        found = [f'{text[0].upper()}{text[1:]}.' for text in (limits, near) if text]
+        return found[::-1] if self.word == UNFIT else found
 
 
 def fitness(motion: Motion, scene: CollisionScene) -> Fitness:

@@ -41,32 +41,21 @@ EFFECTS = {
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ('criterion', 'effects'),
-    [*(('D', effects) for effects in EFFECTS), *((name, 'state') for name in 'AE'),
-     ('condition', 'state')],
-)  # fmt: skip
-def test_gradient_of_each_criterion_and_of_each_kind_of_effect(
-    tree, with_effects, criterion, effects
-):
-    settings = DesignSettings(period=5.0, harmonics=2, criterion=criterion)
-    arm = with_effects(tree, *EFFECTS[effects])
-    problem = DesignProblem.of(arm, settings, np.random.default_rng(3))
-    assert_gradient(Objective(problem), problem)
-
-
-@pytest.mark.parametrize(
-    ('target', 'effects'),
+    ('robot', 'effects', 'settings'),
     [
-        ('gravity', ()),
-        ('gravity', ('coulomb_friction', 'payload')),
-        ('effects', ('payload', 'viscous_friction')),
+        *(('tree', effects, {}) for effects in EFFECTS.values()),
+        *(('tree', EFFECTS['state'], {'criterion': c}) for c in ('A', 'E', 'condition')),
+        ('humanoid', (), {'target': 'gravity'}),
+        ('humanoid', ('coulomb_friction', 'payload'), {'target': 'gravity'}),
+        ('humanoid', ('payload', 'viscous_friction'), {'target': 'effects'}),
     ],
 )
-def test_gradient_of_each_target(humanoid, with_effects, target, effects):
-    settings = DesignSettings(period=5.0, harmonics=2, target=target)
-    problem = DesignProblem.of(
-        with_effects(humanoid, *effects), settings, np.random.default_rng(3)
-    )
+def test_gradient_of_each_criterion_effect_and_target(
+    request, with_effects, robot, effects, settings
+):
+    arm = with_effects(request.getfixturevalue(robot), *effects)
+    settings = DesignSettings(period=5.0, harmonics=2, **settings)
+    problem = DesignProblem.of(arm, settings, np.random.default_rng(3))
     assert_gradient(Objective(problem), problem)
 
 

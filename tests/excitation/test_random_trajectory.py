@@ -15,7 +15,6 @@ from armid_ros.excitation import (
     random_feasible,
     with_obstacles,
 )
-from armid_ros.motion import Motion
 from armid_ros.robots import collision_model
 import numpy as np
 import pytest
@@ -42,18 +41,6 @@ def test_torque_limit_below_gravity_is_named(two_link_arm):
     )
     with pytest.raises(TrajectoryError, match=r'shoulder.*2 N'):
         random_feasible(two_link_arm, pinned, 6.0, 3, np.random.default_rng(0))
-
-
-def test_limits_that_no_pose_keeps_together_are_named(two_link_arm):
-    """The shoulder is held best upright, the elbow with the upper arm level."""
-    lower, upper = np.array([0.3, 0.3]), np.array([1.4, 1.4])
-    q = np.random.default_rng(1).uniform(lower, upper, (5000, 2))
-    rest = np.zeros_like(q)
-    motion = Motion(two_link_arm.robot.joints, np.arange(5000.0), q, rest, rest)
-    least = np.abs(two_link_arm.joint_torque(motion)).min(axis=0)
-    limits = replace(Limits.of(two_link_arm.robot), lower=lower, upper=upper, torque=1.2 * least)
-    with pytest.raises(TrajectoryError, match='torque'):
-        random_feasible(two_link_arm, limits, 6.0, 3, np.random.default_rng(0))
 
 
 @pytest.mark.parametrize('name', ['coulomb_friction', 'presliding_hysteresis'])

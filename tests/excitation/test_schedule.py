@@ -93,32 +93,24 @@ def test_coefficients_that_are_no_numbers_are_refused_with_the_joint():
         FourierTrajectory(('elbow',), 1.0, np.zeros(1), np.full((1, 2), np.nan), np.zeros((1, 2)))
 
 
-@pytest.mark.parametrize('start', ['[0.5]', '0.5'])
-def test_a_start_pose_that_would_be_another_motion_is_refused(make_run_file, start):
-    path = make_run_file('run_in:', f'start: {start}\nrun_in:')
-    with pytest.raises(TrajectoryError, match='start pose'):
-        load_excitation(path)
-
-
-@pytest.mark.parametrize('number', ['1e12', '10000000000000', '2.5', '.nan', '2001-01-01', '0'])
-def test_a_run_of_more_than_a_day_or_of_no_whole_number_of_periods_is_refused(
-    make_run_file, number
+@pytest.mark.parametrize(
+    ('old', 'new', 'message'),
+    [
+        *(('run_in:', f'start: {start}\nrun_in:', 'start pose') for start in ('[0.5]', '0.5')),
+        *(
+            ('n_periods: 2', f'n_periods: {number}', r'run\.yaml: .*')
+            for number in ('1e12', '10000000000000', '2.5', '.nan', '2001-01-01', '0')
+        ),
+    ],
+)
+def test_a_run_from_another_pose_or_of_an_impossible_length_is_refused(
+    tmp_path, old, new, message
 ):
-    path = make_run_file('n_periods: 2', f'n_periods: {number}')
-    with pytest.raises(TrajectoryError, match=r'run\.yaml: .*'):
+    series = FourierTrajectory(('a',), 4.0, np.zeros(1), np.ones((1, 2)), np.ones((1, 2)))
+    path = tmp_path / 'run.yaml'
+    save_excitation(Excitation(series, 2, 1.0), path)
+    text = path.read_text()
+    assert old in text
+    path.write_text(text.replace(old, new))
+    with pytest.raises(TrajectoryError, match=message):
         load_excitation(path)
-
-
-@pytest.fixture
-def make_run_file(tmp_path):
-    """Return a function that writes an excitation with a text replaced."""
-
-    def make(old, new):
-        series = FourierTrajectory(('a',), 4.0, np.zeros(1), np.ones((1, 2)), np.ones((1, 2)))
-        save_excitation(Excitation(series, 2, 1.0), tmp_path / 'run.yaml')
-        text = (tmp_path / 'run.yaml').read_text()
-        assert old in text
-        (tmp_path / 'run.yaml').write_text(text.replace(old, new))
-        return tmp_path / 'run.yaml'
-
-    return make

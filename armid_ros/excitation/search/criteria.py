@@ -15,9 +15,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 
-from armid_ros.errors import TrajectoryError
 from armid_ros.estimate import ParameterName
-from armid_ros.motion import FloatArray, read_only
+from armid_ros.motion import FloatArray, freeze, read_only
 import numpy as np
 import numpy.typing as npt
 
@@ -57,15 +56,8 @@ class Information:
     scale: FloatArray
 
     def __post_init__(self) -> None:
-        """Freeze the arrays and check their shapes."""
-        count = len(self.parameters)
-        for name, shape in (('matrix', (count, count)), ('scale', (count,))):
-            object.__setattr__(self, name, read_only(getattr(self, name)))
-            if getattr(self, name).shape != shape:
-                raise TrajectoryError(
-                    f'information: {name} of {count} parameters has shape '
-                    f'{getattr(self, name).shape}, expected {shape}'
-                )
+        """Freeze the arrays."""
+        freeze(self, 'matrix', 'scale')
 
     @property
     def log_det(self) -> float:
