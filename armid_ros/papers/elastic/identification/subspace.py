@@ -163,35 +163,24 @@ def _inputs(
     hold: Sequence[Hold],
 ) -> ComplexArray:
     """Fit the input matrix to whole experiments, with one initial state per experiment."""
-    m = experiments[0].u.shape[1]
-    kept = np.flatnonzero(poles.imag >= 0.0)
+    # The outputs are real, so the input gains of a conjugate pair of poles are conjugate as well.
     normal, right = [], []
     for e in experiments:
-        decay = np.exp(dt * np.outer(np.arange(len(e.u)), poles[kept]))
-        start = _real(modal[:, kept], decay, poles[kept])
-        columns = [
-            _real(modal[:, kept], _driven(e.u[:, j], dt, poles[kept], hold[j]), poles[kept])
-            for j in range(m)
-        ]
-        table, wanted = np.hstack(columns), e.y.T.ravel()
+        start = _outputs(modal, np.exp(dt * np.outer(np.arange(len(e.u)), poles)))
+        table = np.hstack(
+            [_outputs(modal, _driven(u, dt, poles, h)) for u, h in zip(e.u.T, hold, strict=True)]
+        )
         basis = np.linalg.qr(start)[0]
-        table = table - basis @ (basis.T @ table)
-        normal.append(table.T @ table)
-        right.append(table.T @ wanted)
-    solution = np.linalg.solve(np.sum(normal, axis=0), np.sum(right, axis=0)).reshape(m, -1).T
-    b = np.zeros((len(poles), m), complex)
-    place = 0
-    for k in kept:
-        if poles[k].imag == 0.0:  # noqa: RUF069 - LAPACK sets it for real eigenvalues
-            b[k] = solution[place]
-            place += 1
-        else:
-            b[k] = solution[place] + 1j * solution[place + 1]
-            twin = int(np.argmin(np.abs(poles - poles[k].conj())))
-            # The eigenvectors of a pair of poles are conjugate, and so are their input gains.
-            b[twin] = b[k].conj()
-            place += 2
-    return b
+        table -= basis @ (basis.conj().T @ table)
+        normal.append(table.conj().T @ table)
+        right.append(table.conj().T @ e.y.ravel())
+    solution = np.linalg.solve(np.sum(normal, axis=0), np.sum(right, axis=0))
+    return np.asarray(solution.reshape(-1, len(poles)).T)
+
+
+def _outputs(modal: ComplexArray, states: ComplexArray) -> ComplexArray:
+    """Return the outputs of each mode as a column, shape (N p, r), from states of shape (N, r)."""
+    return np.asarray((states[:, np.newaxis] * modal).reshape(-1, modal.shape[1]))
 
 
 def _driven(u: FloatArray, dt: float, poles: ComplexArray, hold: Hold) -> ComplexArray:
@@ -207,15 +196,3 @@ def _driven(u: FloatArray, dt: float, poles: ComplexArray, hold: Hold) -> Comple
             numerator = [ramp, gain - ramp]
         states[:, k] = lfilter(numerator, [1.0, -factor], u.astype(complex))
     return states
-
-
-def _real(modal: ComplexArray, states: ComplexArray, poles: ComplexArray) -> FloatArray:
-    """Return the outputs of modes as real columns, two per conjugate pair, (p N, columns)."""
-    columns = []
-    for k, pole in enumerate(poles):
-        output = np.outer(modal[:, k], states[:, k]).ravel()
-        if pole.imag == 0.0:  # noqa: RUF069 - LAPACK sets it for real eigenvalues
-            columns.append(output.real)
-        else:
-            columns += [2.0 * output.real, -2.0 * output.imag]
-    return np.column_stack(columns)
