@@ -4,8 +4,8 @@
 Springs between two machines: online identification, and slack of the straps.
 
 A strap with slack pulls with k (|D| - slack) along D if |D| exceeds the slack; otherwise not. The
-torque is nonlinear in the slack, so the stiffness is fitted at several slacks. A parabola through
-the best fit and its neighbours gives the slack, and its curvature the standard deviation.
+torque is nonlinear in the slack, so the stiffness is fitted at several slacks, in the search for
+the best one. The curvature of the misfit gives the standard deviation of the slack.
 
 """
 
@@ -23,6 +23,7 @@ from armid_ros.model.spring_ties import TiedMachines
 from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording
 import numpy as np
+from scipy.optimize import minimize_scalar
 
 
 @dataclass(frozen=True)
@@ -71,17 +72,14 @@ def find_slack(problem: Callable[[float], InteractionProblem]) -> Slack:
             fits[slack] = identify_interaction(problem(slack))
         return fits[slack].misfit
 
-    # [m]; largest plausible slack of a strap
-    best = min((0.0, 0.001, 0.002, 0.004, 0.006), key=misfit)
-    bend = np.inf
-    # steps below and above the best slack [m]
-    for step in (5e-4, 2e-4):
-        centre = max(best, step)
-        lower, middle, upper = (misfit(centre + k * step) for k in (-1, 0, 1))
-        bend = (lower - 2.0 * middle + upper) / step**2
-        if bend > 0.0:
-            best = float(np.clip(centre + (lower - upper) / (2.0 * bend * step), 0.0, 1.0))
-    misfit(best)
+    # largest plausible slack of a strap, and accuracy of the search [m]
+    largest, accuracy = 0.01, 2e-5
+    searched = minimize_scalar(
+        misfit, bounds=(0.0, largest), method='bounded', options={'xatol': accuracy}
+    )
+    best, step = float(searched.x), 2e-4  # of the second difference [m]
+    lower, middle, upper = (misfit(max(best, step) + k * step) for k in (-1, 0, 1))
+    bend = (lower - 2.0 * middle + upper) / step**2
     found = fits[best]
     freedom = max(1, found.residual.size - len(found.estimate.values))
     noise = max(1.0, found.misfit / freedom)
