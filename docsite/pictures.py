@@ -33,6 +33,7 @@ from armid_ros.papers.exo.plant.gait import read_gait
 from armid_ros.papers.exo.plant.gait_cycle import check_cycle, gait_cycle
 from armid_ros.papers.exo.plant.walkers import walking_pair
 from armid_ros.robots.two_link import two_link_set
+from armid_ros.simulation import Sensors
 from armid_ros.simulation.elastic import two_link_loop
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullLocator
@@ -317,7 +318,7 @@ def damaged() -> Figure:
 def springs() -> Figure:
     """Draw the responses of two joints with springs: measured, and with identified parameters."""
     shipped, rng = two_link_set('after'), np.random.default_rng(0)
-    sensors, loop = ar.Sensors(velocity_noise=0.004), two_link_loop(shipped, RESONANCE_GAIN)
+    sensors, loop = Sensors(velocity_noise=0.004), two_link_loop(shipped, RESONANCE_GAIN)
     runs = [
         run_experiment(plan, shipped, rng, gain=RESONANCE_GAIN, sensors=sensors)
         for plan in resonance_experiments(8, rng)
