@@ -58,8 +58,8 @@ def trajectory_faults(
 
     """
     count = _CHECK_SAMPLES * trajectory.harmonics
-    # one sample more at both ends, which have no bound on the error beside them
-    path = trajectory.motion(np.arange(-1, count + 2) * (trajectory.period / count))
+    # from the first sample to the one after the period, which have no bound beside them
+    path = trajectory.motion(np.arange(count + 2) * (trajectory.period / count))
     violations = _violations(arm, limits, path)
     if clearance is None:
         return Faults(violations)
