@@ -3,9 +3,9 @@
 """
 Arm whose friction follows its temperature by another law than that of the package.
 
-The rigid body is that of MuJoCo. Friction is viscous, Coulomb and Stribeck friction, each of which
-decreases exponentially with temperature; the package has a law of first order without Stribeck
-friction. Sensors of temperature have noise and steps.
+The rigid body has dynamics of its own. Friction is viscous, Coulomb and Stribeck friction, each
+of which decreases exponentially with temperature; the package has a law of first order without
+Stribeck friction. Sensors of temperature have noise and steps.
 
 """
 
@@ -17,10 +17,11 @@ from dataclasses import dataclass
 from armid_ros.motion import Temperatures
 from armid_ros.recording import Recording
 from armid_ros.robots import robot_from_urdf
-import mujoco
 import numpy as np
 
 from tests.hidden.arrays import FloatArray
+from tests.hidden.lived.chain import Chain
+from tests.hidden.trajectories import Orbit
 
 JOINTS = ('turn', 'shoulder', 'elbow')
 _LINK = (
@@ -38,6 +39,7 @@ URDF = (
     + '</robot>'
 )
 ROBOT = robot_from_urdf(URDF, gravity='earth')
+_CHAIN = Chain.of(ROBOT)
 #: Samples per second, duration of a recording [s], and noise of torques [N m].
 _RATE, _DURATION, _NOISE = 200.0, 14.0, 0.04
 #: Temperature of each joint over that of the arm, and its rise in a recording [K].
@@ -91,16 +93,15 @@ class WarmArm:
 
     def _run(self, rng: np.random.Generator, temperature: float, name: str) -> Recording:
         t = np.arange(round(_DURATION * _RATE)) / _RATE
-        q, dq, ddq = np.zeros((3, len(t), 3))
-        speed, w = rng.uniform(1.0, 2.5), 2 * np.pi / (_DURATION / 2 - 0.5) * np.arange(1, 5)
+        period, speed = _DURATION / 2 - 0.5, rng.uniform(1.0, 2.5)
+        size, phase = np.empty((2, 3, 4))
         for j in range(3):
-            size = rng.uniform(0.5, 1.0, 4)
-            size *= speed / np.sum(size * w / 3)
-            angle = np.outer(t, w) + rng.uniform(0, 2 * np.pi, 4)
-            q[:, j], dq[:, j] = np.sin(angle) @ size, np.cos(angle) @ (size * w)
-            ddq[:, j] = -np.sin(angle) @ (size * w**2)
+            size[j], phase[j] = rng.uniform(0.5, 1.0, 4), rng.uniform(0, 2 * np.pi, 4)
+        size *= speed / np.sum(size * 2 * np.pi / period * np.arange(1, 5) / 3, axis=1)[:, None]
+        orbit = Orbit(period, np.zeros(3), size * np.sin(phase), size * np.cos(phase))
+        q, dq, ddq = orbit.at(t)
         true = temperature + _OWN + _RISE * (1.0 - np.exp(-t / 20.0))[:, np.newaxis]
-        tau = _rigid(q, dq, ddq) + self._friction(dq, true - 25.0)
+        tau = _CHAIN.torque(q, dq, ddq) + self._friction(dq, true - 25.0)
         slow = slice(None, None, 100)
         read = true[slow] + 0.2 * rng.normal(size=true[slow].shape)
         return Recording(
@@ -117,14 +118,3 @@ class WarmArm:
         dry = dry * (1.0 + self.stribeck * np.exp(-np.abs(dq) / 0.08))
         viscous = self.viscous * np.exp(-self.viscous_rate * warmer)
         return viscous * dq + dry * np.tanh(dq / 0.002)
-
-
-def _rigid(q: FloatArray, dq: FloatArray, ddq: FloatArray) -> FloatArray:
-    """Return the torque of the rigid body by MuJoCo, shape (N, 3) [N m]."""
-    model = mujoco.MjModel.from_xml_string(URDF)
-    data, tau = mujoco.MjData(model), np.empty_like(q)
-    for k in range(len(q)):
-        data.qpos[:], data.qvel[:], data.qacc[:] = q[k], dq[k], ddq[k]
-        mujoco.mj_inverse(model, data)
-        tau[k] = data.qfrc_inverse
-    return tau

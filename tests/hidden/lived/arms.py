@@ -5,11 +5,8 @@
 from __future__ import annotations
 
 from functools import cache
-import os
-from pathlib import Path
-import tempfile
 
-from armid_ros.robots import load_robot, Robot
+from armid_ros.robots import Robot, robot_from_urdf
 import numpy as np
 
 from tests.hidden.arrays import body_parts, body_vector, FloatArray
@@ -49,13 +46,7 @@ ARMS = {
 def load_arm(name: str) -> Robot:
     """Load an arm as its engineer describes it."""
     if name.startswith('drawn-'):
-        path = _folder() / f'{name}.urdf'
-        text = drawn_urdf(name)
-        if not path.exists() or path.read_text(encoding='utf-8') != text:
-            beside = path.with_suffix(f'.{os.getpid()}')
-            beside.write_text(text, encoding='utf-8')
-            beside.replace(path)
-        return load_robot(str(path), gravity='earth')
+        return robot_from_urdf(drawn_urdf(name), gravity='earth')
     return load_published(PUBLISHED[name], 'earth')
 
 
@@ -136,12 +127,3 @@ def _link(name: str, mass: float, length: float, rng: np.random.Generator) -> li
         f'izz="{along:.6f}"/></inertial>',
         '  </link>',
     ]
-
-
-def _folder() -> Path:
-    """Return where drawn descriptions are written."""
-    folder = os.environ.get('ARMID_LIVED_CACHE')
-    path = Path(folder) if folder else Path(tempfile.gettempdir()) / f'armid_lived_{os.getuid()}'
-    path = path / 'descriptions'
-    path.mkdir(parents=True, exist_ok=True)
-    return path

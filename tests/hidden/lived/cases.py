@@ -17,12 +17,12 @@ from tests.hidden.lived.causes import CAUSES
 from tests.hidden.lived.causes.base import Cause, Scene
 from tests.hidden.lived.causes.rigid import Mounting
 from tests.hidden.lived.chain import Chain
-from tests.hidden.lived.instruments import Instruments
 from tests.hidden.lived.motions import draw_path, Path, tracked
 from tests.hidden.lived.plant import LivedArm
-from tests.hidden.lived.sizing import gap, misfit, rows_of, sized
+from tests.hidden.lived.sizing import filtered, misfit, rows_of, sized
 from tests.hidden.lived.specification import LivedSpec, specify
 from tests.hidden.lived.wear import Wear
+from tests.hidden.sensors import Instruments
 
 
 @dataclass(frozen=True)
@@ -143,8 +143,6 @@ class Draft:
         What records it.
     floor : ndarray, shape (n,)
         Misfit of an ordinary model of day 1 in each joint [N m].
-    share : float
-        Misfit of all joints over the torque.
     cause : Cause or None
         What happened.
 
@@ -157,31 +155,35 @@ class Draft:
     paths: dict[str, Path]
     instruments: Instruments
     floor: FloatArray
-    share: float
     cause: Cause | None
 
     def gap(self, cause: Cause) -> float:
         """Return the gap that a cause makes in the recording that is held out."""
-        return gap(self.worn['held_out'], self.paths['held_out'], cause, self.floor)
+        part = filtered(self.worn['held_out'].contribution(self.paths['held_out'], cause))
+        return float(((part**2).mean(axis=0) / self.floor**2).max())
 
 
 def draw_case(spec: LivedSpec) -> Draft:
     """Draw all of a case; the second of a pair has the cause of the first."""
     robot = load_arm(spec.arm)
     described = Chain.of(robot)
-    arm = _draw_arm(spec, described, robot)
+    strength = _strength(described, robot)
+    arm = _draw_arm(spec, described, robot, strength)
     paths = {
         run: _draw_run(spec, run, arm.chain, robot, style) for run, style in spec.styles.items()
     }
-    instruments = Instruments.of(_strength(described, robot), spec.rng('instruments'))
+    instruments = Instruments.of(strength, spec.rng('instruments'))
     if spec.exact:
         instruments = replace(instruments, jitter=0.0, torque_noise=0.5 * instruments.torque_noise)
-    worn = {run: replace(arm, wear=_wear_of(spec, arm.wear, run)) for run in paths}
-    floor, share = _floor(described, worn, paths, instruments)
-    draft = Draft(spec, robot, arm, worn, paths, instruments, floor, share, None)
+    worn = {
+        run: arm if spec.exact else replace(arm, wear=arm.wear.of_a_run(spec.rng('friction', run)))
+        for run in paths
+    }
+    floor = _floor(described, worn, paths, instruments)
+    draft = Draft(spec, robot, arm, worn, paths, instruments, floor, None)
     if spec.second_of_pair:
         return replace(draft, cause=draw_case(specify(spec.kind, spec.index - 1)).cause)
-    return replace(draft, cause=_draw_cause(draft, described))
+    return replace(draft, cause=_draw_cause(draft, strength))
 
 
 def _strength(chain: Chain, robot: Robot) -> FloatArray:
@@ -195,10 +197,9 @@ def _strength(chain: Chain, robot: Robot) -> FloatArray:
     return rms + 0.03 * rms.max()
 
 
-def _draw_arm(spec: LivedSpec, described: Chain, robot: Robot) -> LivedArm:
+def _draw_arm(spec: LivedSpec, described: Chain, robot: Robot, strength: FloatArray) -> LivedArm:
     """Draw an arm of a description, with the clutter of its own."""
-    rng = spec.rng('arm')
-    strength, n = _strength(described, robot), robot.n_joints
+    rng, n = spec.rng('arm'), robot.n_joints
     speed = np.minimum(robot.velocity_limit, 3.0)
     unit = np.zeros((1, n))
     inertia = np.array(
@@ -224,28 +225,22 @@ def _draw_run(spec: LivedSpec, run: str, chain: Chain, robot: Robot, style: str)
     return tracked(wanted, chain, error)
 
 
-def _wear_of(spec: LivedSpec, wear: Wear, run: str) -> Wear:
-    return wear if spec.exact else wear.of_a_run(spec.rng('friction', run))
-
-
 def _floor(
     described: Chain,
     worn: dict[str, LivedArm],
     paths: dict[str, Path],
     instruments: Instruments,
-) -> tuple[FloatArray, float]:
-    """Return the misfit of an ordinary model of day 1 in each joint, and as a share."""
+) -> FloatArray:
+    """Return the misfit of an ordinary model of day 1 in each joint, rms, shape (n,) [N m]."""
     days = [run for run in paths if run.startswith('day_1')]
     noise = 0.3 * instruments.torque_noise  # what is left of it behind the filter
     if not days:
-        efforts = np.concatenate([worn[run].effort(path) for run, path in paths.items()])
-        return noise, float(np.linalg.norm(noise) / np.sqrt((efforts**2).sum(axis=1).mean()))
+        return noise
     rows = [rows_of(described, paths[run], worn[run].effort(paths[run])) for run in days]
-    floor, share = misfit(rows)
-    return np.hypot(floor, noise), share
+    return np.hypot(misfit(rows), noise)
 
 
-def _draw_cause(draft: Draft, described: Chain) -> Cause | None:
+def _draw_cause(draft: Draft, strength: FloatArray) -> Cause | None:
     spec, robot = draft.spec, draft.robot
     if spec.cause == 'none':
         return None
@@ -255,7 +250,7 @@ def _draw_cause(draft: Draft, described: Chain) -> Cause | None:
     ends = np.array([robot.lower, robot.upper])
     scene = Scene(
         chain=draft.arm.chain,
-        strength=_strength(described, robot),
+        strength=strength,
         speed=2.0 * np.sqrt(np.mean([(path.dq**2).mean(axis=0) for path in second], axis=0)),
         low=np.min([path.q.min(axis=0) for path in second], axis=0),
         high=np.max([path.q.max(axis=0) for path in second], axis=0),

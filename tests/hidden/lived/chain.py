@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Inverse dynamics of a tree of joints, vectorised over samples.
+Inverse dynamics of a tree of revolute joints, vectorised over samples.
 
 The recursive Newton-Euler algorithm (Luh, Walker, Paul 1980) in body frames, on the bodies that
 MuJoCo compiles from a description. Bodies are given by mass, first moments and inertia about the
@@ -16,7 +16,6 @@ from dataclasses import dataclass, replace
 from armid_ros.robots import Robot
 import mujoco
 import numpy as np
-import numpy.typing as npt
 
 from tests.hidden.arrays import body_vector, FloatArray, symmetric
 from tests.hidden.descriptions import bare_urdf
@@ -43,9 +42,7 @@ class Chain:
     turn : ndarray, shape (n, 3, 3)
         Rotation from each body frame to the frame of its parent at position zero.
     axis : ndarray, shape (n, 3)
-        Axis of each joint in the body frame, of length 1.
-    slides : ndarray of bool, shape (n,)
-        True where a joint is prismatic.
+        Axis of each joint in the body frame, of length 1; all joints turn.
     bodies : ndarray, shape (n, 10)
         m, m cx, m cy, m cz, Ixx, Ixy, Iyy, Ixz, Iyz, Izz about the origin of the body frame.
     gravity : ndarray, shape (3,)
@@ -58,30 +55,32 @@ class Chain:
     place: FloatArray
     turn: FloatArray
     axis: FloatArray
-    slides: npt.NDArray[np.bool_]
     bodies: FloatArray
     gravity: FloatArray
 
     @classmethod
     def of(cls, robot: Robot) -> Chain:
         """Take the bodies of a robot from what MuJoCo makes of its description."""
+        if any(robot.prismatic):
+            raise ValueError(f'{robot.name}: a joint slides; here all joints turn')
         spec = mujoco.MjSpec.from_string(bare_urdf(robot))
         spec.compiler.fusestatic, spec.compiler.balanceinertia = True, False
         model = spec.compile()
         ids = [int(model.joint(joint).bodyid[0]) for joint in robot.joints]
         count = len(ids)
-        parent, place, turn = [], np.zeros((count, 3)), np.zeros((count, 3, 3))
-        bodies, axis = np.zeros((count, PARAMETERS_PER_BODY)), np.zeros((count, 3))
+        bodies = np.zeros((count, PARAMETERS_PER_BODY))
         for j, body in enumerate(ids):
-            above, place[j], turn[j] = _from_parent(model, body, set(ids))
-            parent.append(ids.index(above) if above else -1)
-            axis[j] = model.joint(robot.joints[j]).axis
             frame = _matrix(model.body_iquat[body])
             central = frame @ np.diag(model.body_inertia[body]) @ frame.T
             bodies[j] = body_vector(model.body_mass[body], model.body_ipos[body], central)
-        slides = np.array(robot.prismatic, dtype=bool)
         return cls(
-            robot.joints, tuple(parent), place, turn, axis, slides, bodies, np.array(robot.gravity)
+            joints=robot.joints,
+            parent=tuple(ids.index(body) if body else -1 for body in model.body_parentid[ids]),
+            place=model.body_pos[ids].copy(),
+            turn=np.array([_matrix(model.body_quat[body]) for body in ids]),
+            axis=np.array([model.joint(joint).axis for joint in robot.joints]),
+            bodies=bodies,
+            gravity=np.array(robot.gravity),
         )
 
     @property
@@ -131,10 +130,9 @@ class Chain:
         arms = {}  # from the origin of each body on the path, in its frame
         for j in path:
             arms[j] = position
-            position = self.turn[j] @ self._joint_place(j, q[j], position) + self.place[j][:, None]
+            position = self.turn[j] @ self._joint_turn(j, q[j], position) + self.place[j][:, None]
         for j in path:
-            axis = self.axis[j][:, np.newaxis]
-            way = np.broadcast_to(axis, arms[j].shape) if self.slides[j] else _cross(axis, arms[j])
+            way = _cross(self.axis[j][:, np.newaxis], arms[j])
             k = j
             while k >= 0:
                 way = self.turn[k] @ self._joint_turn(k, q[k], way)
@@ -151,8 +149,7 @@ class Chain:
                 force, moment = _wrench(unit, *frames[j])
                 k = j
                 while k >= 0:
-                    part = force if self.slides[k] else moment
-                    columns[:, k, PARAMETERS_PER_BODY * j + p] = self.axis[k] @ part
+                    columns[:, k, PARAMETERS_PER_BODY * j + p] = self.axis[k] @ moment
                     force, moment = self._to_parent(k, q[:, k], force, moment)
                     k = self.parent[k]
         return columns
@@ -163,7 +160,7 @@ class Chain:
         tau = np.empty_like(q)
         for j in reversed(range(self.n_joints)):
             force, moment = wrenches[j]
-            tau[j] = self.axis[j] @ (force if self.slides[j] else moment)
+            tau[j] = self.axis[j] @ moment
             above = self.parent[j]
             if above >= 0:
                 more = self._to_parent(j, q[j], force, moment)
@@ -183,43 +180,27 @@ class Chain:
             w, dw, a = frames[above] if above >= 0 else base
             axis = self.axis[j][:, np.newaxis]
             arm = self.place[j][:, np.newaxis]
-            if self.slides[j]:
-                arm = arm + (self.turn[j] @ axis) * q[j]
             a = a + _cross(dw, arm) + _cross(w, _cross(w, arm))
             w, dw, a = (self._joint_turn(j, -q[j], self.turn[j].T @ x) for x in (w, dw, a))
-            if self.slides[j]:
-                a = a + axis * ddq[j] + 2.0 * _cross(w, axis * dq[j])
-            else:
-                dw = dw + axis * ddq[j] + _cross(w, axis * dq[j])
-                w = w + axis * dq[j]
+            dw = dw + axis * ddq[j] + _cross(w, axis * dq[j])
+            w = w + axis * dq[j]
             frames.append((w, dw, a))
         return frames
 
     def _joint_turn(self, j: int, angle: FloatArray, x: FloatArray) -> FloatArray:
         """Turn vectors (3, N) by the angle of a joint about its axis (Rodrigues)."""
-        if self.slides[j]:
-            return x
         axis = self.axis[j][:, np.newaxis]
         cosine = np.cos(angle)
         along = (1.0 - cosine) * (self.axis[j] @ x)
         return x * cosine + _cross(axis, x) * np.sin(angle) + axis * along
 
-    def _joint_place(self, j: int, value: FloatArray, x: FloatArray) -> FloatArray:
-        """Move points (3, N) of a body with its joint."""
-        if self.slides[j]:
-            return x + self.axis[j][:, np.newaxis] * value
-        return self._joint_turn(j, value, x)
-
     def _to_parent(
         self, j: int, value: FloatArray, force: FloatArray, moment: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
         """Return force and moment of a body about the origin of its parent, in that frame."""
-        arm = self.place[j][:, np.newaxis]
-        if self.slides[j]:
-            arm = arm + (self.turn[j] @ self.axis[j][:, np.newaxis]) * value
         force = self.turn[j] @ self._joint_turn(j, value, force)
         moment = self.turn[j] @ self._joint_turn(j, value, moment)
-        return force, moment + _cross(arm, force)
+        return force, moment + _cross(self.place[j][:, np.newaxis], force)
 
 
 def _wrench(
@@ -242,16 +223,3 @@ def _matrix(quaternion: FloatArray) -> FloatArray:
     matrix = np.empty(9)
     mujoco.mju_quat2Mat(matrix, quaternion)
     return matrix.reshape(3, 3)
-
-
-def _from_parent(
-    model: mujoco.MjModel, body: int, driven: set[int]
-) -> tuple[int, FloatArray, FloatArray]:
-    """Return the nearest driven body above (0 for none) and where the body is in its frame."""
-    place, turn = model.body_pos[body].copy(), _matrix(model.body_quat[body])
-    above = int(model.body_parentid[body])
-    while above and above not in driven:
-        matrix = _matrix(model.body_quat[above])
-        place, turn = model.body_pos[above] + matrix @ place, matrix @ turn
-        above = int(model.body_parentid[above])
-    return above, place, turn

@@ -12,7 +12,7 @@ from armid_ros.robots import Robot
 import numpy as np
 from scipy.signal import cont2discrete, lfilter, ss2tf
 
-from tests.hidden.arrays import FloatArray, smooth_step
+from tests.hidden.arrays import FloatArray, sampled, smooth_step
 from tests.hidden.lived.chain import Chain
 from tests.hidden.machines import position_range
 
@@ -123,7 +123,7 @@ def tracked(path: Path, chain: Chain, error: FloatArray) -> Path:
     load = load / np.maximum(np.sqrt((load**2).mean(axis=0)), 1e-9)
     dry = np.tanh(path.dq[coarse] / (0.03 * np.abs(path.dq).max(axis=0) + 1e-9))
     push = -error * (0.5 * load + 0.5 * dry)
-    push = np.column_stack([np.interp(path.t, path.t[coarse], p) for p in push.T])
+    push = sampled(path.t, path.t[coarse], push)
     position, velocity, acceleration = _second_order(push - push[0])
     return Path(path.t, path.q + position + push[0], path.dq + velocity, path.ddq + acceleration)
 

@@ -52,7 +52,7 @@ class LivedArm:
             chain, wear = cause.bodies(chain), cause.wear(wear)
             extra, dry = cause.torque(path, chain), cause.dry(path.dq)
         rigid = chain.torque(path.q, path.dq, path.ddq)
-        tau = rigid + extra + friction(path, rigid, wear, dry)
+        tau = rigid + extra + _friction(path, rigid, wear, dry)
         tau = tau + wear.rotor * path.ddq + wear.spring * (path.q - wear.rest)
         reported = low_pass(tau, wear.lag, float(t[1] - t[0])) * (1.0 + wear.gain) + wear.offset
         return reported if cause is None else cause.reading(t, reported)
@@ -62,25 +62,9 @@ class LivedArm:
         return self.effort(path, cause) - self.effort(path)
 
 
-def friction(
-    path: Path, load: FloatArray, wear: Wear, more_dry: FloatArray | float = 0.0
-) -> FloatArray:
-    """
-    Return the torque of friction and of what repeats by the turn, shape (N, n) [N m].
-
-    Parameters
-    ----------
-    path : Path
-        True motion.
-    load : ndarray, shape (N, n)
-        Torque of the rigid arm [N m].
-    wear : Wear
-        Clutter.
-    more_dry : ndarray, shape (N, n), or 0
-        Dry friction that a cause adds [N m].
-
-    """
-    level = wear.coulomb + wear.load_share * np.abs(load) + more_dry
+def _friction(path: Path, load: FloatArray, wear: Wear, dry: FloatArray | float) -> FloatArray:
+    """Return the torque of friction and of what repeats by the turn, shape (N, n) [N m]."""
+    level = wear.coulomb + wear.load_share * np.abs(load) + dry
     slow = np.zeros_like(path.dq)
     there = wear.stribeck_speed > 0.0
     slow[:, there] = wear.stribeck[there] * np.exp(

@@ -14,7 +14,6 @@ through one zero-phase filter of 10 Hz.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from scipy.signal import butter, sosfiltfilt
@@ -23,8 +22,10 @@ from tests.hidden.arrays import FloatArray
 from tests.hidden.lived.causes.base import Cause
 from tests.hidden.lived.chain import Chain
 from tests.hidden.lived.motions import Path, STEP
-from tests.hidden.lived.plant import LivedArm
 from tests.hidden.lived.wear import bristle
+
+#: Columns of what is fitted, (R, n, p), and torque that the description leaves, (R, n) [N m].
+Rows = tuple[FloatArray, FloatArray]
 
 CUT_OFF = 10.0  # Hz
 _EVERY = round(1.0 / 25.0 / STEP)  # samples of a path per row
@@ -33,30 +34,9 @@ _EVERY = round(1.0 / 25.0 / STEP)  # samples of a path per row
 _RIDGE = 1e-3
 
 
-@dataclass(frozen=True)
-class Rows:
-    """
-    What one recording contributes to a fit.
-
-    Attributes
-    ----------
-    columns : ndarray, shape (R, n, p)
-        Of what is fitted.
-    tau : ndarray, shape (R, n)
-        Torque that the description leaves over [N m].
-    told : ndarray, shape (R, n)
-        Torque that was reported [N m].
-
-    """
-
-    columns: FloatArray
-    tau: FloatArray
-    told: FloatArray
-
-
 def rows_of(described: Chain, path: Path, tau: FloatArray) -> Rows:
     """
-    Return the rows of a recording.
+    Return the columns of what is fitted, (R, n, p), and the torque that the description leaves.
 
     Parameters
     ----------
@@ -77,27 +57,16 @@ def rows_of(described: Chain, path: Path, tau: FloatArray) -> Rows:
         drives[:, j, 3 * j] = dq[:, j]
         drives[:, j, 3 * j + 1] = sign[:, j]
         drives[:, j, 3 * j + 2] = 1.0
-    told = filtered(tau)[rows]
     columns = np.concatenate([described.columns(q, dq, ddq), drives], axis=2)
-    return Rows(columns, told - described.torque(q, dq, ddq), told)
+    return columns, filtered(tau)[rows] - described.torque(q, dq, ddq)
 
 
-def misfit(recordings: Sequence[Rows]) -> tuple[FloatArray, float]:
-    """Return what is left of each joint, rms, shape (n,) [N m], and of all as a share."""
+def misfit(recordings: Sequence[Rows]) -> FloatArray:
+    """Return what is left of each joint where the other recordings are fitted, rms, (n,) [N m]."""
     left = []
-    for k, held_out in enumerate(recordings):
-        others = [rows for i, rows in enumerate(recordings) if i != k]
-        left.append(held_out.tau - held_out.columns @ _fit(others))
-    residual = np.concatenate(left)
-    told = np.concatenate([rows.told for rows in recordings])
-    share = float(np.linalg.norm(residual) / np.linalg.norm(told))
-    return np.sqrt((residual**2).mean(axis=0)), share
-
-
-def gap(arm: LivedArm, path: Path, cause: Cause, floor: FloatArray) -> float:
-    """Return the gap of a cause along a motion, for misfits of shape (n,) [N m]."""
-    part = filtered(arm.contribution(path, cause))
-    return float(((part**2).mean(axis=0) / floor**2).max())
+    for k, (columns, tau) in enumerate(recordings):
+        left.append(tau - columns @ _fit([*recordings[:k], *recordings[k + 1 :]]))
+    return np.sqrt((np.concatenate(left) ** 2).mean(axis=0))
 
 
 def sized(cause: Cause, wanted: float, gap_of: Callable[[Cause], float]) -> Cause:
@@ -121,9 +90,8 @@ def filtered(values: FloatArray) -> FloatArray:
 
 
 def _fit(recordings: Sequence[Rows]) -> FloatArray:
-    p = recordings[0].columns.shape[2]
-    columns = np.concatenate([rows.columns for rows in recordings])
-    tau = np.concatenate([rows.tau for rows in recordings])
+    columns, tau = (np.concatenate(part) for part in zip(*recordings, strict=True))
+    p = columns.shape[2]
     weight = 1.0 / np.maximum(tau.std(axis=0), 1e-9)
     design = (columns * weight[:, np.newaxis]).reshape(-1, p)
     scale = np.maximum(np.linalg.norm(design, axis=0), 1e-12)
