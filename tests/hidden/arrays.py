@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import ClassVar, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -97,31 +97,24 @@ class KnownEffect:
 
 
 class Sized:
-    """What has true parameters and grows by one of its attributes; a base of dataclasses."""
+    """What has true parameters and one value that the gap goes by; a base of dataclasses."""
 
-    #: The attribute that is larger where the gap is to be.
-    sized_by: ClassVar[str] = 'value'
     #: Ordinary value over the drive's torque and the joint's speed, to these powers.
     ordinary: ClassVar[float]
     by_torque: ClassVar[int] = 1
     by_speed: ClassVar[int] = 0
     #: Whether the value has either sign.
     signed: ClassVar[bool] = False
-    #: Whether it is in a joint that carries something, and the first joint that it may be in.
-    loaded: ClassVar[bool] = False
+    #: Share of the largest torque that its joint carries, and the first joint that it may be in.
+    loaded: ClassVar[float] = 0.0
     first_joint: ClassVar[int] = 0
     #: Name in the catalogue, attribute and unit of every true parameter.
     stated: ClassVar[tuple[tuple[str, str, str], ...]] = ()
-
-    @classmethod
-    def ordinary_value(cls, torque: float, speed: float, rng: np.random.Generator) -> float:
-        """Draw the value for a joint of some torque and speed [N m, rad/s]."""
-        sign = rng.choice([-1.0, 1.0]) if cls.signed else 1.0
-        return float(sign * cls.ordinary * torque**cls.by_torque / speed**cls.by_speed)
+    value: float
 
     def scaled(self, factor: float) -> Self:
         """Return it larger by a factor, or its like of which the gap grows with the factor."""
-        return replace(self, **{self.sized_by: getattr(self, self.sized_by) * factor})
+        return replace(self, value=self.value * factor)
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
@@ -130,6 +123,62 @@ class Sized:
         return tuple(
             Parameter(name, joint, getattr(self, attribute), unit)
             for name, attribute, unit in self.stated
+        )
+
+
+@dataclass(frozen=True)
+class OfJoint(Sized):
+    """What is in one joint."""
+
+    joint: str
+    index: int
+    value: float
+
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """Names of its joints."""
+        return (self.joint,)
+
+    @classmethod
+    def draw(cls, scene: Any, rng: np.random.Generator) -> Self:
+        """Draw one of ordinary size, for joints of some strength and speed [N m, rad/s]."""
+        j = scene.pick(rng, loaded=cls.loaded, first=cls.first_joint)
+        value = rng.choice([-1.0, 1.0]) * cls.ordinary if cls.signed else cls.ordinary
+        value = value * scene.strength[j] ** cls.by_torque / scene.speed[j] ** cls.by_speed
+        return cls(scene.joints[j], j, float(value), *cls.drawn(scene, j, rng))
+
+    @classmethod
+    def drawn(cls, scene: Any, j: int, rng: np.random.Generator) -> tuple[Any, ...]:
+        """Draw what it has beside its value."""
+        return ()
+
+
+@dataclass(frozen=True)
+class Ball(OfJoint):
+    """A body fixed to a link, of equal inertia about all axes; the value is its mass [kg]."""
+
+    #: What the names of the ten parameters are made of.
+    label: ClassVar[str]
+    #: Inertia over mass times squared radius.
+    share: ClassVar[float] = 0.4
+    centre: tuple[float, float, float]
+    radius: float
+
+    @property
+    def inertia(self) -> float:
+        """Inertia about any axis through the centre of mass [kg m^2]."""
+        return self.share * self.value * self.radius**2
+
+    @property
+    def body(self) -> FloatArray:
+        """Its ten parameters about the frame of the joint."""
+        return body_vector(self.value, np.array(self.centre), self.inertia * np.eye(3))
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        return tuple(
+            Parameter(self.label.format(name), self.joint, float(value), unit)
+            for (name, unit), value in zip(BODY.items(), self.body, strict=True)
         )
 
 
@@ -177,14 +226,6 @@ def force_parameters(joint: str, force: FloatArray) -> tuple[Parameter, ...]:
     return tuple(
         Parameter(f'interaction_force_{axis}', joint, float(value), 'N')
         for axis, value in zip('xyz', force, strict=True)
-    )
-
-
-def named_body(label: str, joint: str, values: FloatArray) -> tuple[Parameter, ...]:
-    """Return the ten parameters of a body, named after a label with a place for each name."""
-    return tuple(
-        Parameter(label.format(name), joint, float(value), unit)
-        for (name, unit), value in zip(BODY.items(), values, strict=True)
     )
 
 

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
-from typing import Any, ClassVar, Self
+from typing import ClassVar, Self
 
 from armid_ros.robots import Robot
 import mujoco
@@ -21,7 +21,7 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from tests.hidden.arrays import FloatArray, Signals, Sized
+from tests.hidden.arrays import FloatArray, OfJoint, Signals, Sized
 
 
 @dataclass(frozen=True)
@@ -33,7 +33,7 @@ class Setting:
     ----------
     robot : Robot
         With the true rigid parameters.
-    drive : ndarray, shape (n,)
+    strength : ndarray, shape (n,)
         Size of each drive [N m].
     low, high : ndarray, shape (n,)
         Smallest and largest position in all motions [rad].
@@ -49,13 +49,24 @@ class Setting:
     """
 
     robot: Robot
-    drive: FloatArray
+    strength: FloatArray
     low: FloatArray
     high: FloatArray
     speed: FloatArray
     torque: FloatArray
     peak: FloatArray
     postures: FloatArray
+
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """Names of the joints."""
+        return self.robot.joints
+
+    def pick(self, rng: np.random.Generator, *, loaded: float = 0.0, first: int = 0) -> int:
+        """Pick a joint, none before the first; or one with a share of the largest torque."""
+        if loaded:
+            return int(rng.choice(np.flatnonzero(self.torque > loaded * self.torque.max())))
+        return int(rng.integers(first, self.robot.n_joints))
 
     def points(
         self, joint: int, offset: FloatArray, postures: FloatArray | None = None
@@ -86,8 +97,6 @@ class Live:
         Dry friction torque of this step, to which effects add [N m].
     applied : ndarray, shape (n,)
         Torque on the joints of this step, to which effects add [N m].
-    dt : float
-        Time step [s].
     load : ndarray, shape (n,)
         Torque of the rigid arm in the step before [N m].
 
@@ -99,9 +108,20 @@ class Live:
     dofs: npt.NDArray[np.intp]
     friction: FloatArray
     applied: FloatArray
-    dt: float
     load: FloatArray
     memory: dict[int, FloatArray] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, robot: Robot, model: mujoco.MjModel) -> Live:
+        """Return a compiled arm that has not moved yet."""
+        dofs = np.array([model.joint(joint).qposadr[0] for joint in robot.joints])
+        zero = np.zeros((3, robot.n_joints))
+        return cls(robot, model, mujoco.MjData(model), dofs, *zero)
+
+    @property
+    def dt(self) -> float:
+        """Time step [s]."""
+        return float(self.model.opt.timestep)
 
     @property
     def t(self) -> float:
@@ -162,34 +182,8 @@ class HiddenEffect(Sized, ABC):
         return signals
 
 
-@dataclass(frozen=True)
-class InJoint(HiddenEffect):
-    """An effect in one joint."""
-
-    joint: str
-
-    @property
-    def joints(self) -> tuple[str, ...]:
-        return (self.joint,)
-
-
-@dataclass(frozen=True)
-class OneJoint(InJoint):
+class OneJoint(OfJoint, HiddenEffect):
     """An effect in one joint with one value that the gap goes by."""
-
-    index: int
-    value: float
-
-    @classmethod
-    def draw(cls, setting: Setting, rng: np.random.Generator) -> Self:
-        j = pick_loaded(setting, rng) if cls.loaded else pick(setting, rng, first=cls.first_joint)
-        value = cls.ordinary_value(setting.drive[j], setting.speed[j], rng)
-        return cls(setting.robot.joints[j], j, value, *cls.drawn(setting, j, rng))
-
-    @classmethod
-    def drawn(cls, setting: Setting, j: int, rng: np.random.Generator) -> tuple[Any, ...]:
-        """Draw what it has beside its value."""
-        return ()
 
 
 @dataclass(frozen=True)
@@ -197,17 +191,8 @@ class InPair(HiddenEffect):
     """An effect in a pair of joints."""
 
     pair: tuple[str, str]
+    value: float
 
     @property
     def joints(self) -> tuple[str, ...]:
         return self.pair
-
-
-def pick(setting: Setting, rng: np.random.Generator, *, first: int = 0) -> int:
-    """Pick a joint, none before the one given."""
-    return int(rng.integers(first, setting.robot.n_joints))
-
-
-def pick_loaded(setting: Setting, rng: np.random.Generator, share: float = 0.05) -> int:
-    """Pick a joint that carries more than a share of the largest torque."""
-    return int(rng.choice(np.flatnonzero(setting.torque > share * setting.torque.max())))

@@ -90,11 +90,6 @@ class Case:
     size: float
 
     @property
-    def visible(self) -> bool:
-        """Whether what is hidden can be asked to be found."""
-        return bool(self.effects) and self.size >= VISIBLE
-
-    @property
     def removed(self) -> tuple[str, ...]:
         """Names to be taken out of the library for this case."""
         if self.spec.kind != 'removed':
@@ -165,7 +160,7 @@ def draw(spec: CaseSpec, attempt: int = 0) -> Draft:
         for name in effect.replaces:
             for joint in effect.joints if name in known else ():
                 known[name][robot.index(joint)] = 0.0
-    sensors = Sensors.draw(setting.torque, setting.drive, sensor_rng, spec.noise)
+    sensors = Sensors.draw(setting.torque, setting.strength, sensor_rng, spec.noise)
     return Draft(spec, robot, known, orbits, sensors, effects)
 
 
@@ -233,7 +228,7 @@ def _setting(robot: Robot, known: Mapping[str, FloatArray], orbits: Sequence[Orb
     friction = friction + known.get('coulomb_friction', zero) * np.sign(dq)
     return Setting(
         robot=robot,
-        drive=drive_size(robot),
+        strength=drive_size(robot),
         low=q.min(axis=0),
         high=q.max(axis=0),
         speed=np.abs(dq).max(axis=0),

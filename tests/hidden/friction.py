@@ -60,7 +60,7 @@ class StribeckFriction(OneJoint):
         return (setting.speed[j] * rng.uniform(0.04, 0.12),)
 
     def act(self, live: Live) -> None:
-        speed = live.data.qvel[live.dofs[self.index]]
+        speed = live.dq[self.index]
         live.friction[self.index] += self.value * np.exp(-((speed / self.velocity) ** 2))
 
 
@@ -86,7 +86,7 @@ class AsymmetricFriction(OneJoint):
         )
 
     def act(self, live: Live) -> None:
-        speed = abs(live.data.qvel[live.dofs[self.index]])
+        speed = abs(live.dq[self.index])
         live.applied[self.index] -= self.value * (self.coulomb_share + speed)
 
 
@@ -99,7 +99,7 @@ class QuadraticFriction(OneJoint):
     acts = True
 
     def act(self, live: Live) -> None:
-        speed = live.data.qvel[live.dofs[self.index]]
+        speed = live.dq[self.index]
         live.applied[self.index] -= self.value * speed * abs(speed)
 
 
@@ -107,7 +107,7 @@ class LoadDependentFriction(OneJoint):
     """Dry friction that is higher by a share of the torque the rigid arm takes."""
 
     name = 'load_dependent_friction'
-    ordinary, by_torque, loaded = 0.08, 0, True
+    ordinary, by_torque, loaded = 0.08, 0, 0.05
     stated = (('load_coefficient', 'value', ''),)
     acts = True
 
@@ -134,7 +134,7 @@ class PreslidingHysteresis(OneJoint):
 
     def act(self, live: Live) -> None:
         state = live.memory.setdefault(id(self), np.zeros(1))
-        way = live.data.qvel[live.dofs[self.index]] * live.dt
+        way = live.dq[self.index] * live.dt
         live.applied[self.index] -= self.value * state[0]
         target = np.sign(way)
         state[0] = target + (state[0] - target) * np.exp(-abs(way) / self.distance)
@@ -161,7 +161,7 @@ class ThermalFriction(OneJoint):
 
     def act(self, live: Live) -> None:
         warmth = 1.0 - np.exp(-live.t / self.time_constant)
-        speed = live.data.qvel[live.dofs[self.index]]
+        speed = live.dq[self.index]
         live.applied[self.index] -= self.value * warmth * speed
 
 
@@ -176,26 +176,25 @@ class CoupledJointFriction(InPair):
 
     name = 'coupled_joint_friction'
     needs = ('viscous_friction',)
-    viscous: float
     coulomb: float
     most_viscous: float
 
     @classmethod
     def draw(cls, setting: Setting, rng: np.random.Generator) -> Self:
-        drive = float(setting.drive[-2:].min())
+        drive = float(setting.strength[-2:].min())
         viscous = 0.005 * drive / float(setting.robot.velocity_limit[-2:].max())
-        return cls(setting.robot.joints[-2:], viscous, 0.02 * drive, 1.6 * viscous)
+        return cls(setting.joints[-2:], viscous, 0.02 * drive, 1.6 * viscous)
 
     def scaled(self, factor: float) -> Self:
-        viscous = min(self.viscous * factor, self.most_viscous)  # less than the joint's own
-        return replace(self, viscous=viscous, coulomb=self.coulomb * factor)
+        viscous = min(self.value * factor, self.most_viscous)  # less than the joint's own
+        return replace(self, value=viscous, coulomb=self.coulomb * factor)
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
         joint = self.pair[0]
         return (
             Parameter('coupled_inertia', joint, 0.0, 'kg m^2'),
-            Parameter('coupled_viscous_coefficient', joint, self.viscous, 'N m s/rad'),
+            Parameter('coupled_viscous_coefficient', joint, self.value, 'N m s/rad'),
             Parameter('coupled_coulomb_torque', joint, self.coulomb, 'N m'),
         )
 
@@ -204,21 +203,8 @@ class CoupledJointFriction(InPair):
         for joint in self.pair:
             tendon.wrap_joint(joint, 1.0)
         tendon.frictionloss = self.coulomb
-        tendon.damping = [self.viscous, 0.0, 0.0]
+        tendon.damping = [self.value, 0.0, 0.0]
 
     def prepare(self, live: Live) -> None:
         for joint in self.pair:
-            live.model.dof_damping[live.dofs[live.robot.index(joint)]] -= self.viscous
-
-
-FRICTION = (
-    ViscousFriction,
-    CoulombFriction,
-    StribeckFriction,
-    AsymmetricFriction,
-    QuadraticFriction,
-    LoadDependentFriction,
-    PreslidingHysteresis,
-    ThermalFriction,
-    CoupledJointFriction,
-)
+            live.model.dof_damping[live.dofs[live.robot.index(joint)]] -= self.value

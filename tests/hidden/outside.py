@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from tests.hidden.base import HiddenEffect, Live, OneJoint, Setting
+from tests.hidden.base import Live, OneJoint, Setting
 
 
 @dataclass(frozen=True)
@@ -21,7 +21,7 @@ class _Outside(OneJoint):
 
     def act(self, live: Live) -> None:
         live.applied[self.index] += self.value * self.shape(
-            live.t, live.data.qpos[live.dofs[self.index]], live.data.qvel[live.dofs[self.index]]
+            live.t, live.q[self.index], live.dq[self.index]
         )
 
     @abstractmethod
@@ -116,6 +116,3 @@ class Muscle(_Outside):
         length = np.exp(-(((q - self.centre) / self.width) ** 2))
         shortening = 1.0 / (1.0 + np.exp(4.0 * dq / self.speed))
         return float(activation * length * shortening)
-
-
-OUTSIDE: tuple[type[HiddenEffect], ...] = (DeadPatch, Chirp, RandomContact, Muscle)

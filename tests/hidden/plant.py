@@ -20,7 +20,7 @@ import mujoco
 import numpy as np
 import pinocchio as pin
 
-from tests.hidden.arrays import FloatArray, Signals
+from tests.hidden.arrays import FloatArray, sampled, Signals
 from tests.hidden.base import HiddenEffect, Live
 from tests.hidden.descriptions import bare_urdf
 from tests.hidden.machines import with_rigid_errors
@@ -88,17 +88,7 @@ class Plant:
             stiffness[:] = [2.0 * self.dt, 1.0]  # dry friction as hard as it can be
         for impedance in (model.dof_solimp, model.tendon_solimp_fri):
             impedance[:] = [0.9999, 0.9999, 0.001, 0.5, 2.0]
-        dofs = np.array([model.joint(joint).qposadr[0] for joint in self.robot.joints])
-        live = Live(
-            self.robot,
-            model,
-            mujoco.MjData(model),
-            dofs,
-            zero.copy(),
-            zero.copy(),
-            self.dt,
-            zero.copy(),
-        )
+        live = Live.of(self.robot, model)
         for effect in self.effects:
             effect.prepare(live)
         return live
@@ -158,14 +148,9 @@ def _integrate(
     model, data, dofs = live.model, live.data, live.dofs
     acting = [effect for effect in effects if effect.acts]
     dry = model.dof_frictionloss[dofs].copy()
-    n_steps, n = control.shape
-    q, dq, tau = (
-        np.empty((n_steps, model.nv)),
-        np.empty((n_steps, model.nv)),
-        np.empty((n_steps, n)),
-    )
-    step = mujoco.mj_step
-    for k in range(n_steps):
+    q, dq = np.empty((2, len(control), model.nv))
+    tau = np.empty_like(control)
+    for k in range(len(control)):
         q[k], dq[k] = data.qpos, data.qvel
         data.ctrl[:] = control[k]
         if acting:
@@ -175,7 +160,7 @@ def _integrate(
                 effect.act(live)
             model.dof_frictionloss[dofs] = live.friction
             data.qfrc_applied[dofs] = live.applied
-        step(model, data)
+        mujoco.mj_step(model, data)
         tau[k] = data.actuator_force
     return q[:, dofs], dq[:, dofs], tau
 
@@ -198,9 +183,7 @@ def _controller_model(
         zip(reference.q[coarse], reference.dq[coarse], reference.ddq[coarse], strict=True)
     )
     rigid = np.array([pin.rnea(robot.model, data, *state) for state in states])
-    torque = np.column_stack(
-        [np.interp(reference.t, reference.t[coarse], column) for column in rigid.T]
-    )
+    torque = sampled(reference.t, reference.t[coarse], rigid)
     zero = np.zeros(robot.n_joints)
     speed = 0.02 * np.abs(reference.dq).max(axis=0) + 1e-6
     friction = plant.known.get('viscous_friction', zero) * reference.dq

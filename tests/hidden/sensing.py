@@ -11,7 +11,7 @@ from typing import Any, Self
 from armid_ros.robots import Robot
 import numpy as np
 
-from tests.hidden.arrays import FloatArray, low_pass, Parameter, Signals
+from tests.hidden.arrays import FloatArray, low_pass, Parameter, sampled, Signals
 from tests.hidden.base import HiddenEffect, InPair, OneJoint, Setting
 
 
@@ -65,7 +65,7 @@ class TorqueGain(_Reading):
     """The reading is too large by a share."""
 
     name = 'torque_gain'
-    ordinary, by_torque, loaded = 0.05, 0, True
+    ordinary, by_torque, loaded = 0.05, 0, 0.05
     stated = (('gain_error', 'value', ''),)
 
     def reading(self, t: FloatArray, tau: FloatArray) -> FloatArray:
@@ -77,8 +77,6 @@ class TorqueCrosstalk(InPair):
     """The reading of one joint contains a share of another's torque."""
 
     name = 'torque_crosstalk'
-    sized_by = 'share'
-    share: float
 
     @classmethod
     def draw(cls, setting: Setting, rng: np.random.Generator) -> Self:
@@ -86,17 +84,28 @@ class TorqueCrosstalk(InPair):
         loud = int(order[rng.integers(0, 2)])
         quiet = int(rng.choice([j for j in range(len(order)) if j != loud]))
         share = rng.choice([-1.0, 1.0]) * 0.02
-        return cls((setting.robot.joints[quiet], setting.robot.joints[loud]), share)
+        return cls((setting.joints[quiet], setting.joints[loud]), share)
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
-        return (Parameter(f'crosstalk_from_{self.pair[1]}', self.pair[0], self.share, ''),)
+        return (Parameter(f'crosstalk_from_{self.pair[1]}', self.pair[0], self.value, ''),)
 
     def distort(self, signals: Signals, robot: Robot) -> Signals:
         tau = signals.tau.copy()
         listener, source = (robot.index(joint) for joint in self.pair)
-        tau[:, listener] += self.share * signals.tau[:, source]
+        tau[:, listener] += self.value * signals.tau[:, source]
         return replace(signals, tau=tau)
+
+
+class TorqueLag(_Reading):
+    """The reading is low-passed, first order, exact for a torque linear between the steps."""
+
+    name = 'torque_lag'
+    ordinary, by_torque, loaded = 0.01, 0, 0.05
+    stated = (('lag', 'value', 's'),)
+
+    def reading(self, t: FloatArray, tau: FloatArray) -> FloatArray:
+        return low_pass(tau, self.value, t[1] - t[0])
 
 
 @dataclass(frozen=True)
@@ -113,19 +122,7 @@ class TimeDelay(HiddenEffect):
 
     def distort(self, signals: Signals, robot: Robot) -> Signals:
         past = signals.t - self.value
-        tau = np.column_stack([np.interp(past, signals.t, column) for column in signals.tau.T])
-        return replace(signals, tau=tau)
-
-
-class TorqueLag(_Reading):
-    """The reading is low-passed, first order, exact for a torque linear between the steps."""
-
-    name = 'torque_lag'
-    ordinary, by_torque, loaded = 0.01, 0, True
-    stated = (('lag', 'value', 's'),)
-
-    def reading(self, t: FloatArray, tau: FloatArray) -> FloatArray:
-        return low_pass(tau, self.value, t[1] - t[0])
+        return replace(signals, tau=sampled(past, signals.t, signals.tau))
 
 
 class EncoderOffset(OneJoint):
@@ -140,14 +137,3 @@ class EncoderOffset(OneJoint):
         q = signals.q.copy()
         q[:, self.index] -= self.value
         return replace(signals, q=q)
-
-
-SENSING = (
-    TorqueOffset,
-    TorqueDrift,
-    TorqueGain,
-    TorqueCrosstalk,
-    TorqueLag,
-    TimeDelay,
-    EncoderOffset,
-)

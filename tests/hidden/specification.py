@@ -14,17 +14,18 @@ from zlib import crc32
 
 import numpy as np
 
+from tests.hidden import friction, load, outside, sensing, springs
 from tests.hidden.base import HiddenEffect
-from tests.hidden.drive import DRIVE
-from tests.hidden.friction import FRICTION
-from tests.hidden.load import LOAD
-from tests.hidden.outside import OUTSIDE
-from tests.hidden.sensing import SENSING
-from tests.hidden.springs import SPRINGS
 
-_ALL: tuple[type[HiddenEffect], ...] = (*FRICTION, *SENSING, *LOAD, *DRIVE, *SPRINGS, *OUTSIDE)
-#: Everything that can be hidden, by name.
-HIDDEN: Mapping[str, type[HiddenEffect]] = MappingProxyType({e.name: e for e in _ALL})
+#: Everything that can be hidden, by name: the classes with a name, in the order of their files.
+HIDDEN: Mapping[str, type[HiddenEffect]] = MappingProxyType(
+    {
+        one.name: one
+        for module in (friction, sensing, load, springs, outside)
+        for one in vars(module).values()
+        if getattr(one, '__module__', '') == module.__name__ and hasattr(one, 'name')
+    }
+)
 #: Names that the diagnosis can give.
 CATALOGUED = tuple(name for name, effect in HIDDEN.items() if effect.in_catalogue)
 #: Names of what it should call unknown.

@@ -13,7 +13,7 @@ import mujoco
 import numpy as np
 
 from tests.hidden.arrays import FloatArray, holding_parameters, Parameter, spring_parameters
-from tests.hidden.base import InJoint, InPair, Live, OneJoint, pick, pick_loaded, Setting
+from tests.hidden.base import InPair, Live, OneJoint, Setting
 
 
 @dataclass(frozen=True)
@@ -25,10 +25,10 @@ class JointSpring(OneJoint):
 
     @classmethod
     def draw(cls, setting: Setting, rng: np.random.Generator) -> Self:
-        j = pick(setting, rng)
+        j = setting.pick(rng)
         low, high = setting.low[j], setting.high[j]
-        value = 0.05 * setting.drive[j] / (high - low)
-        return cls(setting.robot.joints[j], j, value, float(rng.uniform(low, high)))
+        value = 0.05 * setting.strength[j] / (high - low)
+        return cls(setting.joints[j], j, value, float(rng.uniform(low, high)))
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
@@ -53,14 +53,14 @@ class SoftLimit(OneJoint):
 
     @classmethod
     def draw(cls, setting: Setting, rng: np.random.Generator) -> Self:
-        j = pick(setting, rng)
+        j = setting.pick(rng)
         low, high = setting.low[j], setting.high[j]
         position = high - (high - low) * rng.uniform(0.2, 0.35)
-        value = 0.1 * setting.drive[j] / (high - position)
-        return cls(setting.robot.joints[j], j, value, position)
+        value = 0.1 * setting.strength[j] / (high - position)
+        return cls(setting.joints[j], j, value, position)
 
     def act(self, live: Live) -> None:
-        beyond = live.data.qpos[live.dofs[self.index]] - self.position
+        beyond = live.q[self.index] - self.position
         if beyond > 0.0:
             live.applied[self.index] -= self.value * beyond
 
@@ -70,90 +70,75 @@ class JointCoupling(InPair):
     """A cable between two neighbouring joints: each feels the other's position."""
 
     name = 'joint_coupling'
-    sized_by = 'stiffness'
     acts = True
     first: int
-    stiffness: float
 
     @classmethod
     def draw(cls, setting: Setting, rng: np.random.Generator) -> Self:
         i = int(rng.integers(0, setting.robot.n_joints - 1))
         reach = max(setting.high[i + 1] - setting.low[i + 1], setting.high[i] - setting.low[i])
-        stiffness = 0.05 * float(setting.drive[i : i + 2].min()) / reach
-        return cls(setting.robot.joints[i : i + 2], i, stiffness)
+        stiffness = 0.05 * float(setting.strength[i : i + 2].min()) / reach
+        return cls(setting.joints[i : i + 2], stiffness, i)
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
-        return (Parameter('coupling_stiffness', self.pair[0], self.stiffness, 'N m/rad'),)
+        return (Parameter('coupling_stiffness', self.pair[0], self.value, 'N m/rad'),)
 
     def act(self, live: Live) -> None:
         i = self.first
-        live.applied[i] += self.stiffness * live.data.qpos[live.dofs[i + 1]]
-        live.applied[i + 1] += self.stiffness * live.data.qpos[live.dofs[i]]
+        live.applied[i] += self.value * live.q[i + 1]
+        live.applied[i + 1] += self.value * live.q[i]
 
 
 @dataclass(frozen=True)
-class JointElasticity(InJoint):
+class JointElasticity(OneJoint):
     """A second hinge behind the motor's, with a native spring and a little damping."""
 
     name = 'joint_elasticity'
-    sized_by = 'compliance'
-    stated = (('compliance', 'compliance', 'rad/(N m)'),)
+    stated = (('compliance', 'value', 'rad/(N m)'),)
     needs = ('rotor_inertia',)
     dt = 2.5e-4
-    index: int
-    compliance: float
-    retardation: float
+    retardation: float = 4e-4
 
     @classmethod
     def draw(cls, setting: Setting, rng: np.random.Generator) -> Self:
-        j = pick_loaded(setting, rng, 0.1)
-        return cls(setting.robot.joints[j], j, 0.002 / float(setting.torque[j]), 4e-4)
+        j = setting.pick(rng, loaded=0.1)
+        return cls(setting.joints[j], j, 0.002 / float(setting.torque[j]))
 
     def edit(self, spec: mujoco.MjSpec, robot: Robot) -> None:
         twist = add_twist(spec, self.joint)
-        twist.stiffness = [1.0 / self.compliance, 0.0, 0.0]
-        twist.damping = [self.retardation / self.compliance, 0.0, 0.0]
+        twist.stiffness = [1.0 / self.value, 0.0, 0.0]
+        twist.damping = [self.retardation / self.value, 0.0, 0.0]
 
 
-@dataclass(frozen=True)
-class Backlash(InJoint):
+class Backlash(OneJoint):
     """A second hinge behind the motor's, free between two stops."""
 
     name = 'backlash'
-    sized_by = 'width'
+    ordinary, by_torque, loaded = 0.004, 0, 0.1
     stated = (
-        ('backlash', 'width', 'rad'),
-        ('crossing_width', 'width', 'rad'),
+        ('backlash', 'value', 'rad'),
+        ('crossing_width', 'value', 'rad'),
     )
     needs = ('rotor_inertia',)
     dt = 2.5e-4
-    index: int
-    width: float
-
-    @classmethod
-    def draw(cls, setting: Setting, rng: np.random.Generator) -> Self:
-        j = pick_loaded(setting, rng, 0.1)
-        return cls(setting.robot.joints[j], j, 0.004)
 
     def edit(self, spec: mujoco.MjSpec, robot: Robot) -> None:
         twist = add_twist(spec, self.joint)
         twist.limited = True
-        twist.range = [-0.5 * self.width, 0.5 * self.width]
+        twist.range = [-0.5 * self.value, 0.5 * self.value]
         twist.solref_limit = [0.005, 1.0]  # teeth that do not bounce
         twist.solimp_limit = [0.999, 0.9999, 1e-5, 0.5, 2.0]
         twist.margin = 0.0
 
 
 @dataclass(frozen=True)
-class _Strap(InJoint):
-    """Something between a point of a link and a fixed point of the world."""
+class _Strap(OneJoint):
+    """Something between a point of a link and a fixed point; the value is its stiffness [N/m]."""
 
     attachment: tuple[float, float, float]
     anchor: tuple[float, float, float]
-    stiffness: float
     acts = True
-    sized_by = 'stiffness'
 
     def act(self, live: Live) -> None:
         mujoco.mj_kinematics(live.model, live.data)
@@ -183,20 +168,25 @@ class HumanInteraction(_Strap):
 
     @classmethod
     def draw(cls, setting: Setting, rng: np.random.Generator) -> Self:
-        joint, attachment, points = _attach(setting, rng)
+        j, attachment, points = _attach(setting, rng)
         anchor = points.mean(axis=0) + 0.05 * rng.normal(size=3)
         reach = np.linalg.norm(points - anchor, axis=1).mean()
-        stiffness = 0.02 * float(setting.drive[:2].mean()) / reach
-        middle = _middle(setting, joint, attachment)
-        return cls(joint, attachment, tuple(anchor.tolist()), stiffness, middle=middle)
+        stiffness = 0.02 * float(setting.strength[:2].mean()) / reach
+        ends = np.array([setting.robot.lower, setting.robot.upper])
+        posture = np.where(np.isfinite(ends).all(axis=0), ends, 0.0).mean(axis=0)
+        middle = setting.points(j, np.array(attachment), posture[np.newaxis])[0]
+        anchor = tuple(anchor.tolist())
+        return cls(
+            setting.joints[j], j, stiffness, attachment, anchor, middle=tuple(middle.tolist())
+        )
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
         way = np.array(self.anchor) - self.middle
-        return holding_parameters(self.joint, self.stiffness, self.damping_time, way)
+        return holding_parameters(self.joint, self.value, self.damping_time, way)
 
     def force(self, way: FloatArray, velocity: FloatArray) -> FloatArray:
-        return -self.stiffness * (way + self.damping_time * velocity)
+        return -self.value * (way + self.damping_time * velocity)
 
 
 @dataclass(frozen=True)
@@ -208,18 +198,19 @@ class InterfaceSlack(_Strap):
 
     @classmethod
     def draw(cls, setting: Setting, rng: np.random.Generator) -> Self:
-        joint, attachment, points = _attach(setting, rng)
+        j, attachment, points = _attach(setting, rng)
         spread = points.std(axis=0).max()
         anchor = points.mean(axis=0) + spread * rng.normal(size=3)
         reach = np.linalg.norm(points - anchor, axis=1)
         slack = float(np.quantile(reach, rng.uniform(0.3, 0.6)))
-        stiffness = 0.04 * float(setting.drive[:2].mean()) / (reach.max() - slack)
-        return cls(joint, attachment, tuple(anchor.tolist()), stiffness, slack)
+        stiffness = 0.04 * float(setting.strength[:2].mean()) / (reach.max() - slack)
+        anchor = tuple(anchor.tolist())
+        return cls(setting.joints[j], j, stiffness, attachment, anchor, slack)
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
         return (
-            Parameter('slack_stiffness', self.joint, self.stiffness, 'N/m'),
+            Parameter('slack_stiffness', self.joint, self.value, 'N/m'),
             *(
                 Parameter(f'anchor_{axis}', self.joint, value, 'm')
                 for axis, value in zip('xyz', self.anchor, strict=True)
@@ -229,7 +220,7 @@ class InterfaceSlack(_Strap):
 
     def force(self, way: FloatArray, velocity: FloatArray) -> FloatArray:
         length = np.linalg.norm(way)
-        return -self.stiffness * max(length - self.slack, 0.0) * way / max(length, 1e-9)
+        return -self.value * max(length - self.slack, 0.0) * way / max(length, 1e-9)
 
 
 def add_twist(spec: mujoco.MjSpec, joint: str) -> mujoco.MjsJoint:
@@ -240,33 +231,11 @@ def add_twist(spec: mujoco.MjSpec, joint: str) -> mujoco.MjsJoint:
     return twist
 
 
-def _middle(
-    setting: Setting, joint: str, attachment: tuple[float, float, float]
-) -> tuple[float, float, float]:
-    """Return where an attachment is in the middle of the range of motion, which forces go by."""
-    robot = setting.robot
-    ends = np.array([robot.lower, robot.upper])
-    posture = np.where(np.isfinite(ends).all(axis=0), ends, 0.0).mean(axis=0)
-    place = setting.points(robot.index(joint), np.array(attachment), posture[np.newaxis])
-    return tuple(place[0].tolist())
-
-
 def _attach(
     setting: Setting, rng: np.random.Generator
-) -> tuple[str, tuple[float, float, float], FloatArray]:
+) -> tuple[int, tuple[float, float, float], FloatArray]:
     """Return a link beyond the third joint, its centre of mass, and where that comes to."""
     robot = setting.robot
     j = int(rng.integers(3, robot.n_joints))
     centre = robot.model.inertias[j + 1].lever
-    return robot.joints[j], tuple(centre.tolist()), setting.points(j, centre)
-
-
-SPRINGS = (
-    JointSpring,
-    SoftLimit,
-    JointCoupling,
-    JointElasticity,
-    Backlash,
-    HumanInteraction,
-    InterfaceSlack,
-)
+    return j, tuple(centre.tolist()), setting.points(j, centre)

@@ -80,7 +80,7 @@ def play(robot, excitation, secret, rng, rate=200):
         'viscous_friction': 3.0 * secret.friction,
         'rotor_inertia': 0.005 * drive_size(robot),
     }
-    tool = Payload(robot.joints[-1], secret.mass, tuple(secret.center))
+    tool = Payload(robot.joints[-1], robot.n_joints - 1, secret.mass, tuple(secret.center))
     plant = Plant(robot.with_gravity(secret.gravity(robot)), known, [tool])
     reference = Reference(0.0, (), t, wanted.q, wanted.dq, wanted.ddq)
     signals = run(plant, reference, rng)

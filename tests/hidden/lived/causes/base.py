@@ -6,11 +6,11 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar, Self
+from typing import ClassVar, Self
 
 import numpy as np
 
-from tests.hidden.arrays import FloatArray, Sized
+from tests.hidden.arrays import FloatArray, OfJoint, Sized
 from tests.hidden.lived.chain import Chain
 from tests.hidden.lived.motions import Path
 from tests.hidden.lived.wear import Wear
@@ -44,11 +44,16 @@ class Scene:
     middle: FloatArray
     end: float
 
-    def joint(self, rng: np.random.Generator, *, loaded: bool = False, first: int = 0) -> int:
-        """Pick a joint; of the loaded ones, if asked for."""
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """Names of the joints."""
+        return self.chain.joints
+
+    def pick(self, rng: np.random.Generator, *, loaded: float = 0.0, first: int = 0) -> int:
+        """Pick a joint, none before the first, that has a share of the largest torque."""
         allowed = np.arange(len(self.strength)) >= min(first, len(self.strength) - 1)
         if loaded:
-            allowed &= self.strength > 0.1 * self.strength.max()
+            allowed &= self.strength > loaded * self.strength.max()
         chosen = np.flatnonzero(allowed)
         return int(rng.choice(chosen if len(chosen) else [np.argmax(self.strength)]))
 
@@ -95,30 +100,11 @@ class Cause(Sized, ABC):
         return tau
 
 
-@dataclass(frozen=True)
-class JointCause(Cause):
+class JointCause(OfJoint, Cause):
     """A cause in one joint with one value that its size goes by."""
 
     #: Attribute of the wear that grows by the value; empty for none.
     worn: ClassVar[str] = ''
-    joint: str
-    index: int
-    value: float
-
-    @property
-    def joints(self) -> tuple[str, ...]:
-        return (self.joint,)
-
-    @classmethod
-    def draw(cls, scene: Scene, rng: np.random.Generator) -> Self:
-        j = scene.joint(rng, loaded=cls.loaded, first=cls.first_joint)
-        value = cls.ordinary_value(scene.strength[j], scene.speed[j], rng)
-        return cls(scene.chain.joints[j], j, value, *cls.drawn(scene, j, rng))
-
-    @classmethod
-    def drawn(cls, scene: Scene, j: int, rng: np.random.Generator) -> tuple[Any, ...]:
-        """Draw what it has beside its value."""
-        return ()
 
     def _column(self, like: FloatArray, values: FloatArray) -> FloatArray:
         torque = np.zeros_like(like)

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 
@@ -16,7 +16,23 @@ from tests.hidden.lived.motions import Path
 
 
 @dataclass(frozen=True)
-class Holding(JointCause):
+class _OnLink(JointCause):
+    """Something at the centre of mass of a link of the outer half; the value is [N/m] or [N]."""
+
+    #: Ordinary value over the largest strength of a joint.
+    ordinary = 1.0
+    attachment: tuple[float, float, float]
+
+    @classmethod
+    def draw(cls, scene: Scene, rng: np.random.Generator) -> Self:
+        n = len(scene.strength)
+        j = int(rng.integers(min(n // 2 + 1, n - 1), n))
+        value = cls.ordinary * scene.strength.max()
+        return cls(scene.joints[j], j, value, *cls.drawn(scene, j, rng))
+
+
+@dataclass(frozen=True)
+class Holding(_OnLink):
     """
     A person who holds a link: a spring and a damper to a fixed place.
 
@@ -25,17 +41,14 @@ class Holding(JointCause):
     """
 
     name = 'human_interaction'
-    attachment: tuple[float, float, float]
+    ordinary = 0.5
     anchor: tuple[float, float, float]
     middle: tuple[float, float, float]
     damping_time: float = 0.03
 
     @classmethod
-    def draw(cls, scene: Scene, rng: np.random.Generator) -> Self:
-        n = len(scene.strength)
-        j = int(rng.integers(min(n // 2 + 1, n - 1), n))
-        point, anchor, middle = _grip(scene, j, rng)
-        return cls(scene.chain.joints[j], j, 0.5 * scene.strength.max(), point, anchor, middle)
+    def drawn(cls, scene: Scene, j: int, rng: np.random.Generator) -> tuple[Any, ...]:
+        return _grip(scene, j, rng)
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
@@ -50,7 +63,7 @@ class Holding(JointCause):
 
 
 @dataclass(frozen=True)
-class Pulling(JointCause):
+class Pulling(_OnLink):
     """
     A person, or a balancer's rope, that pulls at a link with a constant force.
 
@@ -59,19 +72,15 @@ class Pulling(JointCause):
     """
 
     name = 'human_interaction'
-    attachment: tuple[float, float, float]
+    ordinary = 0.3
     direction: tuple[float, float, float]
 
     @classmethod
-    def draw(cls, scene: Scene, rng: np.random.Generator) -> Self:
-        n = len(scene.strength)
-        j = int(rng.integers(min(n // 2 + 1, n - 1), n))
+    def drawn(cls, scene: Scene, j: int, rng: np.random.Generator) -> tuple[Any, ...]:
         point, _, _ = _grip(scene, j, rng)
         along = rng.normal(size=3) * [1.0, 1.0, 0.3]  # not the weight of something
         along /= np.linalg.norm(along)
-        return cls(
-            scene.chain.joints[j], j, 0.3 * scene.strength.max(), point, tuple(along.tolist())
-        )
+        return point, tuple(along.tolist())
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
@@ -83,26 +92,23 @@ class Pulling(JointCause):
 
 
 @dataclass(frozen=True)
-class Knocks(JointCause):
+class Knocks(_OnLink):
     """A person who pushes a link now and then, this way and that: in no catalogue."""
 
     name = 'pushes'
     stated = (('force', 'value', 'N'),)
     in_catalogue = False
-    attachment: tuple[float, float, float]
     pushes: tuple[tuple[float, float, float, float, float], ...]
 
     @classmethod
-    def draw(cls, scene: Scene, rng: np.random.Generator) -> Self:
-        n = len(scene.strength)
-        j = int(rng.integers(min(n // 2 + 1, n - 1), n))
+    def drawn(cls, scene: Scene, j: int, rng: np.random.Generator) -> tuple[Any, ...]:
         point, _, _ = _grip(scene, j, rng)
         times = np.sort(rng.uniform(0.8, scene.end - 0.8, 9))
         pushes = [
             (float(time), float(rng.uniform(0.15, 0.7)), *rng.normal(size=3).tolist())
             for time in times
         ]
-        return cls(scene.chain.joints[j], j, scene.strength.max(), point, tuple(pushes))
+        return point, tuple(pushes)
 
     def torque(self, path: Path, chain: Chain) -> FloatArray:
         force = np.zeros((3, len(path.t)))

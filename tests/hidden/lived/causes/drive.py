@@ -55,7 +55,7 @@ class LoadFriction(JointCause):
     """A gear in which dry friction grows with the load."""
 
     name, worn = 'load_dependent_friction', 'load_share'
-    ordinary, by_torque, loaded = 0.1, 0, True
+    ordinary, by_torque, loaded = 0.1, 0, 0.1
     stated = (('load_coefficient', 'value', ''),)
     factors = (0.02, 6.0)
 
@@ -77,10 +77,10 @@ class Spring(JointCause):
 
     @classmethod
     def draw(cls, scene: Scene, rng: np.random.Generator) -> Self:
-        j = scene.joint(rng)
+        j = scene.pick(rng)
         low, high = scene.low[j], scene.high[j]
         value = 0.3 * scene.strength[j] / (high - low)
-        return cls(scene.chain.joints[j], j, value, float(rng.uniform(low, high)))
+        return cls(scene.joints[j], j, value, float(rng.uniform(low, high)))
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:

@@ -5,33 +5,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar, Self
+from typing import Self
 
 import numpy as np
 
-from tests.hidden.arrays import body_vector, FloatArray, named_body, Parameter, Tilted
+from tests.hidden.arrays import Ball, Parameter, Tilted
 from tests.hidden.lived.causes.base import Cause, JointCause, Scene
 from tests.hidden.lived.chain import Chain
 
 
-@dataclass(frozen=True)
-class Body(JointCause):
-    """A ball fixed to a link; the value is its mass [kg]."""
-
-    #: What the names of the ten parameters are made of.
-    label: ClassVar[str]
-    centre: tuple[float, float, float]
-    radius: float
-
-    @property
-    def body(self) -> FloatArray:
-        """Its ten parameters about the frame of the joint."""
-        central = 0.4 * self.value * self.radius**2 * np.eye(3)
-        return body_vector(self.value, np.array(self.centre), central)
-
-    @property
-    def parameters(self) -> tuple[Parameter, ...]:
-        return named_body(self.label, self.joint, self.body)
+class Body(Ball, JointCause):
+    """A ball fixed to a link."""
 
     def bodies(self, chain: Chain) -> Chain:
         return chain.with_body(self.index, self.body)
@@ -49,7 +33,7 @@ class Payload(Body):
         mass = rng.uniform(0.02, 0.12) * float(scene.chain.bodies[1:, 0].sum())
         centre = rng.normal(size=3)
         centre *= rng.uniform(0.03, 0.15) / np.linalg.norm(centre)
-        return cls(scene.chain.joints[j], j, mass, tuple(centre.tolist()), rng.uniform(0.02, 0.06))
+        return cls(scene.joints[j], j, mass, tuple(centre.tolist()), rng.uniform(0.02, 0.06))
 
 
 class Link(Body):
@@ -64,7 +48,7 @@ class Link(Body):
         centre = rng.normal(size=3)
         centre *= rng.uniform(0.08, 0.2) / np.linalg.norm(centre)
         mass = 0.08 * float(scene.chain.bodies[1:, 0].sum())
-        return cls(scene.chain.joints[j], j, mass, tuple(centre.tolist()), rng.uniform(0.03, 0.06))
+        return cls(scene.joints[j], j, mass, tuple(centre.tolist()), rng.uniform(0.03, 0.06))
 
 
 class Tilt(Tilted, Cause):

@@ -9,7 +9,7 @@ from typing import Self
 
 import numpy as np
 
-from tests.hidden.arrays import FloatArray
+from tests.hidden.arrays import FloatArray, sampled
 from tests.hidden.lived.causes.base import Cause, JointCause, Scene
 from tests.hidden.lived.motions import Path
 
@@ -18,7 +18,7 @@ class Gain(JointCause):
     """A torque reading of another scale."""
 
     name = 'torque_gain'
-    ordinary, by_torque, signed, loaded = 0.08, 0, True, True
+    ordinary, by_torque, signed, loaded = 0.08, 0, True, 0.1
     stated = (('gain_error', 'value', ''),)
     factors = (0.05, 6.0)
 
@@ -51,14 +51,14 @@ class Delay(Cause):
         return cls(0.01)
 
     def reading(self, t: FloatArray, tau: FloatArray) -> FloatArray:
-        return np.column_stack([np.interp(t - self.value, t, column) for column in tau.T])
+        return sampled(t - self.value, t, tau)
 
 
 class Encoder(JointCause):
     """An encoder that reads too little by a constant."""
 
     name = 'encoder_offset'
-    ordinary, by_torque, signed, loaded, first_joint = 0.03, 0, True, True, 1
+    ordinary, by_torque, signed, loaded, first_joint = 0.03, 0, True, 0.1, 1
     stated = (('encoder_offset', 'value', 'rad'),)
     factors = (0.02, 6.0)
 
