@@ -116,27 +116,31 @@ class CauseComparison:
         effects = tuple(self.catalogue.effects)
         return Result((), self.nuisance, look.under, look, effects)
 
-    def found(self, before: Result | None = None) -> Result:
+    def begun(self, before: Result) -> Result:
+        """Return the refitted causes of another comparison that act on the whole arm."""
+        accepted = tuple(trial for trial in before.accepted if not trial.effect.joints)
+        nuisance = self.nuisance
+        for one in before.nuisance.accepted:
+            if not one.effect.joints:
+                cause = self.catalogue.reshaped(one, np.array(one.effect.shape))
+                assert cause is not None  # it had torques in the other gravity as well
+                nuisance = nuisance.and_cause(cause, one.size)
+        under = self._likeliest(nuisance)
+        return replace(before, accepted=accepted, nuisance=nuisance, under=under)
+
+    def found(self, begun: Result | None = None) -> Result:
         """
         Accept the best cause until none is significant; drop causes that became redundant.
 
         Parameters
         ----------
-        before : Result, optional
-            Result of another comparison, whose causes that act on the whole arm are accepted
-            already, and are refitted.
+        begun : Result, optional
+            Causes that are accepted already.
 
         """
-        result = before or self.first()
-        accepted, nuisance, look = list[Trial](), self.nuisance, result.first
-        if before is not None:
-            accepted = [trial for trial in before.accepted if not trial.effect.joints]
-            for one in before.nuisance.accepted:
-                if not one.effect.joints:
-                    cause = self.catalogue.reshaped(one, np.array(one.effect.shape))
-                    assert cause is not None  # it had torques before as well
-                    nuisance = nuisance.and_cause(cause, one.size)
-            look = self.look(nuisance)
+        result = begun or self.first()
+        accepted = list(result.accepted)
+        look = self.look(result.nuisance) if accepted else result.first
         accepted, nuisance = self._exchanged(*self._extended(accepted, look))
         under = self._likeliest(nuisance)
         return replace(result, accepted=tuple(accepted), nuisance=nuisance, under=under)
