@@ -16,10 +16,17 @@ import pytest
 SYMBOLS = ('m', 'mx', 'my', 'mz', 'Ixx', 'Ixy', 'Iyy', 'Ixz', 'Iyz', 'Izz')
 
 
+def given(source, table):
+    """Return a file with independent values."""
+    covariance = np.diag([std**2 for _, std in table.values()])
+    return ParameterFile(source, 'arm', table, 5.0, covariance)
+
+
 def parameters(values, std, source='a'):
     names = [ParameterName(f'Izz{k + 1}', f'joint_{k + 1}', 'kg m^2') for k in range(len(values))]
-    table = {name: (float(v), float(s)) for name, v, s in zip(names, values, std, strict=True)}
-    return ParameterFile(source, 'arm', table, 5.0, np.diag(np.square(std)))
+    return given(
+        source, {n: (float(v), float(s)) for n, v, s in zip(names, values, std, strict=True)}
+    )
 
 
 def test_a_real_change_is_found_and_sized():
@@ -266,12 +273,6 @@ def test_numbers_that_no_estimate_has_are_refused(tmp_path, changes, message):
     assert [*read_parameters(written(tmp_path)).values.values()] == [(1.0, 0.1)]
     with pytest.raises(ModelError, match=rf'identification.json: .*{message}'):
         read_parameters(written(tmp_path, **changes))
-
-
-def given(source, table):
-    """Return a file with independent values."""
-    covariance = np.diag([std**2 for _, std in table.values()])
-    return ParameterFile(source, 'arm', table, 5.0, covariance)
 
 
 @pytest.mark.parametrize('inverse', [False, True])

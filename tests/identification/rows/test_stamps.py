@@ -68,24 +68,23 @@ def sent(seed=1, rate=100.0, amplitude=0.5, noise=1e-5, step=0.0):
     motion = multisine(JOINTS, 40.0, rate, seed, amplitude)
     q = motion.q + noise * np.random.default_rng(seed).normal(size=motion.q.shape)
     q = np.round(q / step) * step if step else q
-    return Recording(joints=JOINTS, t=motion.t, q=q, dq=motion.dq, tau=3.0 * motion.q)
+    return Recording(joints=JOINTS, t=motion.t, q=q, tau=3.0 * motion.q)
 
 
 def mixed(one, other, later):
     """Put the messages of two recordings into one, in order of time."""
     t = np.concatenate([one.t, other.t + later])
     order = np.argsort(t, kind='stable')
-    q, dq, tau = (
-        np.concatenate([getattr(one, name), getattr(other, name)])[order]
-        for name in ('q', 'dq', 'tau')
+    q, tau = (
+        np.concatenate([getattr(one, name), getattr(other, name)])[order] for name in ('q', 'tau')
     )
-    return Recording(joints=JOINTS, t=t[order], q=q, dq=dq, tau=tau, source='mixed')
+    return Recording(joints=JOINTS, t=t[order], q=q, tau=tau, source='mixed')
 
 
 def zeros_of_another(one, count=200):
     t = np.sort(np.random.default_rng(0).uniform(0.0, one.t[-1], count))
     nothing = np.zeros((count, len(JOINTS)))
-    return mixed(one, Recording(joints=JOINTS, t=t, q=nothing, dq=nothing, tau=nothing), 0.0)
+    return mixed(one, Recording(joints=JOINTS, t=t, q=nothing, tau=nothing), 0.0)
 
 
 def leader_and_follower(one):
@@ -97,13 +96,10 @@ def two_arms(one):
     return mixed(one, sent(2), 0.0003)
 
 
-@pytest.mark.parametrize('velocity', [True, False])
 @pytest.mark.parametrize('mix', [zeros_of_another, leader_and_follower, two_arms])
-def test_two_senders_of_one_topic_are_refused(mix, velocity):
-    recording = mix(sent())
-    recording = recording if velocity else replace(recording, dq=None)
+def test_two_senders_of_one_topic_are_refused(mix):
     with pytest.raises(IdentificationError, match='two senders'):
-        conditioning([recording], SignalSettings())
+        conditioning([mix(sent())], SignalSettings())
 
 
 def with_faulty_samples(value):
@@ -129,6 +125,5 @@ def with_faulty_samples(value):
         with_faulty_samples(lambda rng, shape: rng.normal(size=shape))(sent()),
     ],
 )
-@pytest.mark.parametrize('velocity', [True, False])
-def test_one_sender_is_one(sound, velocity):
-    assert two_senders(sound if velocity else replace(sound, dq=None)) == ''
+def test_one_sender_is_one(sound):
+    assert two_senders(sound) == ''
