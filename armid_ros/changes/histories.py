@@ -31,7 +31,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cache
 from typing import Literal, NamedTuple
 
 from armid_ros.changes.statistic import MEDIAN_SQUARE, tail, two_means
@@ -370,12 +369,10 @@ def _ratio(series: ParameterHistory, spread: Spread) -> float:
     return max(float(np.median(squares)) / MEDIAN_SQUARE, 1e-100)
 
 
-@cache
 def _freedom(bags: int) -> float:
-    """Return the degrees of freedom of the variance of a number of bags, from white noise."""
-    noise = np.random.default_rng(0).normal(size=(4000, bags))  # series of white noise
-    medians = np.median(np.diff(noise, axis=1) ** 2, axis=1)
-    return _inverse_trigamma(_robust_scale(np.log(medians)) ** 2)
+    """Return the degrees of freedom of the variance of a series, from the median of squares."""
+    # a line through simulated series of white noise; right to 6 % from 4 to 80 bags
+    return 0.8 + 0.31 * bags
 
 
 def _robust_scale(values: FloatArray) -> float:
