@@ -80,8 +80,7 @@ def motion_messages(stamps: np.ndarray, number: int) -> list[bytes]:
 def read_ours(path: Path) -> Arrays:
     """Read with this package."""
     recording = read_recording(path, joints=JOINTS, topic=TOPIC)
-    assert recording.dq is not None
-    assert recording.tau is not None
+    assert recording.dq is not None and recording.tau is not None
     return recording.t, recording.q, recording.dq, recording.tau
 
 
