@@ -17,7 +17,7 @@ from benchmarks.reference_loop import processor
 BENCHMARKS = (
     *('changes', 'coverage', 'exo', 'exo_diagnosis', 'growth'),
     *('healthy_arms', 'hidden_effects', 'live_diagnosis', 'lived', 'nodes'),
-    *('offline_speed', 'online', 'reading', 'real_changes', 'real_diagnosis'),
+    *('offline_speed', 'online', 'part_time', 'reading', 'real_changes', 'real_diagnosis'),
     'simulation',
 )
 #: Benchmarks whose output is kept.
