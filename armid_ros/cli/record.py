@@ -126,8 +126,9 @@ def simulate(
 
 
 def _of_some_size(text: str, robot: Robot) -> tuple[Effect, FloatArray]:
-    """Parse --effect; raise a ModelError if its size is zero."""
+    """Parse --effect; raise a ModelError if its size is zero, warn of an impossible payload."""
     from armid_ros.effects import parse_effect
+    from armid_ros.simulation.plant import possible_loads
 
     effect, values = parse_effect(text, robot)
     if not any(values):
@@ -138,6 +139,13 @@ def _of_some_size(text: str, robot: Robot) -> tuple[Effect, FloatArray]:
             f"--effect '{text}' has zero size and would change nothing: it takes {sizes}"
             + (f', and the shape {shapes}' if shapes else '')
             + f'; write {text.partition(":")[0]}:{first}=0.1'
+        )
+    if effect.traits.weighs and not possible_loads(robot, values):
+        say(
+            f"warning: --effect '{text}': no body within reach of the arm has these values. "
+            'payload_mx etc. are payload_m times distance; payload_Ixx etc. are about the '
+            'joint, with payload_m times distance squared',
+            'yellow',
         )
     return effect, values
 

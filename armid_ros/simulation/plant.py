@@ -11,7 +11,7 @@ from armid_ros.arm import ArmModel
 from armid_ros.effects import Action, DryFriction, TorqueLaw
 from armid_ros.effects.action import sum_laws
 from armid_ros.errors import ModelError, TrajectoryError
-from armid_ros.model.pseudo_inertia import pseudo_inertia
+from armid_ros.model.pseudo_inertia import Consistency, pseudo_inertia
 from armid_ros.motion import FloatArray, read_only
 from armid_ros.robots import NO_MASS, Robot
 from armid_ros.robots.reference import limit_slack
@@ -34,6 +34,28 @@ def require_masses(robot: Robot) -> None:
     ]
     if named:
         raise ModelError(f'{robot.name}: {", ".join(named)}; correct the description')
+
+
+def possible_loads(robot: Robot, values: FloatArray) -> bool:
+    """
+    Return whether bodies within reach of an arm can have the parameters of loads.
+
+    Parameters
+    ----------
+    robot : Robot
+        The arm; its reach is the sum of the distances between its joints, at least 1 m.
+    values : ndarray, shape (10 m,)
+        Ten parameters of each load, about the joint that carries it.
+
+    """
+    places = [placement.translation for placement in robot.model.jointPlacements]
+    reach = max(1.0, float(np.sum(np.linalg.norm(places, axis=1))))
+    for body in np.reshape(values, (-1, PER_LINK)):
+        found = Consistency.of('', body)
+        possible = found.eigenvalues[0] >= -1e-9 * found.eigenvalues[-1]
+        if not possible or np.linalg.norm(found.center) > reach:
+            return False
+    return True
 
 
 def require_any_mass(robot: Robot) -> None:
