@@ -70,7 +70,8 @@ def compare_report(comparison: Comparison, origin: ResultOrigin) -> str:
     ]
     title = f'Comparison of two identifications of {robot_label(comparison.after.robot)}'
     subtitle = f'{comparison.before.source} · {comparison.after.source}'
-    return Page(title, subtitle, sections).html()
+    joints = dict.fromkeys(one.parameter.joint for one in comparison.changes)
+    return Page(title, subtitle, sections, names=[*filter(None, joints)]).html()
 
 
 def verdict(comparison: Comparison) -> tuple[str, str]:

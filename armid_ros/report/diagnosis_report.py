@@ -158,7 +158,8 @@ def diagnosis_report(
         if read.get(role)
     ]
     subtitle = ' · '.join([robot_label(origin.robot), *used])
-    return Page(f'Diagnosis of {arm.robot.name}', subtitle, sections).html()
+    names = (*arm.robot.joints, *arm.robot.links)
+    return Page(f'Diagnosis of {arm.robot.name}', subtitle, sections, names=names).html()
 
 
 def _at_fault(diagnosis: Diagnosis, read: Mapping[str, Sequence[Recording]]) -> list[str]:

@@ -129,7 +129,8 @@ def excitation_report(
         f'{robot_label(origin.robot)} · {run.duration:.4g} s · {excitation.n_periods} periods · '
         f'{design.settings.speed}'
     )
-    return Page(f'Excitation of {arm.robot.name}', subtitle, sections).html()
+    names = (*arm.robot.joints, *arm.robot.links)
+    return Page(f'Excitation of {arm.robot.name}', subtitle, sections, names=names).html()
 
 
 def _verdict(

@@ -119,7 +119,8 @@ def identification_report(
     subtitle = f'{robot_label(origin.robot)} · {counted(len(training), "training recording")}'
     if validation:
         subtitle += f' · {counted(len(validation), "recording")} not used for the fit'
-    return Page(f'Identification of {described.name}', subtitle, sections).html()
+    names = (*described.joints, *described.links)
+    return Page(f'Identification of {described.name}', subtitle, sections, names=names).html()
 
 
 def _contradictions(result: Identification, description: ArmModel) -> list[str]:

@@ -84,7 +84,7 @@ def inspection_report(found: Inspection, origin: ResultOrigin = DEFAULT_ORIGIN) 
             None, (Path(origin.robot).name, recording.topic, counted(recording.n_joints, 'joint'))
         )
     )
-    return Page(f'Inspection of {name}', subtitle, sections).html()
+    return Page(f'Inspection of {name}', subtitle, sections, names=recording.joints).html()
 
 
 def inspection_word(found: Inspection) -> str:
@@ -191,7 +191,8 @@ def description_check_report(
         sections.append(ContentSection('Links', [table, Paragraph(hint, 'hint')]))
     sections.append(Origin(origin.provenance))
     title = f'Check of {robot_label(origin.robot)}'
-    return Page(title, '', sections, charts=False).html()
+    names = () if links is None else (*links.joints, *links.links)
+    return Page(title, '', sections, charts=False, names=names).html()
 
 
 def recording_facts(found: Inspection) -> list[tuple[str, str]]:

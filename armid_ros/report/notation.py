@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 import math
 from pathlib import PurePath
 import re
@@ -106,6 +107,41 @@ def robot_label(source: str) -> str:
         return 'description in the recording'
     path = source.split(' ')[0] if ':=' in source else source
     return PurePath(path).name or path
+
+
+def common_prefix(names: Sequence[str]) -> str:
+    """
+    Return the common prefix of all joints and links if it is long, such as 'panda_'.
+
+    Parameters
+    ----------
+    names : sequence of str
+        Joints and links.
+
+    Returns
+    -------
+    str
+        Five letters or more and a separator, after which each name goes on with a letter; or ''.
+
+    """
+    first = names[0] if len(names) > 1 else ''
+    ends = [first[: found.end()] for found in re.finditer(r'[_/.:-]', first)]
+    fitting = [
+        end
+        for end in ends
+        # shortest prefix that is omitted from names [letters]
+        if len(end) > 5 and all(x.startswith(end) and x[len(end) :][:1].isalpha() for x in names)
+    ]
+    return max(fitting, default='')
+
+
+def without_prefix(text: str, names: Sequence[str]) -> str:
+    """Remove the common prefix from the names in a label; names within paths stay."""
+    prefix = common_prefix(names)
+    if not prefix:
+        return text
+    rests = '|'.join(re.escape(name.removeprefix(prefix)) for name in names)
+    return re.sub(rf'(?<![\w/.-]){re.escape(prefix)}(?=(?:{rests})(?![\w/]|\.\w))', '', text)
 
 
 def explained(text: str) -> Markup:

@@ -16,10 +16,23 @@ from importlib.resources import files
 import re
 from typing import Any, ClassVar
 
-from armid_ros.report.notation import counted, digits, explained, plain, pretty
+from armid_ros.report.notation import (
+    common_prefix,
+    counted,
+    digits,
+    explained,
+    plain,
+    pretty,
+    without_prefix,
+)
 from armid_ros.version import GENERATOR
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
+
+#: Labels, in which names of joints and links are without their common prefix.
+_LABELS = re.compile(
+    r'<(table|figure|svg|summary|h3|div(?= class="bar-label"))\b.*?</\1>', flags=re.DOTALL
+)
 
 
 class Templated:
@@ -77,6 +90,8 @@ class Page:
         Parts in order; the first is the verdict.
     charts : bool
         Whether the page has interactive charts.
+    names : sequence of str
+        Joints and links of the arm. Tables and charts leave their common prefix out.
 
     """
 
@@ -84,6 +99,7 @@ class Page:
     subtitle: str
     sections: Sequence[Section]
     charts: bool = True
+    names: Sequence[str] = ()
 
     def html(self) -> str:
         """Return the whole file, scripts and styles included."""
@@ -95,9 +111,10 @@ class Page:
             'script': asset('report.js'),
             'style': asset('report.css'),
         }
-        text = render('page.html', {'page': self, **assets})
+        text = render('page.html', {'page': self, 'prefix': common_prefix(self.names), **assets})
+        shown = _LABELS.sub(lambda label: without_prefix(label[0], self.names), text)
         # passwords in arguments and in URLs
-        shown = re.sub(r'(\w*(?:passw|token|secret)\w*:?=)[^\s<"&]+', r'\1***', str(text))
+        shown = re.sub(r'(\w*(?:passw|token|secret)\w*:?=)[^\s<"&]+', r'\1***', shown)
         shown = re.sub(r'://[^/\s@<>"]+:[^/\s@<>"]+@', '://***@', shown)
         # escape control characters in file names
         return re.sub(r'[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f]', lambda c: repr(c[0])[1:-1], shown)
