@@ -6,6 +6,7 @@ from base64 import b64decode
 from dataclasses import replace
 from html.parser import HTMLParser
 import re
+from urllib.parse import unquote
 from xml.sax.saxutils import quoteattr
 
 from armid_ros.files.output import hash_files
@@ -352,6 +353,10 @@ def test_parameters_are_filtered_and_tables_are_copied(browser, first_plot):
     shown = browser.run(f'{rows}.map(row => {text})')
     assert 0 < len(shown) < everything
     assert all('elbow' in text for text in shown)
+    known = 'document.querySelector("#parameters button[aria-pressed]").click()'
+    browser.run(f'field.value = ""; {known}')
+    known = browser.run(f'{rows}.map(row => row.innerText)')
+    assert 0 < len(known) < everything and not any('includes 0' in text for text in known)
     tables, buttons = (
         browser.run(f'document.querySelectorAll(".scroll {place}").length')
         for place in ('> table', '+ button.tool')
@@ -365,6 +370,8 @@ def test_parameters_are_filtered_and_tables_are_copied(browser, first_plot):
     assert browser.run('window.copied').startswith('"Recording","Used for"')
     browser.run(
         'HTMLAnchorElement.prototype.click = function () { window.saved = this.href; };'
-        'document.querySelector("figure.chart .tool").click()'
+        'document.querySelectorAll("figure.chart .tool")[1].click()'
     )
-    assert browser.run('window.saved').startswith('data:image/png;base64,')
+    table = unquote(browser.run('window.saved')).partition(',')[2].splitlines()
+    assert table[0].startswith('"time [s]","measured: torque')
+    assert len(table) > 100 and len(table[1].split(',')) == len(table[0].split('","'))

@@ -229,16 +229,31 @@
     }
   }
 
-  function addPicture(figure, plot) {
-    const button = Object.assign(document.createElement('button'), {type: 'button', className: 'tool', textContent: 'PNG'});
+  const quoted = (text) => `"${text.trim().replace(/\s+/g, ' ').replace(/"/g, '""')}"`;
+
+  function numbers(spec) {
+    const columns = [[spec.xlabel || 'x', spec.x]];
+    for (const {label, y, upper} of spec.series) {
+      columns.push([`${label}: ${spec.ylabel}`, y], ...(upper ? [[`${label}, upper edge`, upper]] : []));
+    }
+    const rows = spec.x.map((x, k) => columns.map(([, values]) => values[k] ?? '').join(','));
+    return [columns.map(([label]) => quoted(label)).join(','), ...rows].join('\n');
+  }
+
+  function picture(plot) {
+    const {width, height} = plot.ctx.canvas;
+    const canvas = Object.assign(document.createElement('canvas'), {width, height});
+    const ctx = canvas.getContext('2d');
+    ctx.fillStyle = colour.paper;
+    ctx.fillRect(0, 0, width, height);
+    ctx.drawImage(plot.ctx.canvas, 0, 0);
+    return canvas.toDataURL();
+  }
+
+  function addDownload(figure, kind, title, address) {
+    const button = Object.assign(document.createElement('button'), {type: 'button', className: 'tool', textContent: kind, title});
     button.addEventListener('click', () => {
-      const {width, height} = plot.ctx.canvas;
-      const canvas = Object.assign(document.createElement('canvas'), {width, height});
-      const ctx = canvas.getContext('2d');
-      ctx.fillStyle = colour.paper;
-      ctx.fillRect(0, 0, width, height);
-      ctx.drawImage(plot.ctx.canvas, 0, 0);
-      Object.assign(document.createElement('a'), {href: canvas.toDataURL(), download: 'chart.png'}).click();
+      Object.assign(document.createElement('a'), {href: address(), download: `chart.${kind.toLowerCase()}`}).click();
     });
     figure.querySelector('.tools').append(button);
   }
@@ -274,7 +289,9 @@
         setLegend: [(u) => u.root.classList.toggle('idle', u.cursor.idx == null)]},
     }, data, figure);
     charts.set(figure, {plot, spec});
-    addPicture(figure, plot);
+    addDownload(figure, 'PNG', 'picture of the chart', () => picture(plot));
+    addDownload(figure, 'CSV', 'numbers of the curves, as drawn',
+      () => `data:text/csv;charset=utf-8,${encodeURIComponent(numbers(spec))}`);
     touch(plot, spec);
     figure.querySelector('.reset').addEventListener('click', () => plot.setScale('x', whole(spec)));
     resizing.observe(figure);
@@ -311,8 +328,6 @@
     repaint();
   });
 
-  const quoted = (text) => `"${text.trim().replace(/\s+/g, ' ').replace(/"/g, '""')}"`;
-
   // A button below each table copies it as CSV; a field above those of parameters filters rows.
   const csv = (table) => [...table.rows].map(
     (row) => [...row.cells].map((cell) => quoted(cell.innerText.replaceAll('\u00a0', ' '))).join(',')).join('\n');
@@ -333,13 +348,30 @@
     field.setAttribute('aria-label', 'Filter parameters');
     const rows = [...section.querySelectorAll('table.parameters tbody tr')];
     const words = (row) => (row.closest('details').firstElementChild.textContent + row.textContent).toLowerCase();
-    field.addEventListener('input', () => {
-      for (const row of rows) row.hidden = !words(row).includes(field.value.toLowerCase());
+    const keeps = {known: (row) => !row.querySelector('.unknown'), changed: (row) => row.querySelector('.changed')};
+    const tools = [field];
+    const apply = () => {
+      const chosen = tools.slice(1).filter((tool) => tool.ariaPressed === 'true').map((tool) => keeps[tool.textContent]);
+      for (const row of rows) {
+        row.hidden = !words(row).includes(field.value.toLowerCase()) || !chosen.every((keep) => keep(row));
+      }
       for (const fold of section.querySelectorAll('details:has(> .scroll > table.parameters)')) {
         fold.hidden = !fold.querySelector('tbody tr:not([hidden])');
       }
-    });
-    section.querySelector('details').before(field);
+    };
+    field.addEventListener('input', apply);
+    for (const [name, keep] of Object.entries(keeps)) {
+      const left = rows.filter(keep).length;
+      if (!left || left === rows.length) continue;
+      const button = document.createElement('button');
+      Object.assign(button, {type: 'button', className: 'tool', textContent: name, ariaPressed: 'false'});
+      button.addEventListener('click', () => {
+        button.ariaPressed = String(button.ariaPressed !== 'true');
+        apply();
+      });
+      tools.push(button);
+    }
+    section.querySelector('details').before(...tools);
   }
 
   // A number and its unit stay on one line.
