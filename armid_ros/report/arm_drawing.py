@@ -59,6 +59,10 @@ class ArmDrawing(Templated):
         Path of the last body, for each pose.
     captions : tuple of (float, str)
         Position [px] and text of each caption.
+    labels : tuple of (float, float, float, float, str)
+        Ends of a line from a joint to its name [px], and the name.
+    gravity : bool
+        Whether an arrow shows gravity.
     label : str
         Description of the drawing, for screen readers.
 
@@ -72,6 +76,8 @@ class ArmDrawing(Templated):
     dots: tuple[tuple[float, float, str, str], ...]
     paths: tuple[str, ...] = ()
     captions: tuple[tuple[float, str], ...] = ()
+    labels: tuple[tuple[float, float, float, float, str], ...] = ()
+    gravity: bool = False
     label: str = 'Poses of the arm'
 
 
@@ -132,7 +138,7 @@ def draw_arm(
     robot : Robot
         The arm.
     marked : sequence of str
-        Joints that are coloured, with their bodies.
+        Joints that are coloured, with their bodies, and named.
     q : ndarray, shape (N, n), optional
         Recorded poses [rad or m]; by default the middle of the range.
     label : str
@@ -153,15 +159,25 @@ def draw_arm(
         chosen = joint > 0 and robot.moving[joint - 1] in marked
         return 'var(--predicted)' if chosen else other
 
+    dots = [
+        (*strip.place(_flat(frames[k].translation), 0).tolist(), dot, name)
+        for k, name in enumerate(robot.moving, start=1)
+        for dot in [colour(k, 'var(--measured)')]
+    ]
+    labels, y, line = [], 0.0, 16.0  # height of a line of text [px]
+    for x, top, _, name in sorted(
+        (one for one in dots if one[3] in marked), key=lambda one: one[1]
+    ):
+        y = max(top, y + line)
+        labels.append((x, top, round(strip.pitch, 1), round(y, 1), name))
+    letters = max((len(name) for *_, name in labels), default=0)
     return ArmDrawing(
-        round(strip.pitch, 1),
-        round(strip.height, 1),
+        round(strip.pitch + 9.5 * letters, 1),  # a letter is 9.5 px wide
+        round(max(strip.height, y + line), 1),
         strip.bodies(lambda solid: colour(solid.joint, 'var(--faint)')),
-        tuple(
-            (*strip.place(_flat(frames[k].translation), 0).tolist(), dot, name)
-            for k, name in enumerate(robot.moving, start=1)
-            for dot in [colour(k, 'var(--measured)')]
-        ),
+        tuple(sorted(dots, key=lambda one: one[3] in marked)),  # on top of the others
+        labels=tuple(labels),
+        gravity=bool(np.any(robot.gravity)),
         label=label,
     )
 

@@ -36,5 +36,6 @@ def test_an_arm_on_a_ceiling_hangs():
         drawn = draw_arm(robot_from_urdf(ENDLESS, gravity=(0.0, 0.0, up)), [])
         corners = [float(p.split(',')[1]) for body, _ in drawn.bodies for p in body.split()]
         below[up] = max(corners) - next(y for _, y, _, name in drawn.dots if name == 'lift')
+        assert drawn.gravity == bool(up)
     assert 0.0 < below[9.81] < 0.2 * below[-9.81]
     assert below[0.0] == below[-9.81]

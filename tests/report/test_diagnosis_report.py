@@ -106,7 +106,9 @@ def test_the_story_comes_first_and_what_was_looked_at_last(html):
 def test_the_joint_with_the_cause_is_the_one_that_is_drawn_in_colour(html, quiet):
     drawing = html[html.index('<svg class="arm"') : html.index('</svg>')]
     assert re.findall(r'fill="var\(--predicted\)"[^>]*><title>([^<]*)<', drawing) == ['elbow']
+    assert re.findall('font-weight="600"[^>]*>([^<]*)<', drawing) == ['elbow']
     assert drawing.count('<circle') == 2
+    assert drawing.count('<line') == 1  # to the name
     assert drawing.count('polygon') == 3  # to the shoulder, and two links
     plain = quiet[quiet.index('<svg class="arm"') : quiet.index('</svg>')]
     assert 'var(--predicted)' not in plain
