@@ -67,12 +67,15 @@ class TableCell:
         Class of the style sheet, such as 'telling', 'changed' or 'unknown'.
     note : str
         Small print below it.
+    shade : int
+        Strength of its background [%].
 
     """
 
     text: str
     kind: str = ''
     note: str = ''
+    shade: int = 0
 
 
 @dataclass(frozen=True)

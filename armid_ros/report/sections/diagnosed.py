@@ -212,6 +212,16 @@ def isolability_section(isolability: Isolability) -> ContentSection:
         others = np.flatnonzero(near[kinds.index(name)]) if name in kinds else ()
         alike = ', '.join(names[k] for k in others)
         rows.append((*_detectable_row(name, isolability.effects), alike))
+    similar: list[Cells] = [
+        (
+            f'{k + 1} {name}',
+            *(
+                TableCell('=' if near[k, j] else '', shade=round(55.0 * (1.0 - apart[k, j])))
+                for j in range(len(kinds))
+            ),
+        )
+        for k, name in enumerate(names)
+    ]
     heads = (*_DETECTABLE, 'Not distinguishable from')
     return ContentSection(
         'Isolability',
@@ -222,6 +232,11 @@ def isolability_section(isolability: Isolability) -> ContentSection:
                 'not distinguishable from an effect that reproduces its torque to 10 % (rms).'
             ),
             DataTable(heads, rows, tuple(range(len(heads)))),
+            Paragraph(
+                'Similarity of two effects, by number: the darker, the more similar. "=" marks '
+                'an effect in a row that the effect in the column can reproduce.'
+            ),
+            DataTable(('Effect', *(str(k + 1) for k in range(len(kinds)))), similar),
         ],
     )
 
