@@ -52,7 +52,7 @@ from armid_ros.identification.rows.checks import check_held_out
 from armid_ros.identification.rows.temperature import friction_per_kelvin
 from armid_ros.recording import Recording, require_once
 from armid_ros.recording.curves import draw_joints
-from armid_ros.report.identification_report import identification_report
+from armid_ros.report.identification_report import identification_report, parameter_sections
 from armid_ros.report.judgement import judge, residual_trends, USE
 from armid_ros.report.notation import counted, digits, plain, pretty
 from armid_ros.report.parameter_tables import estimate_text, full_label, joint_columns
@@ -205,7 +205,7 @@ class IdentificationResult(ShownModel):
             recordings=[*self.recordings, *self.held_out],
             validation=self.validation,
             verification=self.verification,
-            exports=without_place,
+            parameters=parameter_sections(self.core, self.description, without_place),
             origin=origin.of(source_of(self.description.robot)),
         )
 

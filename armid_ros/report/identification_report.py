@@ -8,9 +8,12 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 
 from armid_ros.arm import ArmModel
+from armid_ros.estimate import Estimate
 from armid_ros.identification import Fit, Grade, Identification, PhysicalCertificate, Verification
+from armid_ros.identification.fitting.identifiability import HALF_WIDTH
 from armid_ros.identification.fitting.instruments import NoiseCheck
 from armid_ros.identification.fitting.least_squares import IN_WORDS
+from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording
 from armid_ros.report.blocks import (
     BulletList,
@@ -19,15 +22,18 @@ from armid_ros.report.blocks import (
     FactList,
     next_steps,
     Origin,
+    Panels,
     Paragraph,
     TableCell,
     VerdictSection,
 )
+from armid_ros.report.charts import Chart, Series
 from armid_ros.report.judgement import findings_of, judge
-from armid_ros.report.notation import counted, digits, plain, robot_label, sentence
+from armid_ros.report.notation import counted, digits, plain, pretty, robot_label, sentence
 from armid_ros.report.page import Page, Section
 from armid_ros.report.parameter_tables import (
     arm_facts,
+    full_label,
     not_as_described,
     parameter_section,
 )
@@ -36,6 +42,7 @@ from armid_ros.report.sections.data_quality import data_quality_section
 from armid_ros.report.sections.fit import by_recording, error_bars, fit_section, forward_section
 from armid_ros.report.statistics import residual_section, torque_reach, whiteness_section
 from armid_ros.robots import Robot
+import numpy as np
 
 #: Colour of each grade.
 TONES = {'good': 'good', 'poor': 'fair', 'unusable': 'bad'}
@@ -49,7 +56,7 @@ def identification_report(
     recordings: Sequence[Recording],
     validation: Mapping[str, Sequence[Fit]],
     verification: Verification | None = None,
-    exports: Mapping[str, Sequence[str]] | None = None,
+    parameters: Sequence[Section] = (),
     origin: ResultOrigin = DEFAULT_ORIGIN,
 ) -> str:
     """
@@ -62,15 +69,15 @@ def identification_report(
     grade : Grade
         Its grade.
     description : ArmModel
-        The model before the identification, to compare parameters with.
+        The model before the identification.
     recordings : sequence of Recording
         Training data and held-out data.
     validation : mapping of str to sequence of Fit
         Predictions of recordings that were not used for fitting, by recording.
     verification : Verification, optional
         Test for encoder noise, and simulations.
-    exports : mapping of str to sequence of str, optional
-        Exported files, and the values that each cannot contain.
+    parameters : sequence of Section
+        Sections on the parameters, by `parameter_sections`.
     origin : ResultOrigin
         Robot, files, versions, settings, seed.
 
@@ -103,13 +110,7 @@ def identification_report(
         *next_steps(steps),
         *([forward_section(described, forward)] if forward else []),
         residual_section(described, shown, role),
-        parameter_section(
-            result.estimate,
-            result.base.values(description.theta),
-            result.unidentified,
-            described.links,
-        ),
-        *([_physical_section(result.physical, exports or {})] if result.physical else []),
+        *parameters,
         whiteness_section(described, shown, role),
         *([] if noise is None else [_noise_section(described, noise)]),
         data_quality_section(read, described),
@@ -121,6 +122,34 @@ def identification_report(
         subtitle += f' · {counted(len(validation), "recording")} not used for the fit'
     names = (*described.joints, *described.links)
     return Page(f'Identification of {described.name}', subtitle, sections, names=names).html()
+
+
+def parameter_sections(
+    result: Identification,
+    reference: ArmModel,
+    exports: Mapping[str, Sequence[str]] | None = None,
+    name: str = 'description',
+) -> list[Section]:
+    """
+    Return sections on the parameters, and on physically consistent links if there are any.
+
+    Parameters
+    ----------
+    result : Identification
+        The identified model.
+    reference : ArmModel
+        Model to compare the parameters with.
+    exports : mapping of str to sequence of str, optional
+        Exported files, and the values that each cannot contain.
+    name : str
+        What the reference is: the 'description', or in a simulation the 'truth'.
+
+    """
+    values, links = result.base.values(reference.theta), result.arm.robot.links
+    return [
+        parameter_section(result.estimate, values, result.unidentified, links, name),
+        *([_physical_section(result.physical, exports or {})] if result.physical else []),
+    ]
 
 
 def _contradictions(result: Identification, description: ArmModel) -> list[str]:
@@ -229,3 +258,56 @@ def _physical_section(
             *homeless,
         ],
     )
+
+
+def convergence_section(
+    history: Sequence[tuple[float, Estimate]], truth: FloatArray
+) -> ContentSection:
+    """
+    Return online estimates over time with their 95 % intervals and the true values.
+
+    Parameters
+    ----------
+    history : sequence of (float, Estimate)
+        Times since the start [s], and estimates of P parameters.
+    truth : ndarray, shape (P,)
+        True values.
+
+    """
+    t, parameters = np.array([at for at, _ in history]), history[-1][1].parameters
+    values = np.array([estimate.values for _, estimate in history])
+    reach = HALF_WIDTH * np.array([estimate.std for _, estimate in history])
+    seen: Counter[str] = Counter()
+    turns = []
+    for k in np.argsort(-np.abs(truth) / reach[-1]):
+        unit = parameters[k].unit
+        turns.append((seen[unit], k))
+        seen[unit] += 1
+    panels = []
+    for k in sorted(k for _, k in sorted(turns)[:6]):
+        # an interval that is much wider than the value would fill the chart
+        known = reach[:, k] < 3.0 * (abs(truth[k]) + reach[-1, k])
+        lower, upper, drawn = (
+            np.where(known, curve, np.nan)
+            for curve in (values[:, k] - reach[:, k], values[:, k] + reach[:, k], values[:, k])
+        )
+        chart = Chart(
+            t,
+            [
+                Series('95 % interval', lower, 'floor', 'band', upper),
+                Series('online estimate', drawn, 'residual'),
+            ],
+            'time [s]',
+            f'estimate [{pretty(parameters[k].unit)}]',
+            height=170,
+            link='convergence',
+            levels=[(float(truth[k]), 'truth')],
+            legend=False,
+        )
+        panels.append((full_label(parameters[k]), '', [chart]))
+    text = (
+        'Six parameters over time, the best-determined one of each unit first. The band is the '
+        '95 % interval of the online estimate; the line is the true value.'
+    )
+    title = 'Convergence of the online estimate'
+    return ContentSection(title, [Paragraph(text), Panels(panels, three=True)])

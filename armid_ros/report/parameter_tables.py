@@ -159,6 +159,7 @@ def parameter_section(
     described: FloatArray,
     unidentified: Sequence[Unidentified] = (),
     links: Sequence[str] = (),
+    reference: str = 'description',
 ) -> ContentSection:
     """
     Return every parameter with its described value.
@@ -173,6 +174,8 @@ def parameter_section(
         Parameters that the data do not determine.
     links : sequence of str
         Names of the links, in the order of their numbers.
+    reference : str
+        Name of ``described``: 'description', or 'truth' of a simulated arm.
 
     """
     names, values = estimate.parameters, estimate.values
@@ -196,15 +199,13 @@ def parameter_section(
     count = int(changed.sum())
     blocks: list[Templated] = [
         Paragraph(
-            f'The description has values of {sum(known)} of these '
+            f'The {reference} has values of {sum(known)} of these '
             f'{counted(len(names), "parameter")}; {count} of them {"is" if count == 1 else "are"} '
             'outside the 95 % interval of the estimate (in bold). Each bar has its own axis with '
             'zero in the middle.'
         ),
-        Legend([('after', 'estimate with its 95 % interval'), ('tick', 'description')]),
-        *parameter_folds(
-            names, ('Estimate', '± 95 %', 'Relative', 'description', ''), cells, links
-        ),
+        Legend([('after', 'estimate with its 95 % interval'), ('tick', reference)]),
+        *parameter_folds(names, ('Estimate', '± 95 %', 'Relative', reference, ''), cells, links),
     ]
     lost: dict[str, list[str]] = {}
     for one in unidentified:

@@ -18,7 +18,7 @@ from armid_ros.identification import (
     verify,
 )
 from armid_ros.motion import Motion
-from armid_ros.report.identification_report import identification_report
+from armid_ros.report.identification_report import identification_report, parameter_sections
 from armid_ros.report.judgement import judge
 from armid_ros.report.provenance import Provenance, ResultOrigin, versions
 from armid_ros.report.sections.data_quality import repeatability
@@ -83,6 +83,9 @@ def report_of(case, **changes):
     }
     result = given.pop('result', case.result)
     training, held_out = case.recordings[:1], case.recordings[1:]
+    given['parameters'] = parameter_sections(
+        result, given['description'], given.pop('exports', None)
+    )
     graded = grade(result, given['description'], training, given['validation'], held_out)
     return identification_report(result, graded, **given)
 
@@ -126,6 +129,7 @@ def hostile():
         description=described,
         recordings=[run, held_out],
         validation=validation,
+        parameters=parameter_sections(result, described),
         origin=ResultOrigin(HOSTILE, provenance=made),
     )
 

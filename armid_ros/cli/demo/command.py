@@ -6,11 +6,18 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, TYPE_CHECKING
 
 from armid_ros.cli import parameters
 from armid_ros.cli.terminal import progress, say
 import click
+
+if TYPE_CHECKING:
+    from armid_ros.api.identification import IdentificationResult
+    from armid_ros.arm import ArmModel
+    from armid_ros.estimate import Estimate
+    from armid_ros.motion import FloatArray
+    from armid_ros.nodes.lockstep import Progress
 
 #: Files of an earlier demo, which the output folder may contain.
 OUTPUTS = ('bag', 'excitation.yaml', 'model.yaml', 'identification.json', 'report.html', 'story')
@@ -42,7 +49,7 @@ def demo(gravity: str, rate: float, hide: str, out: Path, seed: int, as_json: bo
     from armid_ros.cli import options
     from armid_ros.cli.demo import steps
     from armid_ros.excitation import design, DesignSettings, save_excitation
-    from armid_ros.files import json_text, settled
+    from armid_ros.files import json_text, settled, write_file
     from armid_ros.identification import write_document
     from armid_ros.identification.assess.agreement import Agreement
     from armid_ros.identification.online.identifier import OnlineIdentifier
@@ -73,21 +80,22 @@ def demo(gravity: str, rate: float, hide: str, out: Path, seed: int, as_json: bo
         save_excitation(excitation, new / 'excitation.yaml')
         tick(0.0, 'moving, and identifying online')
         identifier = OnlineIdentifier(nominal, rng=np.random.default_rng(seed))
+        target = identifier.base.values(truth.theta)
         plant = SimulatedArm(truth, rng=rng, sensors=steps.SENSORS)
-        end = run_lockstep(
-            plant,
-            excitation,
-            bag,
-            identifier,
-            rate=rate,
-            on_progress=lambda now: tick(now.t / now.duration),
-        )
+        history: list[tuple[float, Estimate]] = []
+
+        def watch(now: Progress) -> None:
+            history.append((now.t, identifier.estimate()))
+            tick(now.t / now.duration)
+
+        end = run_lockstep(plant, excitation, bag, identifier, rate=rate, on_progress=watch)
         tick(0.0, 'identifying offline')
         recording = replace(read_recording(bag, joints=robot.joints), source=str(settled(bag)))
         found = identify(nominal, recording, physical=False, rng=rng, progress=tick)
     offline = Agreement.of(found.estimate, found.core.base.values(truth.theta))
-    online = Agreement.of(identifier.estimate(), identifier.base.values(truth.theta))
+    online = Agreement.of(identifier.estimate(), target)
     found.fill(new, ResultOrigin(steps.ROBOT, steps.ROBOT))
+    write_file(new / 'report.html', _page(found, truth, history, target))
     rng = np.random.default_rng([seed, 1])
     diagnosed = steps.diagnose_hidden(new / 'story', changed, found.arm, recording, rng, rate)
     document: dict[str, Any] = {
@@ -110,3 +118,29 @@ def demo(gravity: str, rate: float, hide: str, out: Path, seed: int, as_json: bo
     say(pretty(f'{diagnosed.verdict.replace("_", " ").upper()}: {diagnosed.core.summary}'))
     say(steps.outcome(changed, diagnosed))
     say(f'Open {out / "report.html"} (model) and {out / "story" / "report.html"} (diagnosis).')
+
+
+def _page(
+    found: IdentificationResult,
+    truth: ArmModel,
+    history: list[tuple[float, Estimate]],
+    target: FloatArray,
+) -> str:
+    """Return report.html with true values and the convergence of the online estimate."""
+    from armid_ros.report.identification_report import (
+        convergence_section,
+        identification_report,
+        parameter_sections,
+    )
+    from armid_ros.report.provenance import ResultOrigin
+
+    parameters = parameter_sections(found.core, truth, name='truth')
+    return identification_report(
+        found.core,
+        found.graded,
+        description=found.description,
+        recordings=found.recordings,
+        validation={},
+        parameters=[*parameters, convergence_section(history, target)],
+        origin=ResultOrigin(truth.robot.name),
+    )
