@@ -21,7 +21,7 @@ from armid_ros.api.arguments import (
 )
 from armid_ros.api.baseline import baseline_recordings, diagnosed_model
 from armid_ros.api.identification import IdentificationResult
-from armid_ros.api.table import data_frame, ShownModel, Summary
+from armid_ros.api.table import data_frame, ResidualPart, ShownModel, Summary
 from armid_ros.arm import ArmModel, Misfit, save_model
 from armid_ros.diagnosis import diagnose as run
 from armid_ros.diagnosis import (
@@ -153,6 +153,9 @@ class DiagnosisResult(ShownModel):
             'with them': (shown.trajectory.t, shown.measured - shown.after),
         }
         return draw_joints(self.arm.robot.joints, curves, 'residual torque [N m or N]')
+
+    def _residuals(self) -> list[ResidualPart]:
+        return [(o.source, o.trajectory.t, o.measured - o.after) for o in self.core.overlays]
 
     def to_dataframe(self) -> pandas.DataFrame:
         """Return the named effects as a pandas table, one row per parameter."""

@@ -22,7 +22,7 @@ from armid_ros.api.arguments import (
     USUAL,
     with_sources_apart,
 )
-from armid_ros.api.table import aligned, data_frame, ShownModel, Summary
+from armid_ros.api.table import aligned, data_frame, ResidualPart, ShownModel, Summary
 from armid_ros.arm import ArmModel, Misfit, save_model
 from armid_ros.arm.export import arm_mjcf, arm_urdf, Exported, torque_check
 from armid_ros.diagnosis import known_misfit
@@ -177,6 +177,12 @@ class IdentificationResult(ShownModel):
     def to_dataframe(self) -> pandas.DataFrame:
         """Return the parameters as a pandas table: name, joint, value, std, unit."""
         return data_frame(self.document()['parameters'])
+
+    def _residuals(self) -> list[ResidualPart]:
+        held_out = [fit for fits in self.validation.values() for fit in fits]
+        return [
+            (fit.source, fit.motion.t, fit.residual) for fit in (*self.core.training, *held_out)
+        ]
 
     @cached_property
     def exports(self) -> dict[str, Exported]:

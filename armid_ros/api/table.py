@@ -15,9 +15,11 @@ from armid_ros.arm import ArmModel
 from armid_ros.arm.export import arm_urdf
 from armid_ros.errors import ArmidError
 from armid_ros.files import json_text, result_folder, staged, write_file
+from armid_ros.motion import FloatArray
 from armid_ros.report.provenance import DEFAULT_ORIGIN, ResultOrigin
 from armid_ros.robots import Robot
 from markupsafe import escape
+import numpy as np
 
 if TYPE_CHECKING:
     import pandas
@@ -63,6 +65,10 @@ class Summary:
         return [headline, *table, *filter(None, self.lines), *below, *steps]
 
 
+#: Source of a recording, times [s] and residual torques [N m or N], shapes (M,) and (M, n).
+ResidualPart = tuple[str, FloatArray, FloatArray]
+
+
 def data_frame(rows: Any) -> pandas.DataFrame:
     """Return rows as a pandas table; ArmidError if pandas is not installed."""
     try:
@@ -104,6 +110,10 @@ class Shown(ABC):
     def document(self, origin: ResultOrigin = DEFAULT_ORIGIN) -> dict[str, Any]:
         """Return the content of the JSON file, with a given provenance."""
 
+    def to_dict(self) -> dict[str, Any]:
+        """Return the content of the JSON file."""
+        return self.document()
+
     @abstractmethod
     def page(self, origin: ResultOrigin = DEFAULT_ORIGIN) -> str:
         """Return the report, one HTML file."""
@@ -142,7 +152,28 @@ class Shown(ABC):
 
 
 class ShownModel(Shown):
-    """Result with an arm model."""
+    """Result with an arm model and residual torques."""
+
+    @abstractmethod
+    def _residuals(self) -> Sequence[ResidualPart]:
+        """Return source, times [s] and residual torques [N m or N] of each stretch."""
+
+    def residual_table(self) -> pandas.DataFrame:
+        """
+        Return measured minus predicted torques [N m or N] as a pandas table, held-out data last.
+
+        Columns are recording, t [s], and every joint.
+
+        Raises
+        ------
+        IdentificationError
+            If the data of a diagnosis were refused, so that there is no residual.
+
+        """
+        names, times, residuals = zip(*self._residuals(), strict=True)
+        columns = dict(zip(self.arm.robot.joints, np.concatenate(residuals).T, strict=True))
+        sources = np.repeat(names, [len(t) for t in times])
+        return data_frame({'recording': sources, 't': np.concatenate(times), **columns})
 
     @property
     @abstractmethod

@@ -92,6 +92,7 @@ def test_recordings_and_residuals_of_a_model_are_its_baseline_from_memory_and_fi
 
 def test_a_diagnosis_and_a_comparison_find_the_load(model, found, loaded, tmp_path):
     assert 'payload' in repr(found) and '\nnext: ' in repr(found)
+    assert found.to_dict() == found.document()
     assert found.to_dataframe().effect.str.contains('payload').any()
     assert (found.save(tmp_path / 'found') / 'diagnosis.json').is_file()
     assert 'damping="0.' in found.urdf()
@@ -225,6 +226,16 @@ def test_an_inspection_takes_a_recording_with_or_without_a_robot(runs, tmp_path)
     assert found == [False, True, True]
     with pytest.raises(ar.ArmidError, match='two recordings'):
         ar.inspect(runs[0], runs[1])
+
+
+def test_residuals_are_a_table_of_every_joint(model, found):
+    table = model.residual_table()
+    joints = list(model.arm.robot.joints)
+    assert list(table.columns) == ['recording', 't', *joints]
+    errors = table[joints].std()
+    left = found.residual_table()
+    assert list(left.columns) == list(table.columns)
+    assert (left[joints].std() < 3.0 * errors).all()
 
 
 @pytest.mark.parametrize('ask', [ar.identify, ar.diagnose])
