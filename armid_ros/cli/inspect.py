@@ -64,13 +64,14 @@ def inspect(
 
 
 @click.command(epilog='Example: armid check ur10.urdf run.mcap')
-@click.argument(
+@click.argument('arguments', metavar='[R] [BAG]...', nargs=-1)
+@click.option(
+    '--robot',
     'robot_source',
     metavar='R',
-    callback=lambda context, _, source: parameters.with_packages(context, source),
     shell_complete=parameters.completed,
+    help='The description, in place of the first argument.',
 )
-@click.argument('bags', nargs=-1, type=click.Path(path_type=Path))
 @parameters.packages
 @click.option(
     '--out',
@@ -82,8 +83,8 @@ def inspect(
 @parameters.effects
 @columns.recordings
 def check(
-    robot_source: str,
-    bags: tuple[Path, ...],
+    arguments: tuple[str, ...],
+    robot_source: str | None,
     out: Path | None,
     strict: bool,
     effects: str,
@@ -97,7 +98,7 @@ def check(
     Check a URDF: alone, or against recordings.
 
     R is a URDF, MJCF or xacro ('arm.xacro tool:=true' with arguments), a shipped name, or - for
-    the description in the bag.
+    the description in the bag. R may be left out if --robot or armid.toml names the robot.
 
     Without recordings: impossible inertias, densities of links with shapes, units of limits. With
     recordings: described and measured mass and centre of each link.
@@ -107,6 +108,9 @@ def check(
     from armid_ros.api.inspection import CheckResult
     from armid_ros.cli import options
 
+    context = click.get_current_context()
+    robot_source, bags = _described(context, arguments, robot_source)
+    context.params |= {'robot_source': robot_source, 'bags': bags}
     staged = None if out is None else options.stage(out, CheckResult.schema, robot_source)
     robot = options.open_robot(robot_source, gravity, joints, bags, tell=False)
     with progress('checking'):
@@ -115,4 +119,23 @@ def check(
     origin = options.origin(robot_source, source, seed)
     options.deliver(found, staged, origin, as_json)
     if strict and found.wrong:
-        click.get_current_context().exit(3)
+        context.exit(3)
+
+
+def _described(
+    context: click.Context, arguments: tuple[str, ...], robot: str | None
+) -> tuple[str, tuple[Path, ...]]:
+    """Return the description and the recordings; a description as the first argument wins."""
+    from armid_ros.robots import shipped_robots
+
+    first = ''.join(arguments[:1])
+    suffix = Path(first.partition(' ')[0]).suffix
+    named = suffix in ('.urdf', '.xacro', '.xml') or first in ('-', *shipped_robots())
+    if first and (named or robot is None):
+        if robot is not None:
+            click.echo(f'{first} is used instead of --robot {robot}', err=True)
+        robot, arguments = first, arguments[1:]
+    source = parameters.with_packages(context, robot)
+    if source is None:
+        raise click.UsageError("Missing argument 'R', the description.")
+    return source, tuple(map(Path, arguments))

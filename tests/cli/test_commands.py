@@ -362,3 +362,15 @@ def test_the_last_line_is_a_command(bags, folder, command, then, words):
     assert {paths.get(word, word) for word in words} <= set(arguments)
     for page in (folder / name / 'report.html' for name in ('plan', 'c') if name in command):
         assert done[-1].removeprefix('next: ') in page.read_text()
+
+
+def test_a_check_takes_the_robot_of_the_project(bags, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    armid('check', code=2)
+    assert (
+        armid('check', bags[0], '--robot', ROBOT).stdout == armid('check', ROBOT, bags[0]).stdout
+    )
+    (tmp_path / 'armid.toml').write_text(f'robot = "{ROBOT}"\n')
+    assert ROBOT in armid('check', bags[0]).stdout.splitlines()[-1]
+    armid('check', 'no.urdf', code=2)
+    assert '- is used' in armid('check', '-', bags[0]).stderr
