@@ -8,6 +8,7 @@ from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.next_run.isolability import isolability
 from armid_ros.effects import make_effect
 from armid_ros.motion import Motion
+from armid_ros.report.sections.diagnosed import isolability_section
 from armid_ros.robots import load_robot
 import numpy as np
 import pytest
@@ -82,3 +83,14 @@ def test_kinds_have_the_least_difference_of_all_places(shown):
     a, b = kinds.index('time_delay'), kinds.index('torque_lag')
     assert apart[a, b] < 0.1 < apart[a, kinds.index('rotor_inertia')]
     assert np.all((apart >= 0.0) & (apart <= 2.0))
+
+
+def test_the_map_of_the_report_marks_what_another_effect_reproduces(shown):
+    kinds, apart = shown.of_kinds()
+    rows = isolability_section(shown).blocks[-1].rows
+    row = rows[kinds.index('payload')][1:]
+    assert row[kinds.index('link_inertia')].text == '='
+    assert row[kinds.index('link_inertia')].shade > 50
+    assert [cell.shade for cell in row] == [
+        round(55 * (1 - x)) for x in apart[kinds.index('payload')]
+    ]
