@@ -37,6 +37,13 @@ class ComparisonResult(Shown):
     core : Comparison
         Everything that the comparison found.
 
+    Examples
+    --------
+    >>> import armid_ros as ar
+    >>> changed = ar.compare('monday_result', 'friday_result')
+    >>> changed.anything, round(changed.load, 1)  # [kg]
+    (True, 0.4)
+
     """
 
     schema = SCHEMA
@@ -101,11 +108,8 @@ def compare(
     Examples
     --------
     >>> import armid_ros as ar
-    >>> changed = ar.compare('monday_result', 'friday_result')
-    >>> print(changed)
+    >>> print(ar.compare('monday_result', 'friday_result'))
     CHANGED: A load of 0.39... kg was added to the link of elbow...
-    >>> changed.anything, round(changed.load, 1)  # [kg]
-    (True, 0.4)
 
     """
     return ComparisonResult(run(_parameters('before', before), _parameters('after', after)))

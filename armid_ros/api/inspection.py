@@ -67,6 +67,13 @@ class InspectionResult(Shown):
     core : Inspection
         Everything that the inspection found.
 
+    Examples
+    --------
+    >>> import armid_ros as ar
+    >>> found = ar.inspect('my_arm.urdf', 'monday')
+    >>> found.report('inspection.html').name
+    'inspection.html'
+
     """
 
     core: Inspection
@@ -159,11 +166,8 @@ def inspect(
     Examples
     --------
     >>> import armid_ros as ar
-    >>> found = ar.inspect('my_arm.urdf', 'monday')
-    >>> found.remarks
+    >>> ar.inspect('my_arm.urdf', 'monday').remarks
     ()
-    >>> found.report('inspection.html').name
-    'inspection.html'
 
     """
     if recording is None:  # the only argument
