@@ -9,7 +9,7 @@ from difflib import get_close_matches
 
 
 def nearest(name: str, names: Iterable[str]) -> str:
-    """Return the most similar of the names; empty if none is similar enough."""
+    """Return the name that is most similar to a text; empty if none is similar enough."""
     # up to a quarter of the letters may differ
     return next(iter(get_close_matches(name, list(names), 1, 0.75)), '')
 

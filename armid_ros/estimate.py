@@ -54,7 +54,7 @@ class ParameterName:
 
     @property
     def rigid(self) -> bool:
-        """Whether the name is, or begins with, a mass, first moment or inertia of a link."""
+        """Whether the parameter is, or begins with, a mass, first moment or inertia of a link."""
         return _RIGID.match(self.name) is not None
 
 
@@ -155,7 +155,9 @@ class Estimate:
         own = [one for one in self.parameters if one.joint == joint] or self.parameters
         known = ', '.join(f'{p.name} [{p.joint}]' if p.joint else p.name for p in own)
         guess = meant(name, [one.name for one in own])
-        raise ModelError(f"no parameter '{name}' of joint '{joint}'; there are {known}{guess}")
+        raise ModelError(
+            f"there is no parameter '{name}' of joint '{joint}'; parameters are {known}{guess}"
+        )
 
 
 def parameter_table(

@@ -76,7 +76,7 @@ class MovingPoints:
         freeze(self, 'position', 'velocity')
 
     def select(self, samples: Samples) -> MovingPoints:
-        """Return the points at selected samples."""
+        """Return the points at some of the samples."""
         return replace(self, position=self.position[samples], velocity=self.velocity[samples])
 
 

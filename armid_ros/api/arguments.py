@@ -38,7 +38,7 @@ USUAL = ','.join(USUAL_EFFECTS)
 
 
 def robot_of(robot: RobotLike) -> Robot:
-    """Return a robot; a name or path is loaded."""
+    """Return a robot, which is loaded if a name or path is given."""
     if isinstance(robot, ArmModel):
         return robot.robot
     if isinstance(robot, Robot):
@@ -49,12 +49,15 @@ def robot_of(robot: RobotLike) -> Robot:
 def is_model(path: str | Path) -> bool:
     """Return whether a path names a model.yaml rather than a description."""
     if not isinstance(path, str | Path):
-        raise RobotError(f'a {type(path).__name__} is no robot; a robot comes before recordings')
+        raise RobotError(
+            f'a {type(path).__name__} was given in place of a robot; the robot comes before the '
+            'recordings'
+        )
     return Path(path).suffix in ('.yaml', '.yml')
 
 
 def source_of(robot: Robot) -> str:
-    """Return how files refer to a robot: by its shipped name, its path, or its own name."""
+    """Return the text by which files refer to a robot: shipped name, path, or own name."""
     for name in shipped_robots():
         if robot.path == shipped_path(name):
             return name
@@ -62,7 +65,7 @@ def source_of(robot: Robot) -> str:
 
 
 def arm_of(arm: RobotLike, effects: str = USUAL) -> ArmModel:
-    """Return an arm model; a robot, a name or a path of a robot gets the usual friction."""
+    """Return an arm model; a robot or its name or path gets the usual friction."""
     if isinstance(arm, ArmModel):
         return arm
     if not isinstance(arm, Robot) and is_model(arm):
@@ -86,13 +89,13 @@ def drivable(arm: RobotLike) -> ArmModel:
 def recordings_of(
     recordings: RecordingLike | Sequence[RecordingLike], robot: Robot
 ) -> list[Recording]:
-    """Return a list of recordings; paths are read."""
+    """Return a list of recordings; those that are given as paths are read."""
     several = recordings if isinstance(recordings, Iterable) else [recordings]
     several = [recordings] if isinstance(recordings, RecordingLike) else list(several)
     for one in several:
         if not isinstance(one, RecordingLike):
             raise RecordingError(
-                f'{str(one)[:40]!r} is no recording; give a Recording, or the path of a bag or '
+                f'{str(one)[:40]!r} is not a recording; give a Recording, or the path of a bag or '
                 'a table'
             )
     read = [one if isinstance(one, Recording) else read_recording(one, robot) for one in several]
@@ -100,8 +103,8 @@ def recordings_of(
         if recording.joints != robot.joints:
             raise RecordingError(
                 f'{recording.source or "recording"}: its joints are '
-                f'{", ".join(recording.joints)}, those of {robot.name} '
-                f'{", ".join(robot.joints)}; read it with that robot'
+                f'{", ".join(recording.joints)}, but those of {robot.name} are '
+                f'{", ".join(robot.joints)}; read the recording with that robot'
             )
     return read
 
@@ -109,7 +112,7 @@ def recordings_of(
 def some_recordings_of(
     recordings: RecordingLike | Sequence[RecordingLike], robot: Robot
 ) -> list[Recording]:
-    """Return a list of recordings, as `recordings_of`; RecordingError if it is empty."""
+    """Return recordings as `recordings_of` does; raise a RecordingError if there are none."""
     found = recordings_of(recordings, robot)
     if not found:
         raise RecordingError('no recordings: give at least one bag, table or Recording')
@@ -117,7 +120,7 @@ def some_recordings_of(
 
 
 def with_sources_apart(*groups: list[Recording]) -> tuple[list[Recording], ...]:
-    """Add numbers to equal source names of recordings; names of existing paths stay."""
+    """Add numbers to sources of recordings that have the same name; existing paths stay."""
     taken: dict[str, int] = {}
 
     def named(recording: Recording) -> Recording:
@@ -240,7 +243,8 @@ def read_recording(
         named = [one.name for one in topics if one.joints]
         if topic is None and len(named) > 1:
             raise RecordingError(
-                f'{path}: topics of JointState: {", ".join(named)}; give one as topic'
+                f'{path}: several topics contain JointState messages: {", ".join(named)}; choose '
+                'one with topic='
             )
         return reader.read_recording(path, topic=topic, columns=settings)
     if isinstance(robot, (Robot, ArmModel, str, Path)):
@@ -253,7 +257,7 @@ def read_recording(
 
 
 def topics_of(path: Path, settings: ReadSettings = DEFAULT) -> tuple[Topic, ...]:
-    """Return the topics of a bag; empty for a table."""
+    """Return the topics of a bag; a table has none."""
     return () if reader.is_table(path) else reader.topics(path, settings)
 
 

@@ -72,7 +72,9 @@ def diagnosed_model(
             return arm, model, arm.misfit, None
         return arm, model, read_misfit(arm, model) if _is_written(arm) else None, None
     if baseline:
-        raise IdentificationError('give recordings of a simulator or a baseline, not both')
+        raise IdentificationError(
+            'a baseline and recordings of a simulator were both given; give only one of them'
+        )
     kinds = CATALOGUE.items()
     usual = [name for name, kind in kinds if kind.traits.usual or kind.traits.mjcf_attribute]
     found = identify(model.robot, recordings, effects=effects or ','.join(usual), rng=rng)

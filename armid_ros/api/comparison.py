@@ -71,11 +71,11 @@ class ComparisonResult(Shown):
         return self.core.document()
 
     def page(self, origin: ResultOrigin = DEFAULT_ORIGIN) -> str:
-        """Return report.html."""
+        """Return report.html of the comparison."""
         return compare_report(self.core, origin)
 
     def summary(self) -> Summary:
-        """Return the changes, most significant first."""
+        """Return a summary of the changes, the most significant first."""
         rows = change_rows(self.core)
         first, *more = change_sentences(self.core)
         then = 'diagnose' if self.anything or self.core.unusable else 'identify'

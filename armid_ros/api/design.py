@@ -192,7 +192,9 @@ def _searched(
     if start is None:
         planner.free_start()  # raises an error before the search if no pose is free
     elif start.shape != (model.robot.n_joints,):
-        raise TrajectoryError(f'start: shape {start.shape}, expected ({model.robot.n_joints},)')
+        raise TrajectoryError(
+            f'start has shape {start.shape}, but the arm needs shape ({model.robot.n_joints},)'
+        )
     elif fault := planner.fault(start):
         degrees = '; are these degrees?' if not planner.fault(np.radians(start)) else ''
         raise TrajectoryError(f'start: {fault}{degrees}')

@@ -62,7 +62,7 @@ _Made = TypeVar('_Made')
 @dataclass(frozen=True, repr=False, eq=False)
 class DiagnosisResult(ShownModel):
     """
-    Diagnosis of a model: named effects, patched model, evidence.
+    Result of a diagnosis: named effects, the patched model, and the evidence.
 
     Attributes
     ----------
@@ -255,14 +255,14 @@ class DiagnosisResult(ShownModel):
         return replace(result, next_run=run, no_run='; '.join(why))
 
     def _steps(self, model: str) -> list[str]:
-        """Return the next steps for the user, which name the path of the model."""
+        """Return the next steps for the user; commands in them contain the path of the model."""
         worse = dict.fromkeys(joint for pair in self.forward for joint in pair.worse)
         learned = self.residual is not None
         steps = next_steps(self.core, self.next_run, self.no_run, model, tuple(worse), learned)
         return list(map(pretty, steps))
 
     def summary(self, model: str = MODEL, every: bool = True) -> Summary:
-        """Return verdict, values that differ from zero, notes, and next steps for a model file."""
+        """Return a summary: verdict, values that differ from zero, notes, and next steps."""
         rows: list[Sequence[str]] = [*named_rows(self.core.findings, certain=True)]
         most = 6  # number of rows without --all
         if not every and len(rows) > most + 1:
@@ -432,7 +432,7 @@ def require_residual() -> None:
 
 
 def _attempt(what: str, make: Callable[[], _Made]) -> tuple[_Made | None, tuple[str, ...]]:
-    """Return the result of a step, or None and the reason of its failure."""
+    """Run a step; return its result, or None and the reason of its failure."""
     try:
         return make(), ()
     except Exception as error:  # the diagnosis itself is valid after any error

@@ -156,7 +156,7 @@ class ExcitationResult(Shown):
 
     @cached_property
     def isolability(self) -> Isolability:
-        """Return the effects that the trajectory makes detectable or cannot distinguish."""
+        """Return which effects the trajectory makes detectable or cannot distinguish."""
         settings = self.core.settings
         noise, count = torque_noise(self.arm, settings), settings.rate * self.duration
         return isolability(self.arm, self.motion(), noise, count)
@@ -247,7 +247,7 @@ class ExcitationResult(Shown):
         return document
 
     def summary(self) -> Summary:
-        """Return the identifiable parameters, and the share of its limits that each joint uses."""
+        """Return a summary: identifiable parameters, and the used share of each joint's limits."""
         shares = self.core.robot_limits_used(self.arm)
         rows = [
             (joint, *(f'{100 * share[k]:.0f} %' for share in shares.values()))
@@ -267,7 +267,7 @@ class ExcitationResult(Shown):
         )
 
     def _of_run(self) -> tuple[str, list[str], str]:
-        """Return the verdict on the run, sentences on run and search, and the remedy."""
+        """Return the verdict on the run, sentences on the run and its search, and the remedy."""
         try:
             run, fit = self.run, self.fitness
         except TrajectoryError as error:

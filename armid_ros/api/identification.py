@@ -124,7 +124,7 @@ class IdentificationResult(ShownModel):
 
     @property
     def error_percent(self) -> float:
-        """Error of the worst joint in the grade, 100 |tau - tau_hat| / |tau| [%]."""
+        """Torque error of the worst joint in the grade, 100 |tau - tau_hat| / |tau| [%]."""
         return self.graded.error_percent
 
     @property
@@ -141,12 +141,12 @@ class IdentificationResult(ShownModel):
 
     @property
     def grade(self) -> str:
-        """Grade: good, poor or unusable."""
+        """Grade of the identification: good, poor or unusable."""
         return self.graded.word
 
     @cached_property
     def graded(self) -> Grade:
-        """Grade with its reasons."""
+        """Grade of the identification with its reasons."""
         return grade(self.core, self.description, self.recordings, self.validation, self.held_out)
 
     def predict(self, recordings: RecordingLike | Sequence[RecordingLike]) -> tuple[Fit, ...]:
@@ -186,7 +186,7 @@ class IdentificationResult(ShownModel):
 
     @cached_property
     def exports(self) -> dict[str, Exported]:
-        """Return URDF and MJCF by file name; empty unless the links are physically consistent."""
+        """Return URDF and MJCF by file name; empty if a link is not physically consistent."""
         if self.core.physical is None:
             return {}
         return {'identified.urdf': arm_urdf(self.arm), 'identified.mjcf.xml': arm_mjcf(self.arm)}
@@ -233,7 +233,7 @@ class IdentificationResult(ShownModel):
         return document
 
     def summary(self, every: bool = False) -> Summary:
-        """Return errors and friction of joints, warnings, and next step; `every`: all values."""
+        """Return a summary: errors, friction, warnings and next step; with `every`, all values."""
         core, estimate, joints = self.core, self.estimate, self.arm.robot.joints
         others = self.graded.reasons[1:]
         held_out = [fit for fits in self.validation.values() for fit in fits]
@@ -279,7 +279,7 @@ class IdentificationResult(ShownModel):
         )
 
     def _parameters(self) -> list[str]:
-        """Return a table of all parameters with their described values, one line each."""
+        """Return a table with one line for each parameter: its value and its described value."""
         estimate, links = self.estimate, self.arm.robot.links
         described = self.core.base.values(self.description.theta)
         rows = []

@@ -60,7 +60,7 @@ if TYPE_CHECKING:
 @dataclass(frozen=True, repr=False, eq=False)
 class InspectionResult(Shown):
     """
-    Inspection of a recording.
+    Result of the inspection of a recording.
 
     Attributes
     ----------
@@ -104,7 +104,7 @@ class InspectionResult(Shown):
         return inspection_report(self.core, self.stated(origin))
 
     def summary(self) -> Summary:
-        """Return verdict, table of joints, remarks and sampling."""
+        """Return a summary: verdict, table of joints, remarks and sampling."""
         heads, found = joint_heads(self.core), self.core
         trial = found.trial
         good = trial is not None and not trial.refused and trial.grade != 'unusable'
@@ -173,9 +173,11 @@ def inspect(
     if recording is None:  # the only argument
         robot, recording = None, robot
     if recording is None or isinstance(recording, Robot | ArmModel):
-        raise RecordingError('no recording: give the path of a bag or a table, or a Recording')
+        raise RecordingError(
+            'no recording was given: give the path of a bag or a table, or a Recording'
+        )
     if isinstance(robot, Recording):
-        raise RecordingError('two recordings: give a robot and a recording')
+        raise RecordingError('two recordings were given: the first argument has to be the robot')
     described = None if robot is None else robot_of(robot)
     if described is not None:
         (read,) = recordings_of(recording, described)
@@ -192,7 +194,7 @@ def inspect(
 @dataclass(frozen=True, repr=False, eq=False)
 class CheckResult(Shown):
     """
-    Check of a robot description.
+    Result of the check of a robot description.
 
     Attributes
     ----------
@@ -214,7 +216,7 @@ class CheckResult(Shown):
 
     @property
     def finding(self) -> str:
-        """Return the finding in one sentence."""
+        """Return what the check found, in one sentence."""
         return headline(self.remarks, self.links)[0]
 
     @property
@@ -240,7 +242,7 @@ class CheckResult(Shown):
         return description_check_report(self.remarks, self.links, self.stated(origin, self.robot))
 
     def summary(self) -> Summary:
-        """Return the finding and the links, with measured values if there are any."""
+        """Return a summary: the finding and the links, with any measured values."""
         links = self.links
         wrong = links is not None and not np.isnan(links.measured_mass).all()
         columns = slice(None) if wrong else slice(0, 4, 2)

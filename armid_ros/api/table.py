@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 @dataclass(frozen=True)
 class Summary:
     """
-    Summary of a result.
+    Text that a command prints about a result.
 
     Attributes
     ----------
@@ -98,17 +98,17 @@ class Shown(ABC):
 
     @abstractmethod
     def summary(self) -> Summary:
-        """Return a summary."""
+        """Return the summary of the result."""
 
     def stated(self, origin: ResultOrigin, robot: Robot | None = None) -> ResultOrigin:
-        """Return the origin with the robot's name and the next step, a sentence or a command."""
+        """Return the origin with robot name and next step, which is a sentence or a command."""
         shown, known = self.summary(), origin if robot is None else origin.of(source_of(robot))
         step = origin.step or ''.join(shown.steps[:1]) or f'armid {shown.then}'
         return replace(known, step=step)
 
     @abstractmethod
     def document(self, origin: ResultOrigin = DEFAULT_ORIGIN) -> dict[str, Any]:
-        """Return the content of the JSON file, with a given provenance."""
+        """Return the content of the JSON file of the result, which includes a given provenance."""
 
     def to_dict(self) -> dict[str, Any]:
         """Return the content of the JSON file."""
@@ -189,7 +189,7 @@ class ShownModel(Shown):
 
 
 def aligned(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
-    """Align names left and other columns right; a single cell spans the row."""
+    """Return the lines of a table, names left, other columns right; single cells may be longer."""
     if not heads:
         return []
     table = [tuple(heads), *(tuple(row) for row in rows)]

@@ -78,14 +78,15 @@ class ArmModel:
     quasi_static: bool = False
 
     def __post_init__(self) -> None:
-        """Fill in zeros, freeze the values and check their number."""
+        """Fill in zeros for missing values, check the number of values, and freeze them."""
         sizes = [len(effect.parameters(self.robot)) for effect in self.effects]
         values = self.values or tuple(np.zeros(size) for size in sizes)
         object.__setattr__(self, 'values', tuple(read_only(v) for v in values))
         if [v.shape for v in self.values] != [(size,) for size in sizes]:
             raise ModelError(
-                f'{self.robot.name}: effects {", ".join(e.name for e in self.effects)} take '
-                f'{sizes} values, got shapes {[v.shape for v in self.values]}'
+                f'{self.robot.name}: the effects {", ".join(e.name for e in self.effects)} need '
+                f'{sizes} values, but the arrays of values have shapes '
+                f'{[v.shape for v in self.values]}'
             )
 
     @classmethod
@@ -285,7 +286,10 @@ class ArmModel:
         if not isinstance(motion, Motion):
             past = [effect.name for effect in self.effects if not effect.instantaneous]
             if past:
-                raise ModelError(f'{", ".join(past)}: pass an ar.Motion, as positions lack times')
+                raise ModelError(
+                    f'positions without times are not enough for {", ".join(past)}: give an '
+                    'ar.Motion'
+                )
             states = Motion.of_states(self.robot.joints, motion, dq, ddq)
             return self.torque(states).reshape(np.shape(motion))
         tau = self.joint_torque(motion)
@@ -363,7 +367,7 @@ class ArmModel:
         return columns
 
     def torque_before(self, effect: Effect, motion: Motion) -> FloatArray:
-        """Return the input torque of a sensor effect, shape (N, n) [N m]."""
+        """Return the torque on which a sensor effect acts, shape (N, n) [N m]."""
         tau = self.joint_torque(motion)
         for own, values in self._readings:
             if own == effect:
@@ -372,7 +376,7 @@ class ArmModel:
         return tau
 
     def neighbours(self, period: float) -> int:
-        """Return the number of samples on either side that affect a reading, for a period [s]."""
+        """Return how many samples on either side affect a reading, for a sampling period [s]."""
         action = self._acting
         if action.displacement is None and action.reading_memory == 0.0:  # noqa: RUF069 - of laws, never computed
             return 0
@@ -387,7 +391,7 @@ class ArmModel:
     def _as_read(
         self, motion: Motion, columns: FloatArray, after: Effect | None = None
     ) -> FloatArray:
-        """Apply all sensor effects to columns, or only those after a given effect."""
+        """Apply all sensor effects, or only those after a given effect, to columns of torque."""
         readings = self._readings
         if isinstance(after, TorqueReading):
             known = [own for own, _ in readings]
@@ -414,7 +418,7 @@ class ArmModel:
         return np.asarray(columns + along @ (gain[:, :, np.newaxis] * (along.T @ columns)))
 
     def felt(self, motion: Motion) -> Motion:
-        """Return the link motion for the rigid body; if quasi-static, with the links at rest."""
+        """Return the motion that the rigid body feels; if quasi-static, with the links at rest."""
         return motion.at_rest() if self.quasi_static else motion
 
     def base_parameters(

@@ -88,7 +88,7 @@ def place_values(
     arm: ArmModel, attribute: Callable[[Effect], str]
 ) -> tuple[dict[str, dict[str, float]], tuple[str, ...]]:
     """
-    Return values by attribute and joint, and a line for each value that a format cannot contain.
+    Return the effects' values by attribute of the file format, and a line for each that has none.
 
     The attribute is where the format has an effect, and is empty if it has none. Effects that
     change the rigid body are part of it, and appear in neither.

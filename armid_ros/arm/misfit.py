@@ -116,7 +116,7 @@ class Misfit:
 
 
 def louder(now: FloatArray, before: FloatArray) -> FloatArray:
-    """Return the ratio of rms torque now to that of the identification, 1 or more, (n,)."""
+    """Return the rms torque now over that of the identification, at least 1, shape (n,)."""
     return np.asarray(np.maximum(now / np.maximum(before, 1e-12), 1.0))
 
 
@@ -134,14 +134,14 @@ def misfit_of_block(block: Any) -> Misfit:
             }
             for name, value in found.items():
                 if value <= 0.0:
-                    raise ModelError(f'misfit: {name} is {value:g}, not above zero')
+                    raise ModelError(f'misfit: {name} is {value:g}, but has to be above zero')
             filters = RowFilters(found['rate_hz'], found['cutoff_hz'], round(found['decimation']))
     except (AttributeError, KeyError, TypeError) as fault:
         raise ModelError(f'misfit: {type(fault).__name__} {fault}') from fault
     if data not in _DATA:
-        raise ModelError(f"misfit has data '{data}', not {' or '.join(_DATA)}")
+        raise ModelError(f"misfit: data is '{data}', but has to be {' or '.join(_DATA)}")
     if loud is not None and not loud.keys() >= rms.keys():
-        raise ModelError('misfit: torque_rms lacks joints of rms')
+        raise ModelError('misfit: torque_rms has no value for some joints of rms')
     relative = finite(error, 'relative_error_percent of the misfit')
     return Misfit(data, rms, relative, loud, filters=filters)
 

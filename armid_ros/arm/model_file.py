@@ -175,7 +175,7 @@ def load_model(path: str | Path, robot: Robot | ArmModel | str | Path | None = N
     if path.is_dir():
         inside = path / 'model.yaml'
         hint = f'name the model in it, {inside}' if inside.is_file() else 'there is no model.yaml'
-        raise ModelError(f'{path}: a folder; {hint}')
+        raise ModelError(f'{path}: this is a folder, not a model.yaml; {hint}')
     if isinstance(robot, ArmModel):
         robot = robot.robot
     elif isinstance(robot, (str, Path)):
@@ -252,7 +252,7 @@ def with_named(arm: ArmModel, effect: Effect, values: FloatArray) -> ArmModel:
 
 
 def place_in(arm: ArmModel, effect: Effect) -> tuple[int, list[int]] | None:
-    """Return the index of the same effect in the arm, and the rows of its parameters, or None."""
+    """Return where the arm has an effect: index and rows of its parameters, or None."""
     wanted = [(p.name, p.joint) for p in effect.parameters(arm.robot)]
     for position, own in enumerate(arm.effects):
         if isinstance(effect, type(own)) and not own.shapes and not own.points:
@@ -264,7 +264,7 @@ def place_in(arm: ArmModel, effect: Effect) -> tuple[int, list[int]] | None:
 
 def in_words(arm: ArmModel) -> ArmModel:
     """
-    Return the arm with search-only effects replaced by effects of the catalogue.
+    Return the arm with effects of the catalogue in place of effects that only a search uses.
 
     Effects for searches only are converted: a gravity vector becomes base tilt and gravity
     magnitude.
@@ -298,7 +298,7 @@ def checked_model(text: str) -> dict[str, Any]:
     """
     document = parsed_yaml(text, ModelError)
     if not isinstance(document, dict) or document.get('schema') != SCHEMA:
-        raise ModelError(f"not an arm model; its 'schema' has to be {SCHEMA}")
+        raise ModelError(f"this is not an arm model: its 'schema' has to be {SCHEMA}")
     strange = [key for key in document if key not in _KEYS]
     if strange:
         line = yaml_line(text, (strange[0],))
@@ -314,7 +314,7 @@ def checked_model(text: str) -> dict[str, Any]:
 
 
 def _wrong_unit(row: Mapping[str, Any], units: Collection[str]) -> str:
-    """Return the error on a wrong unit of a parameter; empty if correct or missing."""
+    """Return an error if the unit of a parameter is wrong; empty if it is correct or missing."""
     if not units or row.get('unit', next(iter(units))) in units:
         return ''
     expected = ' or '.join(f"'{unit}'" for unit in units)
@@ -330,7 +330,9 @@ def _rows(
     for k, entry in enumerate(document['effects']):
         if not isinstance(entry, dict):
             line = yaml_line(text, ('effects', k))
-            raise ModelError(f'line {line}: an effect has {", ".join(_NEEDED_OF_EFFECT)}')
+            raise ModelError(
+                f'line {line}: this is not an effect, which has {", ".join(_NEEDED_OF_EFFECT)}'
+            )
         _require(entry, _NEEDED_OF_EFFECT, f"effect '{str(entry.get('name'))[:40]}'")
         kind = CATALOGUE.find(str(entry['name']))
         known: tuple[Quantity | Shape, ...] = (*kind.quantities, *kind.shapes)
@@ -341,7 +343,7 @@ def _rows(
 
 
 def _fault(row: Any, units: tuple[str, ...]) -> tuple[str, str]:
-    """Return key and error of a wrong parameter; the error is empty for a correct one."""
+    """Return key and error of a parameter in the file; the error is empty if it is correct."""
     if not isinstance(row, dict):
         keys = ', '.join(_KEYS_OF_PARAMETER)
         return '', f'a parameter has {keys}; here is {str(row)[:40]!r}'
@@ -414,7 +416,7 @@ def _values(rows: Sequence[dict[str, Any]], names: Sequence[ParameterName]) -> F
     missing = [name for name in names if (name.name, name.joint) not in table]
     if missing:
         raise ModelError(
-            f"parameter '{missing[0].name}' of joint '{missing[0].joint}' is missing; "
-            'is the file of another robot?'
+            f"parameter '{missing[0].name}' of joint '{missing[0].joint}' is missing; is this the "
+            'file of another robot?'
         )
     return np.array([float(table[name.name, name.joint]['value']) for name in names])

@@ -161,7 +161,7 @@ def check_effect(kind: type[Effect], robot: Robot | None = None) -> None:
 
 
 def it_says_what_it_is(trial: EffectCase) -> None:
-    """Fail if docstring, bounds or names are missing."""
+    """Fail if the effect lacks a docstring, bounds or names."""
     kind = type(trial.effect)
     assert kind.__doc__ and not kind.__doc__.startswith(f'{kind.__name__}('), 'no docstring'
     for quantity in kind.quantities:
@@ -200,7 +200,7 @@ def columns_are_the_derivative_at_any_size(trial: EffectCase) -> None:
 
 
 def linear_means_exact(trial: EffectCase) -> None:
-    """Fail if the torque of a linear effect is not columns times values."""
+    """Fail if the torque of a linear effect differs from columns times values."""
     if trial.effect.linear:
         bare = ArmModel(trial.robot)
         columns = bare.columns_of(trial.effect, trial.motion)

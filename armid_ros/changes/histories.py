@@ -79,14 +79,14 @@ class ParameterHistory:
 
     @property
     def parameter(self) -> tuple[str, str]:
-        """Name and joint of the parameter."""
+        """Name and joint of the parameter, as in the results."""
         return self.name, self.joint
 
 
 @dataclass(frozen=True)
 class Spread:
     """
-    Spread of a parameter between bags beyond its stated uncertainty.
+    Variation of a parameter between bags that exceeds its stated uncertainty.
 
     Attributes
     ----------
@@ -143,7 +143,7 @@ class HistoryChange:
 @dataclass(frozen=True)
 class Judged:
     """
-    Result of the change tests of one arm.
+    Significance of the changes of one arm over time.
 
     Attributes
     ----------
@@ -168,7 +168,7 @@ def judge(
     kinds: Sequence[tuple[Sequence[ParameterHistory], Mapping[tuple[str, str], Spread]]],
 ) -> list[Judged]:
     """
-    Test all series of all arms.
+    Test the histories of all arms for changes.
 
     Parameters
     ----------
@@ -207,7 +207,7 @@ def named(judged: Judged, alpha: float) -> tuple[HistoryChange, ...]:
 
 
 def wear(series: ParameterHistory, spread: Spread) -> tuple[float, float]:
-    """Return the slope of a series per month, and its standard deviation."""
+    """Return the slope of a history per month, and its standard deviation."""
     slope, std, _ = _line(series.days, series.values, 1.0 / _variances(series, spread)[0])
     return slope * MONTH, std * spread.trends * MONTH
 
@@ -226,7 +226,7 @@ def spreads(series: Sequence[ParameterHistory]) -> dict[tuple[str, str], Spread]
 
 def without_days(series: Sequence[ParameterHistory]) -> list[ParameterHistory]:
     """
-    Subtract the effect of each day, which all siblings share.
+    Remove from the histories what all arms have in common on each day, such as the temperature.
 
     The effect is proportional to the size of the parameter, as for friction that falls with
     temperature. Days on which few siblings have bags are unchanged.
@@ -301,7 +301,7 @@ def _by_parameter(
 
 
 def _polished(group: Sequence[ParameterHistory]) -> list[FloatArray]:
-    """Return values without the effects of days, by a median polish with the arms' levels."""
+    """Return values minus the common deviation of each day, found by a median polish."""
     days = np.concatenate([np.floor(one.days) for one in group])
     arm = np.repeat(np.arange(len(group)), [len(one.days) for one in group])
     values = np.concatenate([one.values for one in group])
@@ -363,7 +363,7 @@ def _prior_freedom(
 
 
 def _ratio(series: ParameterHistory, spread: Spread) -> float:
-    """Return the ratio of the variance of a series to the usual variance."""
+    """Return the variance of a history divided by the usual variance."""
     stated = series.std[1:] ** 2 + series.std[:-1] ** 2 + 2.0 * spread.std**2
     squares = np.diff(series.values) ** 2 / np.maximum(stated, 1e-300)
     return max(float(np.median(squares)) / MEDIAN_SQUARE, 1e-100)
@@ -406,7 +406,7 @@ def _variances(series: ParameterHistory, spread: Spread) -> tuple[FloatArray, fl
 def _lasting(
     group: Sequence[ParameterHistory], found: dict[tuple[str, str], Spread]
 ) -> tuple[float, float]:
-    """Return `steps` and `trends` of a `Spread`, each 1 or more."""
+    """Return the factors `steps` and `trends` of a `Spread`, each at least 1."""
     steps, trends = [], []
     for one in group:
         if len(one.values) < _MIN_BAGS:
@@ -427,7 +427,7 @@ def _lasting(
 
 
 def _line(days: FloatArray, x: FloatArray, weights: FloatArray) -> tuple[float, float, float]:
-    """Return slope, its standard deviation and start value of a weighted straight line."""
+    """Fit a weighted straight line; return slope, its standard deviation, and start value."""
     total = weights.sum()
     middle, mean = weights @ days / total, weights @ x / total
     deviation = days - middle

@@ -22,7 +22,7 @@ META = 'armid.columns'
 
 
 def _kept(ctx: click.Context, parameter: click.Parameter, value: Any) -> Any:
-    """Store a value for `settings`."""
+    """Store the value of an option for `settings`."""
     ctx.meta.setdefault(META, {})[parameter.name] = value
     return value
 
@@ -32,7 +32,7 @@ def _option(*names: str, **facts: Any) -> Callable[[Any], Any]:
 
 
 def _rules(ctx: click.Context, parameter: click.Parameter, value: Any) -> Any:
-    """Store pairs of names; raise an error for malformed pairs."""
+    """Store the pairs OLD:NEW of --rename; raise an error for malformed pairs."""
     rules = []
     for text in value:
         old, *new = listed(text, ':')
@@ -40,15 +40,15 @@ def _rules(ctx: click.Context, parameter: click.Parameter, value: Any) -> Any:
             first, equals, second = text.partition('=')
             right = f'{first}:{second}' if equals else f'{text}:NEW'
             raise RecordingError(
-                f"--rename '{text}' has to be OLD:NEW, in quotes where a name has blanks, and an "
-                f"option for each pair: --rename '{right}' --rename fer_:panda_"
+                f"--rename '{text}' is not of the form OLD:NEW. Put names with blanks in quotes, "
+                f"and repeat the option for each pair: --rename '{right}' --rename fer_:panda_"
             )
         rules.append((old, ':'.join(new)))
     return _kept(ctx, parameter, tuple(rules))
 
 
 def _numbers(ctx: click.Context, parameter: click.Parameter, value: str | None) -> Any:
-    """Store one number, or one number per joint."""
+    """Store the value of an option: one number, or one number per joint."""
     if value is not None:
         from armid_ros.recording.columns import numbers
 
@@ -143,7 +143,7 @@ recordings = together(options, parameters.topic, parameters.setting, parameters.
 
 
 def settings() -> ColumnSettings:
-    """Return the values of the options of the running command."""
+    """Return the column settings that the options of the running command give."""
     from armid_ros.recording.columns import ColumnSettings
 
     return ColumnSettings(**click.get_current_context().meta.get(META, {}))

@@ -105,7 +105,7 @@ class Commands(click.Group):
         return [*names, *click.Command.shell_complete(self, ctx, incomplete)]
 
     def invoke(self, ctx: click.Context) -> Any:
-        """Run a command."""
+        """Run a command, and report bad input."""
         try:
             result = super().invoke(ctx)
             _tell_notes(ctx)

@@ -52,7 +52,9 @@ def convert(
     from armid_ros.recording.reader import is_table
 
     if out is None and not dry_run:
-        raise click.UsageError('give --out with the bag to write, or --dry-run to write nothing')
+        raise click.UsageError(
+            'no output was named: give --out with the bag to write, or --dry-run to write nothing'
+        )
     robot = None
     if robot_source is not None:
         robot = options.open_robot(robot_source, 'earth', joints)
@@ -61,7 +63,9 @@ def convert(
         return
     if len(files) > 1:
         named = ', '.join(str(path) for path in files)
-        raise RecordingError(f'{named}: several files have to be tables; convert bags one by one')
+        raise RecordingError(
+            f'{named}: only tables can be converted together; convert bags one by one'
+        )
     _bag(files[0], None if dry_run else out)
 
 
@@ -102,10 +106,12 @@ def _bag(path: Path, out: Path | None) -> None:
 
     refuse_columns(path, columns.settings(), copied=True)
     if out is None:
-        raise RecordingError(f'{path}: --dry-run is for tables; armid inspect shows a bag')
+        raise RecordingError(
+            f'{path}: this is a bag, but --dry-run is for tables; armid inspect shows a bag'
+        )
     if not is_ros1(path):
         topics(path)  # raises an error if the path is not a bag
-        raise RecordingError(f'{path}: nothing to do: it is a bag of ROS 2')
+        raise RecordingError(f'{path}: there is nothing to do, as this is a bag of ROS 2 already')
     copied = copy_bag(path, out, options.read_settings())
     for topic in copied.topics:
         say(f'  {topic.name} ({topic.type_name}): {topic.count} messages')

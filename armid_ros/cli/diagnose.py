@@ -154,9 +154,11 @@ def diagnose(
 ) -> None:
     """Find which effect a model lacks, and add it."""
     if baseline and no_baseline:
-        raise click.UsageError('give --baseline or --no-baseline, not both')
+        raise click.UsageError(
+            '--baseline and --no-baseline were both given; give only one of them'
+        )
     if against and (model or baseline):
-        raise click.UsageError('give --against without --model and --baseline')
+        raise click.UsageError('--against cannot be used together with --model or --baseline')
     from armid_ros.api.diagnosis import diagnose as run
     from armid_ros.api.diagnosis import DiagnosisResult, require_residual
     from armid_ros.arm import ArmModel
@@ -246,7 +248,7 @@ def open_partner(
     source: str | None, ties: Sequence[str], robot: Robot, gravity: str
 ) -> Partner | None:
     """
-    Load the partner of --partner and --tie; None without partner.
+    Load the machine that --partner names, with the ties of --tie; None without --partner.
 
     Raises
     ------
@@ -260,7 +262,10 @@ def open_partner(
 
     if source is None:
         if ties:
-            raise ModelError('give both --tie and --partner, the machine or person at the tie')
+            raise ModelError(
+                '--tie also needs --partner, the description of the machine or person that the '
+                'arm is tied to'
+            )
         return None
     other = load_robot(source, gravity=gravity)
     kept = str(Path(source).resolve()) if Path(source).is_file() else source
@@ -270,9 +275,9 @@ def open_partner(
         found = list(leg_ties(robot, other))
     elif robot.n_joints != other.n_joints:
         raise ModelError(
-            f'{robot.name} has {robot.n_joints} joints and {other.name} {other.n_joints}: give '
-            f'the possible ties with --tie JOINT=JOINT; joints of {robot.name} are '
-            f'{", ".join(robot.joints)}, of {other.name} {", ".join(other.joints)}'
+            f'{robot.name} has {robot.n_joints} joints, but {other.name} has {other.n_joints}: '
+            f'name the tied joints with --tie JOINT=JOINT. The joints of {robot.name} are '
+            f'{", ".join(robot.joints)}, those of {other.name} are {", ".join(other.joints)}'
         )
     else:
         pairs = list(zip(robot.joints, other.joints, strict=True))
@@ -318,5 +323,7 @@ def _point(text: str, numbers: str) -> tuple[float, float, float]:
     try:
         x, y, z = (float(number) for number in numbers.split(','))
     except ValueError:
-        raise ModelError(f"--tie '{text}': a point is X,Y,Z in the joint's frame [m]") from None
+        raise ModelError(
+            f"--tie '{text}': a point has to be X,Y,Z in the frame of its joint [m]"
+        ) from None
     return x, y, z

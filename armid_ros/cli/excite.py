@@ -175,7 +175,7 @@ def _speed(context: click.Context, parameter: click.Parameter, value: Any) -> st
 @click.option(
     '--starts',
     type=click.IntRange(min=1),
-    help='Number of random restarts; default 4, 1 above 20 joints.',
+    help='Number of random trajectories to search from; default 4, 1 above 20 joints.',
 )
 @click.option(
     '--iterations', default=150, show_default=True, help='Number of iterations of each restart.'
@@ -275,8 +275,8 @@ def excite(
                 staged.keep()
                 held = f'{staged.out / "excitation.yaml"} holds the design'
             raise TrajectoryError(
-                f'{held}, but there is no trajectory: {error}; take another --start, or another '
-                '--seed'
+                f'{held}, but no path to the trajectory was found: {error}; take another --start, '
+                'or another --seed'
             ) from error
     if result.core.stopped == INTERRUPTED:
         raise KeyboardInterrupt
@@ -317,8 +317,7 @@ def require_free(folder: Path) -> None:
         raise RecordingError(f'{folder} is a recording; name another --out')
     if os.path.lexists(folder / BAG) and not is_plan(folder / BAG):
         raise RecordingError(
-            f'{folder / BAG}: is no trajectory of armid excite; name another --out, or move it '
-            'away'
+            f'{folder / BAG} was not written by armid excite; name another --out, or move it away'
         )
 
 

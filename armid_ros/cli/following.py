@@ -104,7 +104,7 @@ def _subject(
 
 
 def _typed(context: click.Context, kept: Iterable[str]) -> Iterator[str]:
-    """Yield the values of the named options as typed."""
+    """Yield the values of the named options as the user typed them."""
     known = {
         text: one for one in context.command.params for text in (*one.opts, *one.secondary_opts)
     }

@@ -129,7 +129,7 @@ def deliver_page(
     verdict: VerdictSection,
     table: tuple[Sequence[str], Sequence[Sequence[str]]] | None,
 ) -> None:
-    """Write report.html and NAME.json; print verdict and table, or JSON without a table."""
+    """Write report.html and NAME.json; print verdict and table, or JSON if there is no table."""
     write_file(staged.folder / 'report.html', page)
     summary = None
     if table is not None:
@@ -142,7 +142,7 @@ def deliver_page(
 def deliver_document(
     staged: Staged, name: str, document: Mapping[str, Any], summary: Summary | None, *files: str
 ) -> None:
-    """Write NAME.json, and keep the folder; print a summary with all files, or the document."""
+    """Write NAME.json and keep the folder; print a summary with all files, or the document."""
     write_document(staged.folder / f'{name}.json', document)
     staged.keep()
     if summary is None:
@@ -262,7 +262,7 @@ def model_of(path: Path, robot: Robot | None) -> ArmModel:
     if not np.allclose(given, own):
         typed, known = (','.join(f'{part:g}' for part in vector) for vector in (given, own))
         raise ModelError(
-            f'{path}: its gravity is {known}, and --gravity is {typed}: leave --gravity out, or '
+            f'{path}: its gravity is {known}, but --gravity is {typed}: leave --gravity out, or '
             'write this gravity into the file if the arm is now mounted so'
         )
     return arm

@@ -160,7 +160,7 @@ as_json = click.option('--json', 'as_json', is_flag=True, help='Print the result
 packages = click.option(
     '--package',
     multiple=True,
-    metavar='P=FOLDER',
+    metavar='PACKAGE=FOLDER',
     is_eager=True,
     expose_value=False,
     callback=lambda context, _, values: context.meta.update({PACKAGES: values}),
@@ -186,9 +186,13 @@ def with_packages(context: click.Context, source: str | None) -> str | None:
     written = []
     for text in context.meta.get(PACKAGES, []):
         name, _, folder = text.partition('=')
-        if not name or not folder or source in (None, '-'):
+        if not name or not folder:
             raise click.BadParameter(
-                f"'{text}' has to be P=FOLDER, with the file of a description as --robot",
+                f"'{text}' has to be PACKAGE=FOLDER", param_hint='--package'
+            )
+        if source in (None, '-'):
+            raise click.BadParameter(
+                f"'{text}': packages need a file of a description, --robot FILE",
                 param_hint='--package',
             )
         written.append(shlex.quote(f'package:{name}:={Path(folder).resolve()}'))

@@ -58,7 +58,7 @@ def progress(what: str) -> Iterator[Tick]:
 
 
 def progress_line(what: str, share: float, spent: float) -> str:
-    """Return progress as a line of text, with the remaining time; time spent in s."""
+    """Return the progress as a line of text with the remaining time, given the time spent [s]."""
     known = 0.0 < share < 1.0
     rest = f', about {spent * (1.0 / share - 1.0):.0f} s to go' if known else ''
     return f'{what}: {100.0 * share:.0f} %, {spent:.0f} s{rest}'

@@ -169,7 +169,7 @@ def _of_spans(
     notes: Sequence[str],
     doubt: str,
 ) -> Diagnosis | None:
-    """Diagnose only the time span in which a cause acts; None if no cause explains that gap."""
+    """Diagnose only the time in which a cause acts; None if no cause explains that gap."""
     settings, arm, prepared = explainer.settings, explainer.arm, explainer.prepared
     look = explanation.look
     spans = () if look is None else acting_spans(look, settings.thresholds)
@@ -204,7 +204,7 @@ def _of_spans(
 def _with_unfitted_joints(
     arm: ArmModel, day: Sequence[Recording], used: Conditioning
 ) -> Iterator[tuple[Recording, npt.NDArray[np.bool_]]]:
-    """Yield recordings with joints whose torque the model fits only in the other recordings."""
+    """Yield recordings with their joints whose torque the model fits only in other recordings."""
     unit = np.ones(arm.robot.n_joints)
     bad, sound = np.zeros((2, len(day), len(unit)), dtype=bool)
     for k, one in enumerate(day):
@@ -345,6 +345,6 @@ def _remarks(
 def _bad(
     arm: ArmModel, data: Sequence[Trajectory], faults: Sequence[str], notes: Sequence[str]
 ) -> Diagnosis:
-    """Return the verdict `bad_data`."""
+    """Return a diagnosis with the verdict `bad_data`."""
     summary = f'The data cannot be diagnosed: {"; ".join(faults)}.'
     return Diagnosis('bad_data', summary, arm, tuple(data), tuple(notes))

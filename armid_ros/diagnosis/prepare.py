@@ -34,7 +34,7 @@ _PARTNER_BAND_RATIO = 1.25
 @dataclass(frozen=True)
 class Prepared:
     """
-    Filtered data with their noise.
+    Data that were filtered for a diagnosis, with their noise.
 
     Attributes
     ----------
@@ -53,7 +53,7 @@ class Prepared:
 
     @property
     def allowed(self) -> FloatArray:
-        """Largest uncertain share of an informative row, shape (n,); see `Trajectory`."""
+        """Largest uncertain share of a row that is informative, shape (n,); see `Trajectory`."""
         return self.data[0].allowed
 
     @property

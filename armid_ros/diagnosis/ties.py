@@ -46,7 +46,7 @@ def diagnose_ties(
     explainer: Explainer, recordings: Sequence[Recording], partner: Partner
 ) -> Explanation | None:
     """
-    Explain a gap by ties to another machine, and the remaining residual by other causes.
+    Explain a gap by springs to another machine (ties), and the remaining residual by other causes.
 
     Returns
     -------
@@ -135,7 +135,7 @@ class _Ties:
 
     def without_bias(self, found: Explanation) -> Explanation:
         """
-        Replace the springs of an explanation by those of the unbiased regression.
+        Give the springs of an explanation the values of the regression without bias.
 
         The described links are kept if they explain the torques as well as fitted links.
 
@@ -235,7 +235,7 @@ def _with_springs(explanation: Explanation, found: Interaction) -> Fitted:
 def _as_one_cause(
     explainer: Explainer, evidence: Evidence, partner: Partner, fitted: Fitted
 ) -> tuple[tuple[Trial, ...], tuple[tuple[str, tuple[str, ...]], ...]]:
-    """Compare all ties, as one cause, with the catalogue; return the `survey`, the ties first."""
+    """Compare all ties, as one cause, with the catalogue; return the `survey`, ties first."""
     settings, robot = explainer.settings, explainer.arm.robot
     free = [one for one in settings_alone() if one.body]
     comparison = explainer.comparison(Rows.over_noise(evidence), free)

@@ -74,12 +74,12 @@ class DryFriction:
         return np.asarray((half * np.sign(dq @ self.directions.T) + middle) @ self.directions)
 
     def largest(self, load: FloatArray) -> FloatArray:
-        """Return the largest friction torque of each joint under a load, both (..., n)."""
+        """Return the largest possible friction torque of each joint under a load, (..., n)."""
         half = (self.upper - self.lower) / 2 + self.widening(load)
         return np.asarray(half @ np.abs(self.directions))
 
     def widening(self, load: FloatArray) -> FloatArray:
-        """Return the change of the levels due to a load, shape (..., m) [N m]."""
+        """Return by how much a load raises the friction levels, shape (..., m) [N m]."""
         if self.load_share is None:
             return np.zeros((*load.shape[:-1], len(self.lower)))
         return np.asarray(self.load_share * np.abs(load @ self.directions.T))
@@ -137,7 +137,7 @@ class Transmission:
 @dataclass(frozen=True)
 class Action:
     """
-    Action of effects with given values on the plant and its sensors; None: not used.
+    How effects with given values act on plant and sensors; None where they do not act.
 
     The actuators have to supply damping @ dq + inertia @ ddq + dry friction + hysteresis +
     torque(t, q, dq) on the motor side, and the rigid body's torque + link_torque(t, q, dq) on the

@@ -36,7 +36,7 @@ import numpy.typing as npt
 @dataclass(frozen=True)
 class Effect(ABC):
     """
-    One kind of effect on some joints of an arm.
+    A kind of physical effect, on some joints of an arm.
 
     Attributes
     ----------
@@ -97,8 +97,8 @@ class Effect(ABC):
         values = tuple(float(value) for value in self.shape) or defaults
         if len(values) != len(defaults):
             raise ModelError(
-                f'{self.name}: {len(values)} shape values; {len(defaults)} are needed, '
-                f'{", ".join(s.name for s in self.shapes) or "none"} of each owner'
+                f'{self.name}: {len(values)} shape values were given, but {len(defaults)} are '
+                f'needed, {", ".join(s.name for s in self.shapes) or "none"} of each owner'
             )
         for index, value in enumerate(values):
             shape = self.shapes[index % len(self.shapes)]
@@ -163,7 +163,7 @@ class Effect(ABC):
 
     @classmethod
     def as_change(cls) -> type[Effect]:
-        """Return the class for a change between two days if the effect may exist before."""
+        """Return the class to use between two days if the effect may exist on the first one."""
         return cls
 
     def particulars(self) -> dict[str, Any]:
@@ -175,7 +175,7 @@ class Effect(ABC):
         return self
 
     def named_as(self, values: FloatArray, arm: Arm) -> tuple[tuple[Effect, FloatArray], ...]:
-        """Return the equivalent effects of the catalogue, with values."""
+        """Return equivalent effects of the catalogue, with their values."""
         return ((self, values),)
 
     def _default_shape(self, robot: Robot) -> FloatArray:
@@ -207,13 +207,13 @@ class Effect(ABC):
             spread = np.broadcast_to(np.asarray(values, dtype=float), size)
         except ValueError:
             raise ModelError(
-                f'{self.name}: the shape array has size {size}, not {np.shape(values)}: a row for '
-                f'each owner, columns {", ".join(s.name for s in self.shapes) or "none"}'
+                f'{self.name}: the shape array has to have size {size}, not {np.shape(values)}: a '
+                f'row for each owner, columns {", ".join(s.name for s in self.shapes) or "none"}'
             ) from None
         return replace(self, shape=tuple(spread.ravel().tolist()))
 
     def spread(self, robot: Robot) -> FloatArray:
-        """Return the largest expected values, shape (P,)."""
+        """Return the largest values that are expected, shape (P,)."""
         return np.full(len(self.parameters(robot)), np.inf)
 
     def shape_parameters(self, robot: Robot) -> tuple[ParameterName, ...]:
@@ -240,7 +240,7 @@ class Effect(ABC):
 
     @property
     def owners(self) -> tuple[str, ...]:
-        """Joints that each have their own quantities; one empty name for the whole arm."""
+        """Joints that have quantities of their own; one empty name if the whole arm has them."""
         return self.joints or ('',)
 
     def parameters(self, robot: Robot) -> tuple[ParameterName, ...]:
@@ -258,7 +258,7 @@ class Effect(ABC):
         return lower, upper
 
     def adds_to(self, robot: Robot) -> tuple[int, ...]:
-        """Return the rigid-body parameter to which each parameter adds; empty for most effects."""
+        """Return the rigid-body parameters to which parameters of the effect add; often none."""
         return ()
 
     @property
@@ -268,11 +268,11 @@ class Effect(ABC):
 
     @property
     def points(self) -> tuple[str, ...]:
-        """Names of the points outside the arm to which the effect is attached."""
+        """Names of the points outside the arm to which springs of the effect are attached."""
         return ()
 
     def along(self, motion: Motion) -> Self:
-        """Return the effect with further signals of a recording, such as temperatures."""
+        """Return the effect with signals of a recording that it needs, such as temperatures."""
         return self
 
     def referred_to(self, temperatures: Mapping[str, float]) -> Self:
@@ -305,8 +305,8 @@ class Effect(ABC):
         wanted = (*motion.q.shape, len(self.owners) * len(self.quantities))
         if np.shape(columns) != wanted:
             raise ModelError(
-                f"effect '{self.name}': columns() returned the shape {np.shape(columns)} instead "
-                f'of {wanted}: samples, joints of the arm, parameters'
+                f"effect '{self.name}': columns() returned an array of shape {np.shape(columns)} "
+                f'instead of {wanted}: samples, joints of the arm, parameters'
             )
         return columns
 
@@ -382,7 +382,7 @@ class Arm(Protocol):
 
     @property
     def robot(self) -> Robot:
-        """The described robot."""
+        """The robot as described."""
 
     @property
     def body(self) -> Robot:

@@ -237,7 +237,7 @@ def check_kind(kind: type[Effect]) -> None:
 
 
 def part_names(kind: type[Effect]) -> list[str]:
-    """Return the names of quantities and shapes."""
+    """Return the names of the quantities and shapes of an effect."""
     return [*(one.name for one in kind.quantities), *(one.name for one in kind.shapes)]
 
 

@@ -303,7 +303,7 @@ class TemperatureDependentFriction(Effect):
         return Action(dry_friction=DryFriction(np.eye(len(level)), -level, level), torque=torque)
 
     def warmer(self, t: FloatArray, joints: tuple[str, ...]) -> FloatArray:
-        """Return T - T0 of all joints, zero where not measured, shape (N, n) [K]."""
+        """Return T - T0 of all joints, zero without measurement, shape (N, n) [K]."""
         if self.course is None:
             return np.zeros((np.size(t), len(joints)))
         known = dict(self.reference)

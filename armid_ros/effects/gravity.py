@@ -138,7 +138,7 @@ class GravityVector(_GravityEffect):
 
 
 def with_exact_vector(kinds: Sequence[type[Effect]]) -> list[type[Effect]]:
-    """Return kinds for a search; with both tilt and magnitude, the vector replaces the tilt."""
+    """Return kinds for a search, with the exact vector in place of a tilt next to a magnitude."""
     both = BaseTilt in kinds and GravityMagnitude in kinds
     return [GravityVector if both and kind is BaseTilt else kind for kind in kinds]
 
@@ -152,7 +152,9 @@ def _turned(gravity: FloatArray, tilt: FloatArray) -> FloatArray:
 def _unit(gravity: FloatArray) -> FloatArray:
     length = np.linalg.norm(gravity)
     if not length > 0.0:
-        raise ModelError('an effect of gravity needs a model with gravity; its vector is zero')
+        raise ModelError(
+            'an effect of gravity cannot be used, because the gravity vector of the model is zero'
+        )
     return np.asarray(gravity / length)
 
 

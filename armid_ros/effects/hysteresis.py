@@ -78,7 +78,7 @@ class PreslidingHysteresis(Effect):
         return columns
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
-        """Return the friction as a `Hysteresis`."""
+        """Return an action with the friction as its `hysteresis`."""
         return Action(hysteresis=self._elements(values, arm.robot.joints))
 
     def _elements(self, level: FloatArray, joints: tuple[str, ...]) -> Hysteresis:

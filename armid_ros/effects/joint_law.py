@@ -125,7 +125,7 @@ def joint_columns(effect: Effect, motion: Motion, *quantities: FloatArray) -> Fl
 
 def scatter(effect: Effect, values: FloatArray, robot: Robot) -> FloatArray:
     """
-    Spread values of a joint effect over all joints of the robot, zero elsewhere.
+    Put the values of an effect into the columns of its joints; zero in all other columns.
 
     Parameters
     ----------

@@ -75,11 +75,14 @@ class TorqueMap:
         count = len(self.weights)
         shapes = self.points.shape, self.noise.shape, self.lengths.shape
         if shapes != ((count, len(INPUTS)), (count,), (len(INPUTS),)):
-            raise ModelError(f'torque map of {count} weights: its arrays have shapes {shapes}')
+            raise ModelError(
+                f'torque map: its {count} weights do not agree with the shapes of its other '
+                f'arrays, {shapes}'
+            )
         sizes = (*self.lengths, *self.noise, self.amplitude, self.knee)
         if not min(sizes) > 0.0:
             raise ModelError(
-                'a torque map needs positive length scales, deviations, amplitude and knee'
+                'torque map: length scales, deviations, amplitude and knee have to be positive'
             )
 
     def __eq__(self, other: object) -> bool:
@@ -97,11 +100,11 @@ class TorqueMap:
 
     @property
     def takes_load(self) -> bool:
-        """Whether the torque depends on the load."""
+        """Whether the learned torque depends on the load."""
         return bool(np.isfinite(self.lengths[2]))
 
     def given(self, torque: FloatArray) -> TorqueMap:
-        """Return the map with weights from torques at its points, shape (M,) [N m]."""
+        """Return the map with weights that reproduce torques at its points, shape (M,) [N m]."""
         return replace(self, weights=cho_solve(self._factor, torque))
 
     def torque(self, inputs: FloatArray) -> FloatArray:
@@ -190,8 +193,8 @@ class LearnedTorque(Effect):
         super().__post_init__()
         if self.maps and len(self.maps) != len(self.joints):
             raise ModelError(
-                f'{self.name}: {len(self.maps)} maps for {len(self.joints)} joints '
-                f'({", ".join(self.joints)})'
+                f'{self.name}: there are {len(self.maps)} maps, but {len(self.joints)} joints: '
+                f'{", ".join(self.joints)}'
             )
 
     def particulars(self) -> dict[str, Any]:
@@ -200,7 +203,7 @@ class LearnedTorque(Effect):
         return {'maps': [{'joint': joint, **own.document()} for joint, own in rows]}
 
     def with_particulars(self, entry: Mapping[str, Any]) -> Self:
-        """Return the effect with the maps of a file."""
+        """Return the effect with the maps that an entry of model.yaml has."""
         found = {str(row['joint']): row for row in entry.get('maps', ())}
         if not found:
             return self

@@ -26,8 +26,8 @@ class _Pairs(Effect):
         """Check that the joints are pairs."""
         if not self.joints or len(self.joints) % 2:
             raise ModelError(
-                f'{self.name}: joints come in pairs, such as joint_5 and joint_6; '
-                f'got {", ".join(self.joints) or "none"}'
+                f'{self.name} needs pairs of joints, such as joint_5 and joint_6; got '
+                f'{", ".join(self.joints) or "none"}'
             )
         pairs = list(zip(self.joints[::2], self.joints[1::2], strict=True))
         for first, second in pairs:
@@ -57,7 +57,7 @@ class _Pairs(Effect):
 
     @property
     def owners(self) -> tuple[str, ...]:
-        """First joint of every pair."""
+        """First joint of every pair, which gives its parameters their names."""
         return self.joints[::2]
 
     def parameters(self, robot: Robot) -> tuple[ParameterName, ...]:
@@ -154,7 +154,8 @@ class JointCoupling(_Pairs):
         twice = [joint for joint in self.owners if self.owners.count(joint) > 1]
         if twice:
             raise ModelError(
-                f'{self.name}: {twice[0]} is first in two pairs; put it second in one of them'
+                f'{self.name}: {twice[0]} is the first joint of two pairs; put it second in one '
+                'of them'
             )
 
     @classmethod

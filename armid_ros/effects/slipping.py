@@ -35,7 +35,7 @@ class Hysteresis:
     distance: FloatArray
 
     def start(self, dq: FloatArray) -> FloatArray:
-        """Return the state after a long motion at this velocity, or zero at rest, (m,)."""
+        """Return the springs' states after long motion at this velocity; zero at rest, (m,)."""
         return np.asarray(np.sign(self.directions @ dq))
 
     def advance(self, state: FloatArray, dq: FloatArray) -> FloatArray:
@@ -50,7 +50,7 @@ class Hysteresis:
 
     def along(self, q: FloatArray, dq: FloatArray) -> FloatArray:
         """
-        Return the states along a path, shape (N, m).
+        Return the states of the springs along a path, shape (N, m).
 
         Parameters
         ----------

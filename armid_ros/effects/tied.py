@@ -28,7 +28,7 @@ from scipy.interpolate import CubicHermiteSpline
 @dataclass(frozen=True)
 class Tied(Attached):
     """
-    Base class of springs to points of another machine in motion.
+    Base class of springs that tie an arm to moving points of another machine.
 
     Attributes
     ----------
@@ -52,7 +52,7 @@ class Tied(Attached):
 
     def along(self, motion: Motion) -> Self:
         """
-        Return the effect with its anchors along a motion.
+        Return the effect with the positions of its anchors along a motion.
 
         Raises
         ------
@@ -161,19 +161,23 @@ def tied_effect(
     """
     known = {kind.name: kind for kind in (TiedInteraction, TiedSlack)}
     if name not in known:
-        raise ModelError(f"{name} has 'ties'; effects that can have ties are {', '.join(known)}")
+        raise ModelError(
+            f"{name} cannot have 'ties'; effects that can have ties are {', '.join(known)}"
+        )
     by_joint: dict[str, Tie] = {}
     for tie in ties:
         if tie.joint in by_joint:
             raise ModelError(
-                f'{name}: two ties on {tie.joint}; only one on each joint is identifiable'
+                f'{name}: there are two ties on {tie.joint}; only one on each joint is '
+                'identifiable'
             )
         by_joint[tie.joint] = tie
     chosen = tuple(by_joint if joints is None else joints)
     for joint in chosen:
         if joint not in by_joint:
             raise ModelError(
-                f"{name}: no tie on joint '{joint}'; there are ties on {', '.join(by_joint)}"
+                f"{name}: there is no tie on joint '{joint}'; there are ties on "
+                f'{", ".join(by_joint)}'
             )
         robot.index(joint)
     return known[name](chosen, ties=tuple(by_joint[joint] for joint in chosen), partner=partner)
@@ -230,6 +234,6 @@ class Partner:
     source: str = ''
 
     def tied(self, arm: Robot, joints: Sequence[str] | None = None, *, slack: bool) -> Effect:
-        """Make springs and dampers, or straps with slack, on joints of an arm; all by default."""
+        """Make springs and dampers, or straps with slack, that tie joints of an arm, or all."""
         name = (TiedSlack if slack else TiedInteraction).name
         return tied_effect(name, self.ties, self.source or self.robot.name, arm, joints)

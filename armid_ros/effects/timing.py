@@ -39,7 +39,7 @@ class LateReading(TorqueReading):
         return ((), *((joint,) for joint in robot.joints))
 
     def _owned(self, motion: Motion) -> list[list[int]]:
-        """Return the joints of each owner: all joints, or one."""
+        """Return the joints that share each delay: all joints, or one."""
         joints = self.indices(motion.joints)
         return [[joint] for joint in joints] or [list(range(motion.n_joints))]
 

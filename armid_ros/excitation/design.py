@@ -149,8 +149,8 @@ def design(
         expected = (problem.base.rank,) * 2
         if rival is not None or prior.shape != expected:
             raise TrajectoryError(
-                f'prior information: a matrix {expected} over the base parameters of the arm is '
-                f"needed, and none with criterion 'T'; got {prior.shape}"
+                f'prior information has to be a matrix of shape {expected} over the base '
+                f"parameters, not of shape {prior.shape}, and cannot be used with criterion 'T'"
             )
         if not np.all(np.isfinite(prior)):
             raise TrajectoryError('prior information: not all entries are finite numbers')
@@ -201,7 +201,7 @@ def placed(problem: DesignProblem, trajectory: FourierTrajectory) -> Excitation:
                 return run
             last = f'in {run_in:.3g} s, {faults}'
         run_in *= 1.5
-    raise TrajectoryError(f'no run-in of the trajectory keeps the limits; {last}')
+    raise TrajectoryError(f'no run-in of the trajectory stays inside the limits; {last}')
 
 
 def evaluate(

@@ -156,8 +156,8 @@ def random_feasible(
     found = _shrunk(arm, limits, centred, clearance, 48)
     if found is None:
         raise TrajectoryError(
-            f'no motion around this pose is feasible: {", ".join(f"{x:.2f}" for x in centre)}'
-            f': {trajectory_faults(arm, limits, centred.scaled(0.01), clearance)}'
+            f'no motion around the pose {", ".join(f"{x:.2f}" for x in centre)} is feasible: '
+            f'{trajectory_faults(arm, limits, centred.scaled(0.01), clearance)}'
         )
     return found
 
@@ -187,8 +187,9 @@ def feasible_pose(
         worst = int(load[best].argmax())
         limit, unit = limits.torque[worst], limits.unit('torque', worst)
         raise TrajectoryError(
-            f'joint {limits.joints[worst]}: torque limit {limit:.4g} {unit}, but holding still '
-            f'takes {load[best, worst] * limit:.4g} {unit} in the pose with the least load'
+            f'joint {limits.joints[worst]}: its torque limit is {limit:.4g} {unit}, but holding '
+            f'still takes {load[best, worst] * limit:.4g} {unit} even in the pose with the least '
+            'load'
         )
     if clearance is None:
         best = np.flatnonzero(held)[int(np.argmin(load[held].max(axis=1)))]

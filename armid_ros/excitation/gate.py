@@ -65,7 +65,7 @@ class MotionGate:
         limits = Limits.of(robot, speed=1.0, reserve=False)
         violations = check_limits(limits, motion, torque)
         if violations:
-            raise TrajectoryError(f'the run is not sent: {violations[0]}')
+            raise TrajectoryError(f'the run was not sent: {violations[0]}')
         run.require_waypoints()
         if planner.clearance is not None:
             # intervals of 0.1 s at the beginning of the proof
@@ -73,7 +73,7 @@ class MotionGate:
             peak = np.abs(motion.ddq).max(axis=0)
             near = planner.clearance.first_fault(run.at, 1.5 * peak, times)
             if near is not None:
-                raise TrajectoryError(f'the run is not sent: {near}')
+                raise TrajectoryError(f'the run was not sent: {near}')
         # dry friction of a joint may need a tenth of its limit
         room = np.where(np.isfinite(robot.torque_limit), 0.1 * robot.torque_limit, 0.0)
         return cls(run, limits, planner.clearance, np.maximum(np.abs(torque).max(axis=0), room))

@@ -111,12 +111,14 @@ class Limits:
         """
         if isinstance(speed, str) and speed not in SPEED_CLASSES:
             raise TrajectoryError(
-                f"no speed class '{speed}'; there are {', '.join(SPEED_CLASSES)}, "
-                'or a share of the limits such as 0.6'
+                f"there is no speed class '{speed}'; give {', '.join(SPEED_CLASSES)}, or a share "
+                'of the limits such as 0.6'
             )
         share = SPEED_CLASSES[speed] if isinstance(speed, str) else float(speed)
         if not 0.0 < share <= 1.0:
-            raise TrajectoryError(f'speed: a share of the limits in (0, 1], not {share:g}')
+            raise TrajectoryError(
+                f'speed has to be a share of the limits, above 0 and at most 1, not {share:g}'
+            )
         span = robot.upper - robot.lower
         # reserves: 2 % of the range at each end, and a tenth of the torque limit
         margin = 0.02 * reserve * np.where(np.isfinite(span), span, 0.0)
@@ -297,7 +299,8 @@ def with_joint_limits(
         joint, assigned, number = text.partition(':=')
         if not assigned or joint not in robot.joints:
             raise TrajectoryError(
-                f"velocity '{text}': write joint:=value for one of {', '.join(robot.joints)}"
+                f"velocity '{text}' has to be joint:=value, with one of the joints "
+                f'{", ".join(robot.joints)}'
             )
         with reading(f'joint {joint}', TrajectoryError):
             top[robot.joints.index(joint)] = _positive(number, 'velocity')
@@ -343,11 +346,11 @@ def _with_file(robot: Robot, path: Path) -> Robot:
         if not isinstance(entries, dict):
             raise TrajectoryError('the key joint_limits of MoveIt is missing, or has no mapping')
         if not entries.keys() & set(robot.joints):
-            raise TrajectoryError(f'no limits for any of {", ".join(robot.joints)}')
+            raise TrajectoryError(f'the file has no limits for any of {", ".join(robot.joints)}')
         for j, joint in enumerate(robot.joints):
             entry = {} if entries.get(joint) is None else entries[joint]
             if not isinstance(entry, dict):
-                raise TrajectoryError(f'joint {joint}: no mapping of limits')
+                raise TrajectoryError(f'joint {joint}: its entry is not a mapping of limits')
             if entry.get('has_position_limits'):
                 ends = [
                     finite(entry.get(key), f'{joint}: {key}')

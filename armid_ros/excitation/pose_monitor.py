@@ -34,7 +34,7 @@ class _State(NamedTuple):
 
 @dataclass
 class _Source:
-    """Messages with the same list of names: the arm's joints in them, limits, recent states."""
+    """Joints of the arm in all messages with one list of names, their limits and recent states."""
 
     columns: npt.NDArray[np.int_]
     joints: list[int]

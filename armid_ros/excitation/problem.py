@@ -101,7 +101,7 @@ class DesignSettings:
             ('target', self.target, TARGETS),
         ):
             if name not in known:
-                raise TrajectoryError(f"no {kind} '{name}'; there are {', '.join(known)}")
+                raise TrajectoryError(f"there is no {kind} '{name}'; there are {', '.join(known)}")
         if self.focus and self.criterion == 'T':
             raise TrajectoryError("focus is not available with criterion 'T', which has a rival")
         self._require_numbers()
@@ -110,13 +110,13 @@ class DesignSettings:
         """Raise a TrajectoryError for an impossible count, time or size."""
         for name in ('harmonics', 'n_periods', 'starts', 'candidates', 'iterations'):
             if getattr(self, name) < 1:
-                raise TrajectoryError(f'{name}: {getattr(self, name)}; at least 1 is needed')
+                raise TrajectoryError(f'{name} is {getattr(self, name)}, but has to be at least 1')
         for name in ('period', 'run_in', 'rate'):
             if not 0.0 < getattr(self, name) < np.inf:
-                raise TrajectoryError(f'{name}: {getattr(self, name)}; it has to be positive')
+                raise TrajectoryError(f'{name} is {getattr(self, name)}, but has to be positive')
         for name in ('time_budget', 'clearance', 'balance'):
             if not getattr(self, name) >= 0.0:
-                raise TrajectoryError(f'{name}: {getattr(self, name)}; it cannot be negative')
+                raise TrajectoryError(f'{name} is {getattr(self, name)}, but cannot be negative')
         duration = self.n_periods * self.period + 2.0 * self.run_in
         if not duration <= MAX_DURATION:
             raise TrajectoryError(
@@ -214,14 +214,15 @@ class DesignProblem:
         noise = torque_noise(arm, settings)
         if (settings.criterion == 'T') != (rival is not None):
             raise TrajectoryError(
-                "criterion 'T' and a rival need each other: give both or neither"
+                "criterion 'T' and a rival need each other, and only one was given: give both or "
+                'neither'
             )
         whole = arm if rival is None else _joined(arm, rival)
         motion = random_motion(arm.robot, rng)
         columns = _target_columns(whole, settings.target, motion)
         if not columns.any():
             raise TrajectoryError(
-                f"target '{settings.target}': {arm.robot.name} has no such parameter"
+                f"target '{settings.target}': {arm.robot.name} has no parameter of this kind"
             )
         level = replace(whole, robot=levelled(whole.robot))
         flat = _target_columns(level, settings.target, motion).reshape(-1, columns.shape[-1])

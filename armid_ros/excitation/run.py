@@ -43,12 +43,12 @@ class Run:
     rate: float
 
     def __post_init__(self) -> None:
-        """Round the transfers to whole numbers of samples; check that they meet the excitation."""
+        """Check that transfers join the excitation without a jump; make them whole samples."""
         ends = self.excitation.at([0.0, self.excitation.duration]).q
         for transfer, own, end in ((self.approach, -1, 0), (self.back, 0, 1)):
             # [rad or m]; rounding
             if transfer is not None and np.abs(transfer.q[own] - ends[end]).max() > 1e-9:
-                raise TrajectoryError('run: a transfer and the excitation do not meet')
+                raise TrajectoryError('run: a transfer does not join the excitation')
         for name in ('approach', 'back'):
             transfer = getattr(self, name)
             if transfer is not None:
@@ -114,7 +114,7 @@ class Run:
         if away[j] > 0.001:  # [rad or m]
             raise TrajectoryError(
                 f"joint '{self.joints[j]}' would be {away[j]:.2g} rad or m off its path between "
-                f'{self.rate:g} waypoints per second: send more (rate), or take fewer harmonics'
+                f'{self.rate:g} waypoints per second: send more with rate, or take fewer harmonics'
             )
 
 

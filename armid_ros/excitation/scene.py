@@ -157,7 +157,7 @@ FIT, PARTLY, UNFIT = 'fit to run', 'partly checked', 'not to be run'
 #: Remedy for each kind of unchecked item.
 _REMEDIES = {
     'the floor': 'the height of the floor (--floor Z)',
-    'mesh not found': 'the folder of the meshes (--package P=FOLDER)',
+    'mesh not found': 'the folder of the meshes (--package PACKAGE=FOLDER)',
     'no collision body': '<collision> in the description',
     'no SRDF': 'an SRDF next to the description',
     'no limit': 'limits (--joint-limits, --velocity or <limit>)',

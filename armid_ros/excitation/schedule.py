@@ -55,9 +55,13 @@ class Excitation:
     def __post_init__(self) -> None:
         """Check the numbers."""
         if int(self.n_periods) != self.n_periods or self.n_periods < 1:
-            raise TrajectoryError(f'excitation: {self.n_periods} periods; at least one is needed')
+            raise TrajectoryError(
+                f'excitation: it has {self.n_periods} periods, but needs at least one'
+            )
         if not (np.isfinite(self.run_in) and self.run_in > 0.0):
-            raise TrajectoryError(f'excitation: run-in {self.run_in} s; it has to be positive')
+            raise TrajectoryError(
+                f'excitation: its run-in is {self.run_in} s, but has to be positive'
+            )
         if not self.duration <= MAX_DURATION:
             raise TrajectoryError(
                 f'excitation: {self.n_periods} periods of {self.trajectory.period:g} s, run-ins '
@@ -118,7 +122,8 @@ class Excitation:
         """
         if set(joints) != set(self.joints):
             raise TrajectoryError(
-                f'joints {", ".join(self.joints)}, but the robot has {", ".join(joints)}'
+                f'the excitation has joints {", ".join(self.joints)}, but the robot has '
+                f'{", ".join(joints)}'
             )
         order = [self.joints.index(joint) for joint in joints]
         path = self.trajectory
@@ -143,7 +148,9 @@ class Excitation:
 
         """
         if not 0.0 < share <= 1.0:
-            raise TrajectoryError(f'speed share {share:g}: has to be above 0 and at most 1')
+            raise TrajectoryError(
+                f'the speed share is {share:g}, but has to be above 0 and at most 1'
+            )
         samples = self._period_samples(rate)
         longer = float(np.ceil(samples / share - _SAMPLE_TOLERANCE)) / samples
         path = self.trajectory.stretched(self.trajectory.period * longer)
@@ -215,7 +222,9 @@ def save_excitation(excitation: Excitation, path: str | Path) -> None:
     path = Path(path)
     writer = {'.yaml': excitation_text, '.yml': excitation_text, '.csv': _to_csv}.get(path.suffix)
     if writer is None:
-        raise TrajectoryError(f'{path}: an excitation is written as .yaml or .csv')
+        raise TrajectoryError(
+            f'{path}: the name of an excitation file has to end in .yaml or .csv'
+        )
     write_file(path, writer(excitation))
 
 
@@ -232,7 +241,7 @@ def load_excitation(path: str | Path) -> Excitation:
     """
     path = Path(path)
     if path.suffix not in ('.yaml', '.yml'):
-        raise TrajectoryError(f'{path}: an excitation is read from a .yaml file')
+        raise TrajectoryError(f'{path}: an excitation can be read only from a .yaml file')
     return read_excitation(read_text(path, TrajectoryError), str(path))
 
 
@@ -256,7 +265,9 @@ def read_excitation(text: str, source: str) -> Excitation:
     with reading(source, TrajectoryError):
         content: Any = load_yaml(text)
         if not isinstance(content, dict) or content.get('schema') != SCHEMA:
-            raise TrajectoryError(f'not an excitation: it has to contain schema: {SCHEMA}')
+            raise TrajectoryError(
+                f'this is not an excitation, which has to contain schema: {SCHEMA}'
+            )
         if content.get('start') is not None:  # it changes the motion
             raise TrajectoryError(
                 'an excitation cannot contain a start pose; remove it, and give it with --start'

@@ -98,7 +98,7 @@ class TransferPlanner:
         for name, q in (('leave', start), ('go to', goal)):
             fault = self.fault(q)
             if fault:
-                raise TrajectoryError(f'the pose to {name} is not free: {fault}')
+                raise TrajectoryError(f'the pose to {name} is not allowed: {fault}')
         poses = find_path(
             self.clearance,
             (start, goal),
@@ -125,7 +125,9 @@ class TransferPlanner:
             if not violations:
                 return transfer
             transfer = transfer.lasting(1.3 * transfer.duration)
-        raise TrajectoryError(f'no transfer to the trajectory keeps the limits: {violations[0]}')
+        raise TrajectoryError(
+            f'no transfer to the trajectory stays inside the limits: {violations[0]}'
+        )
 
     def fault(self, q: FloatArray) -> str:
         """Return why a pose, (n,), is not allowed; empty if it is allowed."""
@@ -175,9 +177,8 @@ class TransferPlanner:
                 if not self.fault(q):
                     return self._simplified(q, zero)
         raise TrajectoryError(
-            f'the zero of {self.arm.robot.name} is not free, and no pose around it is free: '
-            f'{reason}; '
-            'give a pose to start from, --start'
+            f'{self.arm.robot.name}: the zero pose is not allowed ({reason}), and no allowed pose '
+            'was found around it; give a start pose with --start'
         )
 
     def _simplified(self, q: FloatArray, zero: FloatArray) -> FloatArray:

@@ -168,7 +168,10 @@ def identify(
     from armid_ros.identification import SignalSettings
 
     if (robot_source is None) == (table is None):
-        raise FleetError('name the robot of all arms with --robot, or a table with --robots')
+        raise FleetError(
+            'no robot was named: name the robot of all arms with --robot, or a table of robots '
+            'with --robots'
+        )
     robots = read_table(table) if table is not None else str(robot_source)
     fit = FleetSettings(
         joints=joints or '',

@@ -103,8 +103,8 @@ def payloads_of(
         named = [source for source, bag in bags.items() if name in (str(bag), bag.name, bag.stem)]
         if len(named) != 1:
             raise IdentificationError(
-                f"--payload '{text}' names {len(named)} recordings; they are "
-                f'{", ".join(map(str, bags.values()))}'
+                f"--payload '{text}' has to name one recording, not {len(named)}; the recordings "
+                f'are {", ".join(map(str, bags.values()))}'
             )
         found[named[0]] = with_payload(found.get(named[0], robot), link, payload)
     return found
@@ -219,7 +219,7 @@ def drive_gains(
 def _gain(
     columns: FloatArray, known: FloatArray, tau: FloatArray, blocks: FloatArray
 ) -> tuple[float, float, float]:
-    """Return the coefficient of the known torque, its std, and the 95 % half-width."""
+    """Return the drive gain, its standard deviation, and its 95 % half-width."""
     scale = np.linalg.norm(columns, axis=0)
     columns = columns[:, scale > 0.0] / scale[scale > 0.0]
     # the coefficient is that of the column's residual after the other columns (Frisch, Waugh)

@@ -195,7 +195,7 @@ def require_as_identified(path: str | Path) -> None:
 
 
 def _content(path: Path) -> dict[str, Any]:
-    """Return size of a file or folder [bytes], and SHA-256 of the ends of its files."""
+    """Return the size of a file or folder [bytes], and a hash of both ends of its files."""
     inside = sorted(path.rglob('*')) if path.is_dir() else [path]
     digest, total = hashlib.sha256(), 0
     end = 1 << 20  # bytes; enough for the time stamps at the beginning and the index at the end

@@ -56,7 +56,7 @@ class KnownFit:
 
     @property
     def unusable(self) -> bool:
-        """Whether the model does not describe the arm."""
+        """Whether the model is graded unusable, so that it does not describe the arm."""
         return self.grade == 'unusable'
 
 
@@ -137,7 +137,7 @@ class ParameterFile:
 
     def regrouped_as(self, other: ParameterFile) -> ParameterFile:
         """
-        Return the values, and the values of another grouping that follow from them.
+        Return values of the parameters, and values of another grouping that follow from them.
 
         A motion with less excitation groups more parameters. Its values are combinations of the
         values of a richer motion.
@@ -200,7 +200,7 @@ def read_parameters(path: str | Path) -> ParameterFile:
             document = json.loads(text) if path.suffix == '.json' else load_yaml(text)
         except (ValueError, yaml.YAMLError) as error:
             reason = ' '.join(str(error).split())
-            raise ModelError(f'neither JSON nor YAML: {reason}') from error
+            raise ModelError(f'this file is neither JSON nor YAML: {reason}') from error
         if not isinstance(document, dict) or document.get('schema') not in _SCHEMAS:
             raise ModelError(f"its 'schema' has to be {' or '.join(_SCHEMAS)}")
         document = checked_model(text) if document['schema'] == MODEL else document
@@ -280,7 +280,7 @@ def parameters_of(source: str, document: dict[str, Any]) -> ParameterFile:
     values: dict[ParameterName, tuple[float, float]] = {}
     for row in rows:
         if 'unit' not in row:
-            raise ValueError(f"parameter '{row['name']}' of joint '{row['joint']}': no unit")
+            raise ValueError(f"parameter '{row['name']}' of joint '{row['joint']}' has no unit")
         name = ParameterName(str(row['name']), str(row['joint']), str(row['unit']))
         which = f'{name.name} of joint {name.joint}'
         if name in values:
@@ -304,7 +304,7 @@ def parameters_of(source: str, document: dict[str, Any]) -> ParameterFile:
         error = finite(score['relative_error_percent'], 'relative_error_percent')
     scatter = [[finite(v, 'a scatter') for v in row] for row in document.get('scatter', ())]
     if any(len(row) != len(values) for row in scatter):
-        raise ValueError(f'the scatter has to have rows of {len(values)} values')
+        raise ValueError(f'each row of the scatter has to have {len(values)} values')
     about = document.get('description', {})
     return ParameterFile(
         source,
@@ -360,15 +360,17 @@ def _covariance(rows: list[list[float]] | None, size: int) -> FloatArray | None:
     if rows is None:
         return None
     if [len(row) for row in rows] != list(range(1, size + 1)):
-        raise ValueError(f'covariance: it has to be a lower triangle with {size} rows')
+        raise ValueError(f'the covariance has to be a lower triangle with {size} rows')
     matrix = np.zeros((size, size))
     for index, row in enumerate(rows):
         matrix[index, : index + 1] = matrix[: index + 1, index] = row
     if not np.isfinite(matrix).all():
-        raise ValueError('a covariance with a number that is not finite')
+        raise ValueError('the covariance contains a number that is not finite')
     deviations = np.sqrt(np.maximum(np.diag(matrix), 0.0))
     largest = np.outer(deviations, deviations)
     # numbers in the file have 16 digits
     if (np.diag(matrix) < 0.0).any() or (np.abs(matrix) > largest * (1.0 + 1e-9)).any():
-        raise ValueError('a covariance with a negative variance or a correlation beyond one')
+        raise ValueError(
+            'the covariance contains a negative variance, or a correlation beyond one'
+        )
     return matrix

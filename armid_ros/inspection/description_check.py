@@ -151,7 +151,7 @@ def _of_joints(robot: Robot) -> Iterator[Remark]:
 
 
 def _of_sizes(robot: Robot) -> Iterator[Remark]:
-    """Compare the limits of effort and velocity with the weight, the reach and other joints."""
+    """Compare limits of effort and velocity with weight, reach and the other joints."""
     if robot.mechanism is not None:  # not every pose of the driven joints exists
         return
     weight, speeds, efforts = _largest_weight(robot), robot.velocity_limit, robot.torque_limit

@@ -134,7 +134,7 @@ class JointFacts:
 
     @property
     def still(self) -> bool:
-        """Whether the joint is at rest throughout."""
+        """Whether the joint rests throughout the recording."""
         return self.upper - self.lower < REST_RANGE
 
 

@@ -201,7 +201,7 @@ def _contains_any(text: str, others: Iterable[str]) -> bool:
 
 
 def _of_fit(trial: TrialFit, known: Sequence[str]) -> Iterator[Remark]:
-    """Yield the faults found by identify that are in no remark yet."""
+    """Yield faults that `identify` found and that no remark names yet."""
     weight: Weight = 'bad' if trial.grade == 'unusable' else 'doubt'
     others = [*known, *trial.elsewhere]
     yield from (

@@ -71,7 +71,7 @@ class BaseParameters:
         self, standard: tuple[ParameterName, ...], columns: npt.NDArray[np.intp]
     ) -> BaseParameters:
         """
-        Return the parameters in terms of a longer list; they do not depend on the added entries.
+        Return these base parameters for a longer list of parameters; they ignore the added ones.
 
         Parameters
         ----------
@@ -202,7 +202,7 @@ def _named(
 
 def levelled(robot: Robot) -> Robot:
     """
-    Return the robot with gravity aligned to an axis of its first joint, if nearly aligned.
+    Return the robot with gravity along an axis of its first joint, if it nearly is.
 
     A hanging base with a rounded angle of 3.1416 excites first moments by 7e-6 of their weight,
     which is far below noise.

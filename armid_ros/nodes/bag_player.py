@@ -60,7 +60,7 @@ class _JumpGuard:
         self._limits = dict(zip(robot.joints, robot.velocity_limit.tolist(), strict=True))
 
     def objection(self, cdr: bytes) -> str:
-        """Return why a JointTrajectory must not be sent to the arm; empty if it may."""
+        """Return why a JointTrajectory must not be sent to the arm; empty if it may be sent."""
         try:
             reference = waypoints_of(deserialize_message(cdr, JointTrajectory))
         except ArmidError as error:
@@ -146,7 +146,7 @@ class BagPlayerNode(ArmidNode):
         """Open the bag of the parameter bag."""
         super().__init__('bag_player', **kwargs)
         if not self.value('bag'):
-            raise RecordingError("parameter 'bag' is empty: give a bag, -p bag:=PATH")
+            raise RecordingError("parameter 'bag' is empty: name a bag with -p bag:=PATH")
         self._bag = Bag(self.value('bag'))
         self._lock_step = bool(self.value('use_sim_time'))
         self.check({'clock_rate': self.value('clock_rate')})
@@ -229,7 +229,8 @@ class BagPlayerNode(ArmidNode):
         """Raise a RecordingError if the node would publish the /clock that it follows."""
         if self.value('use_sim_time') and values.get('clock_rate'):
             raise RecordingError(
-                'use_sim_time follows /clock; it cannot publish it too: clock_rate'
+                'a node with use_sim_time follows /clock and cannot publish it: set use_sim_time '
+                'or clock_rate, not both'
             )
 
     def changed(self, names: frozenset[str]) -> None:
@@ -280,7 +281,7 @@ class BagPlayerNode(ArmidNode):
             except RecordingError as error:
                 self.complaints.say('topic', f'{name} is not played: {error}')
         if not publishers:
-            raise RecordingError(f'{self._bag.path}: nothing to play')
+            raise RecordingError(f'{self._bag.path}: the bag has no message to play')
         return publishers
 
     def _from_start(self) -> Iterator[RawMessage]:

@@ -61,5 +61,5 @@ class Complaints:
         self._logger.debug(''.join(traceback.format_exception(error)))
 
     def settle(self) -> None:
-        """Reset `fresh` at the start of a new reporting period."""
+        """Begin a new reporting period, with `fresh` reset."""
         self.fresh = False

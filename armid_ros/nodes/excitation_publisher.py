@@ -233,7 +233,7 @@ class ExcitationPublisherNode(ArmidNode):
         if ending is None:
             raise TrajectoryError('no excitation is running')
         if ending.last is None:
-            raise TrajectoryError(f'{ending.reason}; stop the arm there')
+            raise TrajectoryError(f'{ending.reason}; that client moves the arm, so stop it there')
         now, limits = self._arm.now(), map(self.value, ('tracking_tolerance', 'stopping'))
         motion = ending.stopped_again(self._arm.monitor, now, *limits)
         if motion is None:
@@ -281,7 +281,9 @@ class ExcitationPublisherNode(ArmidNode):
 
     def _loaded(self, path: str) -> Excitation:
         if not path:
-            raise TrajectoryError('a running node designs no excitation; name a file')
+            raise TrajectoryError(
+                'a running node cannot design an excitation; name the file of one'
+            )
         return checked(load_excitation(path), self._planner, path)
 
     def close(self) -> None:

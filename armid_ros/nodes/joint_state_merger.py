@@ -145,8 +145,8 @@ class JointStateMergerNode(ArmidNode):
         others = self.value('effort_joints')
         if len(others) not in (0, len(joints)):
             raise ParameterError(
-                f"parameter 'effort_joints' has {len(others)} for {len(joints)} joints: "
-                f'{", ".join(joints)}'
+                f"parameter 'effort_joints' has {len(others)} names, but there are {len(joints)} "
+                f'joints: {", ".join(joints)}'
             )
         self._gains = per_joint(self.value('gains'), joints, "parameter 'gains'")
         self.joints = tuple(joints)
@@ -189,7 +189,7 @@ class JointStateMergerNode(ArmidNode):
             if not known:
                 there = sorted({name for part in parts for name in part.interface_names})
                 raise RecordingError(
-                    f"efforts: no joint has the interface '{interface}'; there are "
+                    f"efforts: no joint has the interface '{interface}'; interfaces are "
                     f'{", ".join(there)}'
                 )
         else:
@@ -207,7 +207,10 @@ class JointStateMergerNode(ArmidNode):
         n = len(self.joints)
         some = [k for k, name in enumerate(called) if math.isfinite(known.get(name, math.nan))]
         if not some:
-            raise RecordingError(f'torques of {", ".join(known)}, but none of {", ".join(called)}')
+            raise RecordingError(
+                f'the message has torques of {", ".join(known)}, but of none of '
+                f'{", ".join(called)}'
+            )
         torques = np.array([known[called[k]] for k in some]) * self._gains[some]
         self._take(tuple(n + k for k in some), stamp, np.vstack([torques, torques]))
 

@@ -131,7 +131,7 @@ class OnlineIdentifierNode(ListeningNode):
         """Write the estimate, an arm model with it, and the robot of the model to files."""
         identifier = self._require()
         if not identifier.samples:
-            raise IdentificationError('no sample was used so far, so that nothing is written')
+            raise IdentificationError('no sample was used so far, so nothing was written')
         folder = Path(self.value('save_to') or _FOLDER).expanduser()
         refuse_replacing(folder, FILES)
         robot, estimate = identifier.arm.robot, identifier.estimate()

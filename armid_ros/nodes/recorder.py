@@ -99,7 +99,7 @@ class RecorderNode(ArmidNode):
     def start(self) -> str:
         """Open a bag and record; RecordingError if one is open or cannot be created."""
         if self._writer is not None:
-            raise RecordingError(f'recording into {self._writer.path} already')
+            raise RecordingError(f'a recording into {self._writer.path} is under way already')
         name = self.value('bag') or f'armid_{datetime.now():%Y_%m_%d-%H_%M_%S}'
         # The path of the first bag must not exist; bags of later ~/start calls get a number.
         path = Path(name).expanduser()

@@ -326,7 +326,8 @@ class SimulatedArmNode(ArmidNode):
         """Return the arm of the parameters with other effects."""
         if self._without_effects is None:
             raise ModelError(
-                'this arm was made by a program, so that the parameter cannot change its effects'
+                "the node was given a finished arm from Python, so the parameter 'effects' cannot "
+                'change it'
             )
         return with_effects(self._without_effects, texts)
 

@@ -173,7 +173,7 @@ class TrajectoryController:
             raise TrajectoryError(f'{self.missing}; the arm is not started')
 
     def begin(self, trajectory: JointTrajectory) -> str:
-        """Send the trajectory of a run after `discover`, and return the name of the receiver."""
+        """Send the trajectory of a run after `discover`; return the name of its receiver."""
         self._by_action = self._ready
         if self._by_action:
             names = ('tracking_tolerance', 'goal_tolerance', 'goal_time_tolerance')
@@ -190,7 +190,7 @@ class TrajectoryController:
             self._publisher.publish(trajectory)
 
     def insist(self, trajectory: JointTrajectory) -> None:
-        """Send a trajectory to the controller of the present run, by action and by topic."""
+        """Send a trajectory to the controller of the present run by both action and topic."""
         self.bring_to_rest(trajectory)
         if self._by_action:
             self._publisher.publish(trajectory)

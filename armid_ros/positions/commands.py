@@ -62,7 +62,9 @@ def read_commands(
     columns = columns or ColumnSettings()
     if is_table(path):
         if name is None:
-            raise RecordingError(f'{path}: name the columns of the commands with --commands')
+            raise RecordingError(
+                f'{path}: this is a table; name its columns of commanded positions with --commands'
+            )
         columns = replace(columns, position=name, velocity='none', effort='none')
         topic = None
     else:
@@ -115,7 +117,7 @@ def _controller_state(path: Path, robot: Robot, topic: Topic, settings: ReadSett
                 stamp, names = state.header.stamp, list(state.joint_names)
                 missing = set(robot.joints) - set(names)
                 if missing:
-                    raise RecordingError(f'no joint {", ".join(sorted(missing))}')
+                    raise RecordingError(f'its messages do not name {", ".join(sorted(missing))}')
                 order = [names.index(joint) for joint in robot.joints]
                 q, dq = (np.array(x) for x in (point.positions, point.velocities))
                 if len(q) == len(names):

@@ -255,7 +255,7 @@ def _errors(
 
 
 def _judged(problem: _Problem, x: FloatArray, free: npt.NDArray[np.bool_]) -> PositionFit:
-    """Return the fit at the solution, with standard errors."""
+    """Return the fit at the solution, with the standard errors of its parameters."""
     model, n, count = problem.model, problem.model.robot.n_joints, len(x)
     residuals = problem.residual(x)
     sigma = np.sqrt(np.mean(residuals**2, axis=0)) + 1e-9

@@ -238,7 +238,9 @@ def _files_of(path: Path) -> BagMetadata:
     if not found:
         below = sorted({str(f.parent) for s in _STORAGES for f in path.glob(f'*/*{s}*')})
         hint = f'; there are bags in {", ".join(below)}' if below else ''
-        raise RecordingError(f'{path}: a directory without {FILE_NAME}, .mcap or .db3{hint}')
+        raise RecordingError(
+            f'{path}: this directory is not a bag, as it has no {FILE_NAME}, .mcap or .db3{hint}'
+        )
     if len({_storage_suffix(file) for file in found}) > 1:
         raise RecordingError(
             f'{path}: has both .mcap and .db3 files, but no {FILE_NAME} that names the files of '

@@ -90,9 +90,11 @@ class ColumnSettings:
     def __post_init__(self) -> None:
         """Raise a RecordingError for invalid settings."""
         if self.time_unit is not None and self.time_unit not in TIME_UNITS:
-            raise RecordingError(f"time unit '{self.time_unit}': use {', '.join(TIME_UNITS)}")
+            raise RecordingError(
+                f"time unit '{self.time_unit}' is not known: use {', '.join(TIME_UNITS)}"
+            )
         if self.rate_hz is not None and not self.rate_hz > 0.0:
-            raise RecordingError(f'rate {self.rate_hz} Hz: it has to be positive')
+            raise RecordingError(f'the rate is {self.rate_hz} Hz, but has to be positive')
         if self.coupling and not self.gear:
             raise RecordingError('a coupling of motors needs their gear ratios, too')
 
@@ -144,7 +146,7 @@ def number(text: str) -> float:
         if not math.isfinite(value):
             raise ValueError(text)
     except (ValueError, ZeroDivisionError):
-        raise RecordingError(f"'{text}' is no number; write 0.5, 1798/7 or -pi/2") from None
+        raise RecordingError(f"'{text}' is not a number; write 0.5, 1798/7 or -pi/2") from None
     return value
 
 
@@ -241,5 +243,6 @@ def _position(joint: str, joints: Sequence[str]) -> int:
     if joint.isdigit() and 1 <= int(joint) <= len(joints):
         return int(joint) - 1
     raise RecordingError(
-        f"a coupling names '{joint}'; there are {', '.join(joints)}, or their numbers from 1"
+        f"a coupling names '{joint}', which is not a joint; joints are {', '.join(joints)}, or "
+        'their numbers from 1'
     )

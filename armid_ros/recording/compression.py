@@ -55,7 +55,7 @@ def decompressed(stored: _Buffer, compression: str, size: int, settings: ReadSet
     else:
         stated = int(lz4.frame.get_frame_info(stored)['content_size']) or -1
     if stated not in (-1, size):  # -1: the frame states no size
-        raise ValueError(f'has {stated} bytes instead of the stated {size}')
+        raise ValueError(f'its header states {stated} bytes of content, but the bag states {size}')
     settings.require(size, 'a chunk')
     if not size:
         return b''
@@ -65,9 +65,9 @@ def decompressed(stored: _Buffer, compression: str, size: int, settings: ReadSet
         decompressor = lz4.frame.LZ4FrameDecompressor()
         content = bytes(decompressor.decompress(stored, max_length=size))
         if not decompressor.eof and decompressor.decompress(b'', max_length=1):
-            raise ValueError(f'has more than the stated {size} bytes')
+            raise ValueError(f'its content has more than the {size} bytes that the bag states')
     if len(content) != size:
-        raise ValueError(f'has {len(content)} bytes instead of the stated {size}')
+        raise ValueError(f'its content has {len(content)} bytes, but the bag states {size}')
     return content
 
 

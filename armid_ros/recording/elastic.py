@@ -101,8 +101,9 @@ def read_accelerations(
     odd = [k for k, m in enumerate(messages) if len(m) != length]
     if odd:
         raise RecordingError(
-            f'{path}: {topic}: message {odd[0]} has {len(messages[odd[0]])} bytes, but one with '
-            f'the frame of the first has {length}; keep one sensor per topic'
+            f'{path}: {topic}: message {odd[0]} has {len(messages[odd[0]])} bytes, but with the '
+            f'frame name of the first message it would have {length}; record each sensor on its '
+            'own topic'
         )
     rows = np.frombuffer(b''.join(messages), _fields(length, order))
     stamps = rows['sec'].astype(np.int64) * 10**9 + rows['nanosec']

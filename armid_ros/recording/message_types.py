@@ -91,7 +91,7 @@ def store_for(described: MessageType) -> Typestore:
     if not described.definition:
         store = get_typestore(Stores.ROS2_JAZZY)
         if described.name not in store.fielddefs:
-            raise RecordingError(f'type {described.name}: its definition is missing in the bag')
+            raise RecordingError(f'type {described.name}: its definition is missing from the bag')
         return store
     store = Typestore()
     if described.encoding == 'ros2idl':
@@ -126,7 +126,7 @@ def _register(store: Typestore, name: str, definition: str | None) -> None:
 
 
 def _installed(name: str) -> str:
-    """Return the text of an installed .msg file."""
+    """Return the text of an installed .msg file, if there is one."""
     listed = os.environ.get('AMENT_PREFIX_PATH', '').split(os.pathsep)
     prefixes = [prefix for prefix in (*listed, sys.prefix) if prefix]
     package, _, rest = name.partition('/')

@@ -157,8 +157,8 @@ def read_metadata(bag: Path) -> BagMetadata:
                     counts[name] = counts.get(name, 0) + count
     except RecordingError as error:
         raise RecordingError(
-            f'{path}: no valid description of a bag ({str(error).lstrip(": ")}); move it away, '
-            'and the files of its folder will be read without it'
+            f'{path}: this is not a valid description of a bag ({str(error).lstrip(": ")}); if '
+            'you move it away, the files of its folder are read without it'
         ) from error
     # Up to version 3 the paths began with the name of the directory.
     files = tuple(bag / Path(name).name for name in names)

@@ -106,7 +106,7 @@ def read_recording(
         joints = [name_in_file(joint, rules) for joint in joints]
         if not joints or len(set(joints)) != len(joints):
             raise RecordingError(
-                f'{path}: give at least one joint, and each joint once; got {joints}'
+                f'{path}: at least one joint has to be named, and each only once; got {joints}'
             )
     recording = _read_bag(path, joints, topic, settings)
     if rules:
@@ -203,7 +203,7 @@ def assembled(
         raise RecordingError(f'{where} has no messages')
     if not decoder.names_seen:
         raise RecordingError(
-            f'{where}: none of {decoder.messages} messages names a joint; '
+            f'{where}: none of the {decoder.messages} messages names a joint; '
             f'{decoder.first_problem or "the names are empty"}'
         )
     missing = [joint for joint in joints if joint not in decoder.names_seen]
@@ -337,7 +337,7 @@ def choose_topics(bag: Bag, joints: Sequence[str] | None, wanted: str | None) ->
     listed = '; '.join(f'{name} names {", ".join(n) or "none"}' for name, n in names.items())
     which = 'several topics name' if complete else 'no topic names'
     raise RecordingError(
-        f'{bag.path}: {which} all of {", ".join(joints)}; say which topic to read: {listed}'
+        f'{bag.path}: {which} all of {", ".join(joints)}; choose a topic to read: {listed}'
     )
 
 

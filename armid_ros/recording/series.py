@@ -106,7 +106,7 @@ def ordered(series: JointSamples, clock: Clock, counts: Counter[str]) -> JointSa
 def merged(
     series: Sequence[JointSamples], joints: Sequence[str], counts: Counter[str]
 ) -> JointSamples:
-    """Merge several series into samples of all joints on one time base."""
+    """Merge several series, each of some joints, into samples of all joints at common times."""
     holders: dict[tuple[int, ...], list[str]] = {}
     for joint in joints:
         key = tuple(i for i, one in enumerate(series) if joint in one.joints)
@@ -370,7 +370,9 @@ def assemble(
     clock: Clock = 'receive' if note else 'header'
     for states in gathered if clock == 'receive' else ():
         if states.receive is None:
-            raise RecordingError(f'{where}: {note}; name another with --time, or give --rate')
+            raise RecordingError(
+                f'{where}: {note}; name another column of time with --time, or give --rate'
+            )
         problem = clock_problem(states.receive, states.values[0])
         if problem:
             raise RecordingError(

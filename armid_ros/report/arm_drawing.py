@@ -192,7 +192,7 @@ class _Solid:
     radius: float
 
     def seen(self, frame: pin.SE3) -> tuple[FloatArray, float]:
-        """Return the projected outline, shape (K, 2) [m], and its depth."""
+        """Return the outline of the body in the drawing plane, (K, 2) [m], and its depth."""
         points = self.points @ frame.rotation.T + frame.translation
         turn = np.linspace(0.0, 2.0 * np.pi, _CIRCLE_CORNERS, endpoint=False)
         ring = max(self.radius, 1e-4) * np.column_stack([np.cos(turn), np.sin(turn)])
@@ -269,13 +269,13 @@ class _Strip:
         return cls(solids, frames, left, high, width * scale, height * scale, scale)
 
     def place(self, points: FloatArray, pose: int) -> FloatArray:
-        """Convert flat points, shape (..., 2) [m], to the frame of a pose [px]."""
+        """Convert points of the drawing plane, (..., 2) [m], to the frame of a pose [px]."""
         right = pose * self.pitch + self.scale * (points[..., 0] - self.left)
         down = self.scale * (self.top - points[..., 1])
         return np.asarray(np.round(np.stack([right, down], axis=-1), 1))
 
     def bodies(self, colour: Callable[[_Solid], str]) -> tuple[tuple[str, str], ...]:
-        """Return the outline of each body and its colour, far bodies of each pose first."""
+        """Return outline and colour of each body, in each pose the farthest body first."""
         found = []
         for pose, frame in enumerate(self.frames):
             seen = [(solid, *solid.seen(frame[solid.joint])) for solid in self.solids]

@@ -37,7 +37,7 @@ class ContentSection(Section):
 @dataclass(frozen=True)
 class Paragraph(Templated):
     """
-    A paragraph.
+    Paragraph of a report.
 
     Attributes
     ----------
@@ -81,7 +81,7 @@ class TableCell:
 @dataclass(frozen=True)
 class IntervalTrack:
     """
-    An interval and a reference on an axis with zero in the middle, as a cell of a table.
+    Cell of a table that draws an interval and a reference around zero.
 
     Attributes
     ----------
@@ -109,7 +109,7 @@ Cells = Sequence[str | TableCell | IntervalTrack]
 @dataclass(frozen=True)
 class DataTable(Templated):
     """
-    A table.
+    Table of a report.
 
     Attributes
     ----------
@@ -135,7 +135,7 @@ class DataTable(Templated):
 @dataclass(frozen=True)
 class FactList(Templated):
     """
-    Names and values.
+    List of names and their values.
 
     Attributes
     ----------
@@ -152,7 +152,7 @@ class FactList(Templated):
 @dataclass(frozen=True)
 class BulletList(Templated):
     """
-    A list.
+    List of a report.
 
     Attributes
     ----------
@@ -172,7 +172,7 @@ class BulletList(Templated):
 @dataclass(frozen=True)
 class Fold(Templated):
     """
-    Blocks that a click on a line opens.
+    Blocks that appear after a click on a line.
 
     Attributes
     ----------
@@ -249,7 +249,7 @@ class SmallMultiples(Templated):
 @dataclass(frozen=True)
 class Bar:
     """
-    One bar.
+    One bar of a bar chart.
 
     Attributes
     ----------

@@ -163,7 +163,7 @@ def diagnosis_report(
 
 
 def _at_fault(diagnosis: Diagnosis, read: Mapping[str, Sequence[Recording]]) -> list[str]:
-    """Return the recordings that a BAD DATA verdict names, or all; [] for other verdicts."""
+    """Return the recordings with the fault of BAD DATA, or all; [] for other verdicts."""
     if diagnosis.verdict != 'bad_data':
         return []
     sources = [one.source for several in read.values() for one in several if one.source]
@@ -191,7 +191,7 @@ def _verdict(diagnosis: Diagnosis, worse: Sequence[str], step: str) -> VerdictSe
 @dataclass(frozen=True)
 class Story(Section):
     """
-    Summary of a diagnosis as questions of a reader with answers.
+    Summary of a diagnosis: questions that a reader has, with answers.
 
     Attributes
     ----------

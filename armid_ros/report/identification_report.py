@@ -209,7 +209,7 @@ def _noise_section(robot: Robot, check: NoiseCheck) -> ContentSection:
 def _physical_section(
     certificate: PhysicalCertificate, exports: Mapping[str, Sequence[str]]
 ) -> ContentSection:
-    """Return the certificate of a fit with physically consistent links."""
+    """Return the section that shows whether the fitted links are physically consistent."""
     quantifier = 'Every' if certificate.consistent else 'Not every'
     training, held_out = (
         100.0 * (ratio - 1.0) for ratio in (certificate.misfit_ratio, certificate.held_out_ratio)

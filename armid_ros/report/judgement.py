@@ -77,7 +77,7 @@ def judge(
 
 
 def findings_of(result: Identification, verification: Verification | None) -> Iterator[str]:
-    """Yield what was identified, and the position error in simulation."""
+    """Yield sentences on what was identified, and on the position error in simulation."""
     robot = result.arm.robot
     effects = [name_in_words(effect.name) for effect in result.arm.effects]
     time = sum(float(fit.motion.t[-1] - fit.motion.t[0]) for fit in result.training)

@@ -66,7 +66,7 @@ def _words_and_link(name: ParameterName, links: Sequence[str]) -> tuple[str, str
 
 
 def grouping(name: ParameterName, links: Sequence[str] = ()) -> str:
-    """Return the linear combination that a group represents; '' for a single parameter."""
+    """Return the linear combination that a base parameter is; empty for a single parameter."""
     if ' ' not in name.name:
         return ''
 

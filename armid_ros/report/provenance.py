@@ -67,7 +67,7 @@ class ResultOrigin:
     step: str = ''
 
     def of(self, known: str) -> ResultOrigin:
-        """Fill in the name of the robot in files, if no name is given."""
+        """Return the origin with the robot's name in files filled in, if it has none."""
         return replace(self, robot=self.robot or known, source=self.source or known)
 
 

@@ -79,7 +79,7 @@ class Whiteness:
 
     @property
     def outside(self) -> float:
-        """Share of the lags outside the band; 0.01 for white noise."""
+        """Share of the autocorrelations outside the band of white noise, for which it is 0.01."""
         return float(np.mean(np.abs(self.correlation) > self.band))
 
     @staticmethod
@@ -103,7 +103,7 @@ class Whiteness:
 
 def torque_reach(result: Identification, fits: Sequence[Fit]) -> FloatArray:
     """
-    Return the 95 % half-width of the torque due to uncertain parameters, shape (n,).
+    Return the 95 % half-width of torque that uncertain parameters cause, shape (n,).
 
     The half-widths are root mean squares over a motion [N m].
 

@@ -80,7 +80,7 @@ def learn_map(rows: JointRows, rng: np.random.Generator) -> tuple[TorqueMap, Flo
 
 
 class _Scales(NamedTuple):
-    """Noise of the points, length scales, amplitude and knee of a map."""
+    """Hyperparameters of a map: noise of its points, length scales, amplitude and knee."""
 
     noise: float
     lengths: FloatArray
@@ -104,7 +104,7 @@ def _cells(rows: JointRows, labels: npt.NDArray[np.intp], used: npt.NDArray[np.b
 
 
 def _fitted(cells: _Cells, knee: float) -> tuple[float, _Scales]:
-    """Maximise the log marginal likelihood; return it per cell, with the hyperparameters."""
+    """Maximise the log marginal likelihood; return its value per cell and the hyperparameters."""
     from sklearn.gaussian_process import GaussianProcessRegressor, kernels
 
     size = max(float(np.sqrt(np.mean(cells.torque**2))), 1e-12)

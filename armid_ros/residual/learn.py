@@ -121,7 +121,7 @@ class Residual:
         return tuple(lines)
 
     def steps(self) -> list[str]:
-        """Return the next step for each joint."""
+        """Return a next step for the user for each joint."""
         return [
             f'Inspect gear, cables and stops of {one.joint} where its map is strong.'
             if one.law is None
@@ -131,7 +131,7 @@ class Residual:
         ]
 
     def section(self) -> ContentSection:
-        """Return the section of a report with the maps at the middle load of each joint."""
+        """Return the section of a report that shows the learned maps at the middle load."""
         robot = self.base.robot
         rows, pictures = [], []
         for one in self.joints:
@@ -351,7 +351,7 @@ def _learned(
 
 
 def near_data(learned: TorqueMap, rows: JointRows) -> npt.NDArray[np.bool_]:
-    """Return a mask of the rows near those from which a map was learned, shape (N,)."""
+    """Return a mask of the rows that are near the training data of a learned map, shape (N,)."""
     # a map is informative where its standard deviation is less than half of that of the prior
     return np.asarray(learned.std(rows.inputs) < 0.5 * learned.amplitude)
 

@@ -171,7 +171,7 @@ def _closing_range(
     mechanism: Mechanism, tree: Robot, lower: FloatArray, upper: FloatArray
 ) -> tuple[Mechanism, FloatArray, FloatArray]:
     """
-    Narrow the range of driven joints so that loops close and passive joints keep their limits.
+    Narrow the range of driven joints to where loops close and passive joints keep limits.
 
     Both conditions hold up to a tenth beyond the result, because motions may overshoot limits.
 

@@ -319,8 +319,8 @@ def _joint(element: ElementTree.Element, name: str, notes: list[str]) -> Joint:
         raise RobotError(f"{where} has the type '{kind}'; types are {', '.join(JOINT_TYPES)}")
     if kind in ('floating', 'planar'):
         raise RobotError(
-            f'{where} is {kind}, but the base of an arm is fixed: make it '
-            f"type='fixed', or take the arm's own description"
+            f"{where} is {kind}, but an arm needs a fixed base: set type='fixed' in this joint, "
+            'or give a URDF of the arm alone'
         )
     xyz, rpy = _origin(element, where)
     axis = element.find('axis')

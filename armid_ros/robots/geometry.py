@@ -163,7 +163,7 @@ def collision_geometry(
 
 def sticks(model: pin.Model) -> list[tuple[int, FloatArray]]:
     """
-    Return lines that represent links: index of a joint, and end point in the joint frame.
+    Return lines to draw in place of links: index of a joint, and end in the joint's frame.
 
     A line ends at the next joint; the line of the last body ends beyond its centre of mass.
     Index 0 is the base.

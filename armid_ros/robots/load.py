@@ -145,7 +145,9 @@ def load_robot(
     if path.is_dir():
         inside = path / 'model.yaml'
         what = inside if inside.is_file() else 'the URDF, xacro or MJCF file of the robot'
-        raise RobotError(f'{source}: a folder; name {what}; it comes before the recordings')
+        raise RobotError(
+            f'{source} is a folder; name {what} as the robot, which comes before the recordings'
+        )
     text = read_text(path, RobotError)
     notes: tuple[str, ...] = ()
     if is_mjcf(text) and not arguments:
@@ -362,7 +364,7 @@ def read_mounting(robot: Robot) -> tuple[float | None, Path] | None:
     if floor == 'none':
         return None, path
     if isinstance(floor, bool) or not isinstance(floor, int | float) or not math.isfinite(floor):
-        raise RobotError(f'{path}: has to say floor: HEIGHT [m], or floor: none')
+        raise RobotError(f'{path}: it has to contain floor: HEIGHT [m], or floor: none')
     return float(floor), path
 
 

@@ -174,7 +174,7 @@ class Mechanism:
     def _drift(
         self, q: FloatArray, jacobian: FloatArray, closing: FloatArray, du: FloatArray
     ) -> FloatArray:
-        """Return the accelerations dJ/dt du, shape (m,), that keep the loops closed."""
+        """Return accelerations dJ/dt du that the motion of closed loops needs, shape (m,)."""
         data, world = _SCRATCH.of(self)[0], pin.LOCAL_WORLD_ALIGNED
         pin.forwardKinematics(self.model, data, q, jacobian @ du, np.zeros(len(q)))
         apart = [
@@ -185,7 +185,7 @@ class Mechanism:
         return np.asarray(-closing @ np.concatenate(apart))
 
     def _gap(self, data: pin.Data, q: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return the vectors between the points of the loops, (3 L,) [m], and their Jacobians."""
+        """Return the distances by which loops are open, (3 L,) [m], and their Jacobians."""
         pin.computeJointJacobians(self.model, data, q)
         pin.updateFramePlacements(self.model, data)
         world, gaps, slopes = pin.LOCAL_WORLD_ALIGNED, [], []

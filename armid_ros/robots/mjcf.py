@@ -89,8 +89,8 @@ def _compiled(mujoco: ModuleType, path: Path, notes: list[str]) -> Any:
             body, file = geom.parent, missing[geom.meshname].file
             if not body.explicitinertial and geom.mass != 0.0 and geom.density != 0.0:  # noqa: RUF069 - as it is written
                 raise RobotError(
-                    f"{path}: the inertia of body '{body.name}' is that of the mesh {file}, which "
-                    f'is not in {folder}'
+                    f"{path}: the inertia of body '{body.name}' is computed from the mesh {file}, "
+                    f'which is not in {folder}'
                 )
             notes.append(f"link '{body.name}': mesh {file} not found; left out")
             spec.delete(geom)
@@ -153,7 +153,7 @@ class _Writer:
     def _link(
         self, body: int, parent: int, joints: list[int], parent_anchor: FloatArray
     ) -> FloatArray:
-        """Write a body with its joints; return the link frame in the body frame."""
+        """Write a MuJoCo body and its joints as URDF; return the link frame in the body frame."""
         model, name = self.model, self.bodies[body]
         placement = pin.SE3(_rotation(model.body_quat[body]), np.array(model.body_pos[body]))
         placement.translation = placement.translation - parent_anchor
@@ -193,7 +193,7 @@ class _Writer:
         slides = model.jnt_type[joint] == kinds.mjJNT_SLIDE
         if not slides and model.jnt_type[joint] != kinds.mjJNT_HINGE:
             raise RobotError(
-                f"{self.path}: joint '{name}' is a ball joint; hinges and slides work"
+                f"{self.path}: joint '{name}' is a ball joint; only hinges and slides can be used"
             )
         axis, dof = np.array(model.jnt_axis[joint]), int(model.jnt_dofadr[joint])
         reference = float(model.qpos0[model.jnt_qposadr[joint]])
@@ -355,7 +355,7 @@ def _place(element: ElementTree.Element, parent: str, child: str, placement: pin
 
 
 def _origin(element: ElementTree.Element, placement: pin.SE3) -> None:
-    """Write a placement; the angles keep all digits in gimbal lock."""
+    """Write the placement of an element in URDF; angles keep all digits in gimbal lock."""
     r = np.array(placement.rotation)
     roll = math.atan2(r[2, 1], r[2, 2])
     pitch = math.atan2(-r[2, 0], math.hypot(r[2, 1], r[2, 2]))

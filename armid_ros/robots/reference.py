@@ -80,7 +80,7 @@ class Reference:
                 )
         if not self.t[0] >= 0.0:
             raise TrajectoryError(
-                f'trajectory: its first time is {self.t[0]} s; it has to be 0 or later'
+                f'trajectory: its first time is {self.t[0]} s, but has to be 0 or later'
             )
         late = np.flatnonzero(~((np.diff(self.t) > 0.0) & np.isfinite(self.t[1:])))
         if len(late):
@@ -191,7 +191,7 @@ class Reference:
 
     def after(self, q: FloatArray, dq: FloatArray, ddq: FloatArray) -> Reference:
         """
-        Return the reference with a waypoint added at time zero, at the position of the arm.
+        Return the reference preceded by a waypoint at time zero, at the position of the arm.
 
         The time of the first point has to be later than zero.
 

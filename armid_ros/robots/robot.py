@@ -154,7 +154,7 @@ class Robot:
         return self.moving[int(np.argmax(reach[1:]))]
 
     def slides(self, joint: str) -> bool:
-        """Return whether a driven or moving joint is prismatic."""
+        """Return whether a joint, driven or moving, is prismatic."""
         own = self if joint in self.joints else self.tree
         return bool(own.prismatic[own.index(joint)])
 
@@ -166,7 +166,7 @@ class Robot:
 
     @cached_property
     def tree(self) -> Robot:
-        """The robot with all moving joints as driven ones; itself if no joints are coupled."""
+        """The robot whose driven joints are all moving joints; itself if no joints are coupled."""
         if self.mechanism is None:
             return self
         own = [self.description.by_name[name] for name in self.moving]

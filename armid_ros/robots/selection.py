@@ -176,7 +176,7 @@ def leaders(
     description: Description, joint: Joint, stop: Collection[str], above: tuple[str, ...] = ()
 ) -> tuple[dict[str, float], float]:
     """
-    Return the position of a joint as a sum over the joints that it follows.
+    Return which joints a joint follows, as a sum that gives its position.
 
     Parameters
     ----------
@@ -220,7 +220,7 @@ def leaders(
 
 
 def _free(description: Description) -> list[Joint]:
-    """Return the joints that can be driven."""
+    """Return the joints that a user can drive."""
     passive = description.passive
     return [j for j in description.movable() if not j.mimic and j.name not in passive]
 

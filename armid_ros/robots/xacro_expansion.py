@@ -78,19 +78,19 @@ def expand_xacro(path: Path, arguments: Mapping[str, str], packages: Mapping[str
             check=False,
         )
     except subprocess.TimeoutExpired as error:
-        raise RobotError(f'{path}: xacro: not expanded within {ELAPSED_LIMIT:g} s') from error
+        raise RobotError(f'{path}: xacro did not finish within {ELAPSED_LIMIT:g} s') from error
     except OSError as error:
         raise RobotError(f'{path}: xacro: cannot be started: {error.strerror}') from error
     if -done.returncode in (signal.SIGPROF, signal.SIGXCPU, signal.SIGKILL):
         raise RobotError(
-            f'{path}: xacro: not expanded within {TIME_LIMIT:g} s of processor time and '
+            f'{path}: xacro did not finish within {TIME_LIMIT:g} s of processor time and '
             f'{MEMORY_LIMIT >> 20} MiB'
         )
     answer: dict[str, Any] = {}
     with suppress(ValueError):  # the process ended without an answer
         answer = json.loads(done.stdout)
     if 'text' not in answer:
-        reason = answer.get('error') or f'not expanded within {MEMORY_LIMIT >> 20} MiB'
+        reason = answer.get('error') or f'did not finish within {MEMORY_LIMIT >> 20} MiB'
         raise RobotError(f'{path}: xacro: {reason}')
     return str(answer['text'])
 

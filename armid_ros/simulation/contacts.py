@@ -140,7 +140,7 @@ class Contacts:
         return -1 not in self.axes and len(set(self.axes)) == len(self.axes)
 
     def under(self, load: FloatArray) -> Contacts:
-        """Return the contacts under a torque of the rigid body, shape (n,) [N m]."""
+        """Return the contacts with friction levels for a rigid-body torque, shape (n,) [N m]."""
         if self.friction is None:
             return self
         more = self.friction.widening(load)

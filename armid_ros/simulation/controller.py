@@ -248,7 +248,9 @@ class MotorControl(Controller):
         """
         robot, springs = plant.robot, plant.springs
         if springs is None:
-            raise ModelError(f'{robot.name}: its joints are rigid; use ComputedTorque')
+            raise ModelError(
+                f'{robot.name} has no elastic joint; control its rigid joints with ComputedTorque'
+            )
         joints, e = springs.joints, len(springs.joints)
         link = np.diag(robot.inertia(robot.model.createData(), robot.middle_pose))
         rotor = np.array(np.diag(springs.rotors)[e:])

@@ -248,7 +248,8 @@ def multisine_course(
         here = there
     if not parts:
         raise TrajectoryError(
-            f'duration {duration:g} s: one experiment alone takes {samples / _RATE:.3g} s'
+            f'a duration of {duration:g} s is too short: one experiment alone takes '
+            f'{samples / _RATE:.3g} s'
         )
     q = np.vstack([*(part[0] for part in parts), still + here])
     tau = np.vstack([*(part[1] for part in parts), still])
@@ -296,14 +297,16 @@ def step_course(
         q += [there, there, there + step, there + step]
         number += 1
     if not number:
-        raise TrajectoryError(f'duration {duration:g} s: one step alone takes {times[-1]:.3g} s')
+        raise TrajectoryError(
+            f'a duration of {duration:g} s is too short: one step alone takes {times[-1]:.3g} s'
+        )
     return Reference(robot.joints, np.array(t), np.array(q))
 
 
 def _next_pose(
     robot: Robot, here: FloatArray, rng: np.random.Generator, clear: Clear, beyond: FloatArray
 ) -> FloatArray:
-    """Draw a pose to which a straight line is allowed, as is the given step beyond it."""
+    """Draw a pose which a straight line can reach, and in which the given step stays allowed."""
     middle = robot.middle_pose
     reach, tries = np.pi / 3.0, 1000  # largest distance from the middle [rad or m]; drawn poses
     lower = np.maximum(robot.lower, middle - reach)
@@ -323,6 +326,7 @@ def _finite(robot: Robot, limit: FloatArray, what: str) -> FloatArray:
     for joint, value in zip(robot.joints, limit, strict=True):
         if not np.isfinite(value):
             raise TrajectoryError(
-                f'joint {joint}: the description has no {what} limit to take a share of'
+                f'joint {joint}: the description has no {what} limit, but a share of it was '
+                'requested'
             )
     return limit

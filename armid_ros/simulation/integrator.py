@@ -122,7 +122,7 @@ def _stop(
     q_next: FloatArray,
     load: FloatArray | None,
 ) -> tuple[FloatArray, FloatArray, FloatArray, Modes]:
-    """Repeat the step with the joint stops that were reached."""
+    """Repeat the step with the joint stops that it reached."""
     robot, count = plant.robot, len(state.modes)
     at_upper, at_lower = q_next > robot.upper, q_next < robot.lower
     while True:
@@ -233,7 +233,7 @@ def _hold(
     modes: Modes,
     moved: FloatArray,
 ) -> None:
-    """Keep the positions of sticking motors exactly, without rounding errors."""
+    """Keep the positions of motors that stick exactly, without rounding errors."""
     e = len(springs.joints)
     for axis, mode in zip(plant.contacts.axes, modes, strict=True):
         if mode != 0 or axis < 0:

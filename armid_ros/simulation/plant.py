@@ -280,7 +280,7 @@ class Plant:
         return State(steps, t, position, velocity, acceleration, modes, memory, rotors)
 
     def weight(self, q: FloatArray, dq: FloatArray) -> FloatArray:
-        """Return the joint torques of gravity and of velocities, shape (n,) [N m]."""
+        """Return the joint torques due to gravity and velocities, shape (n,) [N m]."""
         if self.robot.mechanism is None:
             return np.asarray(pin.nonLinearEffects(self.robot.model, self.data, q, dq))
         return self.robot.inverse_dynamics(self.data, q, dq, np.zeros(len(q)))
@@ -298,7 +298,7 @@ class Plant:
     def resist(
         self, force: FloatArray, t: float, q: FloatArray, dq: FloatArray, memory: FloatArray
     ) -> None:
-        """Subtract the torques of smooth effects from torques on the motors, (n,) [N m]."""
+        """Subtract the torques of smooth effects from the torques on the motors, (n,) [N m]."""
         if self.constant is not None:
             force -= self.constant
         if self.torque is not None:

@@ -138,7 +138,7 @@ def record(
     """
     plant, sensors = arm.plant, arm.sensors
     if not rate > 0.0:
-        raise ModelError(f'a rate of {rate:g} Hz: samples per second have to be positive')
+        raise ModelError(f'the rate is {rate:g} Hz, but has to be positive')
     stride = whole_steps(1.0 / rate, plant.dt, f'a rate of {rate:g} Hz')
     curve = arm.start_on(
         reference if isinstance(reference, Reference) else Reference.of(reference)

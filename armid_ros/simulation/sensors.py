@@ -184,7 +184,7 @@ class RecentPast:
         return (tau[1:] + tau[:-1]) / 2 if self._plant.springs is None else tau[1:]
 
     def drop(self, count: int) -> None:
-        """Remove the last samples, which are of the last trace."""
+        """Remove the last samples, which the last trace added."""
         self._rows, self._steps = self._rows[:, :-count], self._steps - count
 
     def latest(self, ahead: int = 0) -> tuple[FloatArray, FloatArray, FloatArray]:

@@ -193,7 +193,7 @@ class SimulatedArm:
 
     def become(self, arm: ArmModel) -> None:
         """
-        Replace the arm model and keep the state, for example when the arm picks up a load.
+        Change the arm model without a change of state, as when the arm picks up a load.
 
         The controller keeps its model.
 
@@ -373,11 +373,11 @@ class SimulatedArm:
 
     @property
     def _row(self) -> int:
-        """Row of the targets for the present step."""
+        """Row of the targets that belongs to the present step."""
         return self._state.steps - self._first
 
     def _act(self) -> None:
-        """Return the torque of the controller for the present targets."""
+        """Return the torque that the controller applies for the present targets."""
         self._torque = command(self.plant, self._acting, self._state, self._targets, 0)
 
     def _look_ahead(self, commanded: FloatArray | None = None, steps: int = 1000) -> None:

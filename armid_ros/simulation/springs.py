@@ -91,7 +91,7 @@ class ElasticJoints:
 
     @cached_property
     def loose(self) -> bool:
-        """Whether any joint has free play."""
+        """Whether any joint has backlash."""
         return bool(np.any(self.transmission.gap))
 
     @classmethod

@@ -41,8 +41,8 @@ def temperature_course(text: str, n_joints: int, duration: float) -> Temperature
         values = np.broadcast_to(np.column_stack(columns), (len(t), n_joints))
     except ValueError:
         raise ModelError(
-            f"temperature '{text}': write 25, or 20:45:600 for 20 to 45 degC with a time constant "
-            f'of 600 s; with commas for each of {n_joints} joints'
+            f"temperature '{text}' cannot be read: write 25, or 20:45:600 for 20 to 45 degC with "
+            f'a time constant of 600 s; with commas for each of {n_joints} joints'
         ) from None
     return Temperatures(t, values)
 

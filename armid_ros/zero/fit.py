@@ -212,7 +212,7 @@ def _predicted(
 
 
 def _approached(rests: Sequence[Motion]) -> npt.NDArray[np.bool_]:
-    """Return a mask of readings after an approach; other readings only bound dry friction."""
+    """Return which readings follow an approach; the others only bound dry friction."""
     return np.concatenate([one.dq for one in rests]).astype(bool)
 
 

@@ -44,7 +44,7 @@ def plan_zero(
     seed: int = 0,
 ) -> ExcitationResult:
     """
-    Plan a tour of static poses, with a rest of `hold` [s] in each pose from each side.
+    Plan a tour with a rest of `hold` [s] in each pose after an approach from each free side.
 
     `seed` is the seed of the random poses. TrajectoryError: too few poses are free, or no tour
     is found.
@@ -119,7 +119,7 @@ def _poses(
 def _tour(
     planner: TransferPlanner, limits: Limits, poses: FloatArray, hold: float
 ) -> FourierTrajectory:
-    """Return the tour, without unreachable poses and without motions that are not free."""
+    """Return the tour through the poses that can be reached, without motions that are not free."""
     rate, smoothing = 20.0, 0.5  # [Hz], and standard deviation of the filter [s]
     # the filter moves the arm for three standard deviations at either end of a rest
     count = round((hold + 6.0 * smoothing) * rate)
@@ -140,7 +140,7 @@ def _tour(
         if not planner.fault(over):
             parts += [pose + bump * (over - pose), rest]
     if not np.array_equal(now, poses[0]):
-        raise TrajectoryError(f'no return path from the poses: {reason}')
+        raise TrajectoryError(f'no return path from the poses was found: {reason}')
     q = np.roll(np.concatenate(parts), count // 2, axis=0)  # begins and ends in a rest
     q = np.concatenate([q, np.tile(q[-1], (-len(q) % int(rate), 1))])  # whole seconds
     period = len(q) / rate

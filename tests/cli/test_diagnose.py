@@ -212,4 +212,4 @@ def test_ties_without_a_partner_are_refused(tmp_path) -> None:
         ['diagnose', 'bag', '--robot', 'exoskeleton_legs', '--out', str(tmp_path), '--tie', 'a=b'],
     )
     assert done.exit_code == 2
-    assert 'give both' in done.output
+    assert 'also needs --partner' in done.output

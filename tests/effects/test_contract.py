@@ -90,7 +90,7 @@ def test_a_shape_belongs_to_each_joint(robot, motion):
 
 @pytest.mark.parametrize(
     ('values', 'message'),
-    [([-1.0, 2.0], 'stribeck_velocity has to be from'), ([1.0, 2.0, 3.0], 'has size')],
+    [([-1.0, 2.0], 'stribeck_velocity has to be from'), ([1.0, 2.0, 3.0], 'have size')],
 )
 def test_impossible_shapes_are_named(robot, values, message):
     with pytest.raises(ModelError, match=message):
@@ -106,7 +106,7 @@ def test_impossible_shapes_are_named(robot, values, message):
         ('coupled_joint_friction@elbow_pitch', 'pairs'),
         ('gravity_magnitude@elbow_pitch', 'whole arm'),
         ('torque_crosstalk@elbow_pitch+elbow_pitch', 'same joint'),
-        ('joint_coupling@elbow_pitch+wrist_pitch+elbow_pitch+forearm_yaw', 'is first in two'),
+        ('joint_coupling@elbow_pitch+wrist_pitch+elbow_pitch+forearm_yaw', 'first joint of two'),
     ],
 )
 def test_errors_hold_the_answer(robot, text, message):

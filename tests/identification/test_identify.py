@@ -70,7 +70,7 @@ def test_a_resting_joint_is_named_and_the_others_are_identified(arm, structure):
     ('change', 'message'),
     [
         (lambda run: run.select(slice(0, 120)), 'too short; record'),
-        (lambda run: replace(run, q=0.0 * run.q), 'no motion'),
+        (lambda run: replace(run, q=0.0 * run.q), 'does not move'),
         (lambda run: replace(run, tau=None), 'no effort'),
         (lambda run: replace(run, tau=1e-309 * run.tau), 'constant'),
         (lambda run: replace(run, tau=-run.tau), 'opposite sign.*[Nn]egate'),

@@ -74,7 +74,10 @@ def hidden_change(arm: ArmModel, rng: np.random.Generator, hide: str = '') -> Ar
     fitting = [text for text in known if text.startswith(hide)]
     if not fitting:
         names = ', '.join(text.partition(':')[0] for text in known)
-        raise ModelError(f'--hide {hide}: give an effect as E@joint:k=v, or one of {names}')
+        raise ModelError(
+            f'--hide {hide}: no shipped change begins with this text; give one of {names}, or any '
+            'effect as NAME@joint:quantity=value'
+        )
     return arm.with_effect(*parse_effect(str(rng.choice(fitting)), arm.robot))
 
 
@@ -152,7 +155,7 @@ def outcome(changed: ArmModel, diagnosed: DiagnosisResult) -> str:
 
 
 def story(changed: ArmModel, diagnosed: DiagnosisResult) -> dict[str, Any]:
-    """Return the hidden effect, the verdict and whether it was found, for JSON."""
+    """Return a JSON document: hidden effect, verdict, and whether the effect was found."""
     effect = changed.effects[-1]
     return {
         'hidden': {
@@ -168,6 +171,6 @@ def story(changed: ArmModel, diagnosed: DiagnosisResult) -> dict[str, Any]:
 
 
 def _found(effect: Effect, diagnosed: DiagnosisResult) -> bool:
-    """Return whether the first finding is an effect, on the same joints."""
+    """Return whether the diagnosis names a given effect first, and on the same joints."""
     first = diagnosed.core.findings[:1]
     return any((one.name, one.joints) == (effect.name, effect.joints) for one in first)

@@ -73,14 +73,20 @@ def export(
     for name, kinds in _KINDS_OF.items():
         typed = context.get_parameter_source(name) is ParameterSource.COMMANDLINE
         if typed and kind not in kinds:
-            raise click.UsageError(f'--{name} belongs to --to {", ".join(kinds)}, not to {kind}')
+            raise click.UsageError(
+                f'--{name} can be used only with --to {", ".join(kinds)}, not with {kind}'
+            )
     if out.exists() and model.exists() and out.samefile(model):
-        raise OutputError(f'{out}: is the model itself; name another file with --out')
+        raise OutputError(
+            f'--out {out} is the model itself and would be overwritten; name another file'
+        )
     robot = None
     if robot_source is not None:
         robot = options.open_robot(robot_source, 'earth', joints)
     elif joints is not None:
-        raise click.UsageError('--joints needs a description: name it with --robot')
+        raise click.UsageError(
+            '--joints chooses joints of a description, but none is given: name it with --robot'
+        )
     arm = options.model_of(model, robot)
     notes: tuple[str, ...] = ()
     if kind in ('cpp', 'python'):
@@ -103,7 +109,7 @@ def export(
 
 
 def _left_out(where: str, lines: Sequence[str]) -> tuple[str, ...]:
-    """Return one note on omitted parts, with values in two digits; the file has all digits."""
+    """Return a note on the parts that a file omits; it has two digits of their values."""
     short = [
         re.sub(r'^\w+: (.+ = )(\S+)', lambda value: f'{value[1]}{float(value[2]):.2g}', line)
         for line in lines

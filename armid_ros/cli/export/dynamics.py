@@ -38,7 +38,10 @@ def torque_tables(arm: ArmModel) -> tuple[dict[str, npt.NDArray[Any]], tuple[str
 
     """
     if arm.robot.mechanism is not None:
-        raise ModelError(f'{arm.robot.name}: the code has no coupled joints; use its model.yaml')
+        raise ModelError(
+            f'{arm.robot.name} has coupled joints, which the code cannot represent; use its '
+            'model.yaml'
+        )
 
     def table_of(effect: Effect) -> str:
         attribute = effect.traits.mjcf_attribute
@@ -91,7 +94,7 @@ def torque_code(arm: ArmModel, language: str, source: str) -> tuple[str, tuple[s
 
 
 def _nested(values: Any, brackets: str, apart: str = ' ') -> str:
-    """Write nested lists in the brackets of a language; `apart` separates the outer elements."""
+    """Write nested lists with the brackets of a language; `apart` is between outer elements."""
     if not isinstance(values, list):
         return repr(values)
     apart = apart if isinstance(values[0], list) else ' '

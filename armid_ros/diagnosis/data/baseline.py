@@ -57,7 +57,7 @@ def described_precision(
     base: BaseParameters, arm: ArmModel, known: FloatArray | None = None
 ) -> FloatArray:
     """
-    Return the prior precision of the base parameters by the description, shape (r, r).
+    Return the precision of the prior that the description gives for the base parameters, (r, r).
 
     The prior standard deviation is about the described value: data change the parameters that
     they determine; the others keep values that predict other motions well. The standard

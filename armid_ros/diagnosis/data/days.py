@@ -18,7 +18,7 @@ import numpy.typing as npt
 @dataclass(frozen=True)
 class Rows:
     """
-    Weighted regression rows of the recordings of both days.
+    Weighted regression rows of both days: the baseline, and the diagnosed day.
 
     Attributes
     ----------
@@ -43,7 +43,7 @@ class Rows:
 
     @classmethod
     def over_noise(cls, evidence: Evidence) -> Rows:
-        """Weight data of one day by their noise; discrepancies are in units of the rms torque."""
+        """Weight the data of one day by their noise; discrepancy is measured in rms torques."""
         torque = np.maximum(evidence.torque_rms, 1e-3 * evidence.torque_rms.max())
         amplitude = (torque,) * count_recordings(evidence.data)
         return cls(evidence.data, evidence.sigma, 0, amplitude).not_below_rounding()
@@ -65,12 +65,12 @@ class Rows:
 
     @cached_property
     def today(self) -> npt.NDArray[np.bool_]:
-        """Return whether each recording is of the diagnosed day, (K,)."""
+        """Return which recordings are of the diagnosed day, shape (K,)."""
         return np.arange(max(part.fold for part in self.data) + 1) >= self.before
 
     @property
     def repeated(self) -> bool:
-        """Return whether the spread of values between recordings can be estimated."""
+        """Return whether there are enough recordings to estimate how values vary between them."""
         return 0 < self.before and len(self.today) > 2
 
     @cached_property

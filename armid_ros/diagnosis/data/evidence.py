@@ -38,7 +38,7 @@ _LOW_HZ, _HIGH_HZ = 4.0, (6.0, 12.0)
 @dataclass(frozen=True)
 class Evidence:
     """
-    Data, and the unit in which the gap is measured.
+    Data of a diagnosis, and the unit in which their gap is measured.
 
     Attributes
     ----------
@@ -60,7 +60,7 @@ class Evidence:
 
     @classmethod
     def over_noise(cls, data: Sequence[Trajectory], noise: Sequence[FloatArray]) -> Evidence:
-        """Return data in the unit of their noise, each (n,) [N m]."""
+        """Return data whose gap is measured in units of their noise, each (n,) [N m]."""
         return cls(tuple(data), tuple(noise), tuple(noise))
 
     @cached_property
@@ -75,7 +75,7 @@ class Evidence:
         return np.sqrt(self.power([part.torque for part in self.data]))
 
     def chi2_per_row(self, residual: Sequence[FloatArray]) -> FloatArray:
-        """Return the loss of each joint, the mean square of its weighted residual, shape (n,)."""
+        """Return the loss of each joint: its mean squared weighted residual, shape (n,)."""
         return self.power([rows / s for rows, s in zip(residual, self.sigma, strict=True)])
 
     def relative_errors(self, residual: Sequence[FloatArray]) -> FloatArray:
@@ -84,7 +84,7 @@ class Evidence:
         return np.asarray(np.sqrt(self.power(residual) / torque))
 
     def power(self, torque: Sequence[FloatArray]) -> FloatArray:
-        """Return the mean square of torques (M, n), of informative rows of each joint, (n,)."""
+        """Return the mean square of torques (M, n) over each joint's informative rows, (n,)."""
         squares = np.zeros_like(self.count)
         for part, rows in zip(self.data, torque, strict=True):
             squares += np.sum(rows**2, axis=0, where=part.informative)
@@ -102,7 +102,7 @@ class Evidence:
 
     def limits(self, residual: Sequence[FloatArray], settings: DiagnosisSettings) -> FloatArray:
         """
-        Return the largest mean squared weighted residual of each joint without a gap, shape (n,).
+        Return the largest mean squared weighted residual that is not a gap, for each joint, (n,).
 
         The noise and the residual each have one degree of freedom per independent row, so the
         ratio of their squares has an F distribution. A misfit, or assumed noise, may be larger by
@@ -121,12 +121,12 @@ class Evidence:
         return np.where(misfit, self.misfit_limit(settings), noise) + self.material_loss(settings)
 
     def misfit_limit(self, settings: DiagnosisSettings) -> FloatArray:
-        """Return the largest loss of each joint by the misfit in another motion, (n,)."""
+        """Return the largest loss that a known misfit causes in another motion, (n,)."""
         varies = np.ones_like(self.count) if self.varies is None else self.varies
         return np.asarray(settings.thresholds.same_fit * np.maximum(varies, 1.0))
 
     def material_loss(self, settings: DiagnosisSettings) -> FloatArray:
-        """Return the loss of a residual of just material size in each joint, (n,)."""
+        """Return the loss of each joint at which a residual begins to be material, shape (n,)."""
         unit = np.mean(np.square(self.sigma), axis=0)
         return np.asarray((settings.material * self.torque_rms) ** 2 / unit)
 
@@ -150,7 +150,7 @@ def torque_rms(data: Sequence[Trajectory]) -> FloatArray:
 @dataclass(frozen=True)
 class NoiseFloor:
     """
-    Noise of one trajectory.
+    Torque noise of each joint in one trajectory: in total, slow, and from row to row.
 
     Attributes
     ----------
@@ -290,7 +290,7 @@ def _in_informative_rows(
 
 def _assumed(trajectory: Trajectory, smooth: FloatArray) -> FloatArray:
     """
-    Return an upper estimate of the noise from second differences of rows, shape (n,) [N m].
+    Return an upper limit of the noise, from second differences of rows, shape (n,) [N m].
 
     The noise is taken as white in the band of the rows. The torque that a model lacks changes
     little from row to row, except for friction at reversals; rows next to reversals are not used.
@@ -309,7 +309,7 @@ def _assumed(trajectory: Trajectory, smooth: FloatArray) -> FloatArray:
 
 
 def _least(trajectory: Trajectory, arm: ArmModel) -> FloatArray:
-    """Return the lower limit of the noise of each torque, shape (n,) [N m]."""
+    """Return the smallest noise that each torque can have, shape (n,) [N m]."""
     assert trajectory.motion.tau is not None
     size = np.sqrt(np.mean(trajectory.motion.tau**2, axis=0))
     least = np.maximum(TORQUE_RESOLUTION * np.maximum(size, 1e-2 * size.max()), 1e-12)

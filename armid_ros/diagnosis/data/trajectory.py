@@ -82,7 +82,7 @@ class Trajectory:
 
     @cached_property
     def informative(self) -> npt.NDArray[np.bool_]:
-        """Return False where a joint rests or reverses, with unknown friction, shape (M, n)."""
+        """Return a mask: False where a joint rests or reverses with unknown friction, (M, n)."""
         return np.asarray(self.unsure <= self.allowed)
 
     def reduce(self, values: FloatArray) -> FloatArray:
@@ -196,7 +196,7 @@ def trajectories(
 
 def thinnable(used: Conditioning) -> Conditioning:
     """
-    Reduce the decimation of rows to a multiple of the decimation of columns.
+    Reduce the decimation of rows so that it is a multiple of the decimation of columns.
 
     Each row then spans a whole number of column samples; rows increase by at most an eighth.
 
@@ -207,7 +207,7 @@ def thinnable(used: Conditioning) -> Conditioning:
 
 def _widest(used: Conditioning) -> int:
     """
-    Return the largest decimation of a motion before its columns are computed.
+    Return the largest decimation that a motion permits before its columns are computed.
 
     Columns contain squares of velocities, whose band is twice the cut-off: the rate has to be four
     times the cut-off.
@@ -231,7 +231,7 @@ def _thinned(motion: Motion, used: Conditioning) -> tuple[Motion, Conditioning]:
 
 
 def _uncertain_share(motion: Motion, used: Conditioning, slowest: FloatArray) -> FloatArray:
-    """Return the share of each sample with an uncertain sign of velocity, inf at rest, (N, n)."""
+    """Return which share of a sample has an uncertain sign of velocity, inf at rest, (N, n)."""
     speed = np.abs(motion.dq)
     slow = speed < np.maximum(_REVERSAL_SPEED * speed.max(axis=0), slowest)
     slow[1:] |= np.diff(np.sign(motion.dq), axis=0) != 0
@@ -250,7 +250,7 @@ def _uncertain_share(motion: Motion, used: Conditioning, slowest: FloatArray) ->
 def block_rows(
     data: Sequence[Trajectory],
 ) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]:
-    """Return the block of every row, and the fold of every block."""
+    """Return the block to which every row belongs, and the fold to which every block belongs."""
     fold = fold_rows(data)
     block = np.empty(len(fold), dtype=np.intp)
     owner: list[int] = []
@@ -275,7 +275,7 @@ def count_recordings(data: Sequence[Trajectory]) -> int:
 
 
 def not_shown(data: Sequence[Trajectory], joints: Sequence[str]) -> tuple[str, ...]:
-    """Return the joints that never move, or have no informative row."""
+    """Return the joints that the data do not check: at rest, or without informative rows."""
     if not data:
         return ()
     shown = moving(part.motion for part in data)

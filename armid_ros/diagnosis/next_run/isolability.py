@@ -31,7 +31,7 @@ DISTINCT = 0.1
 @dataclass(frozen=True)
 class Isolability:
     """
-    Smallest detectable effects of a motion, and their differences.
+    Smallest effects that a motion makes detectable, and how well it distinguishes them.
 
     Attributes
     ----------
@@ -47,7 +47,7 @@ class Isolability:
 
     @property
     def seen(self) -> npt.NDArray[np.bool_]:
-        """Whether the motion shows each effect at a possible size, shape (E,)."""
+        """Whether the motion makes each effect visible at a possible size, shape (E,)."""
         return np.array([np.isfinite(one.size) for one in self.effects])
 
     def rivals(self, k: int) -> list[Detectable]:
@@ -83,7 +83,7 @@ class Isolability:
         ]
 
     def of_kinds(self) -> tuple[tuple[str, ...], FloatArray]:
-        """Return the names of visible effects, and the minimum of `apart` over joints, (K, K)."""
+        """Return visible effects by name, and the smallest `apart` of two names, (K, K)."""
         names = [one.name for one in self.effects]
         kinds = tuple(dict.fromkeys(np.array(names)[self.seen].tolist()))
         places = [np.flatnonzero(self.seen & (np.array(names) == kind)) for kind in kinds]

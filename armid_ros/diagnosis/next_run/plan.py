@@ -46,7 +46,7 @@ _SUFFICIENT_Z = 5.0
 @dataclass(frozen=True)
 class NextRun:
     """
-    A motion to run next.
+    The motion that the user should run next.
 
     Attributes
     ----------
@@ -107,7 +107,7 @@ class NextRun:
 
 
 class _Candidate(NamedTuple):
-    """A motion, a load of a second run, and the predicted separation of each pair of names."""
+    """A motion that may be run, a load for a second run, and its separation of pairs of names."""
 
     template: Template
     trajectory: FourierTrajectory
@@ -181,7 +181,7 @@ def next_run(
             refused.append(str(error))
             continue
         return NextRun(excitation, kind.name, load, separations)
-    raise TrajectoryError(f'no motion for the next run: {refused[-1]}')
+    raise TrajectoryError(f'no motion for the next run was found: {refused[-1]}')
 
 
 def _in_order(candidates: Sequence[_Candidate]) -> list[_Candidate]:

@@ -105,7 +105,7 @@ def _use_of_model(diagnosis: Diagnosis, model: str, worse: Sequence[str]) -> lis
 
 
 def _looks(finding: Finding, diagnosis: Diagnosis) -> list[str]:
-    """Return sentences on parts to inspect, for a cause and for each of its rivals."""
+    """Return sentences on the parts of a robot to inspect, for a cause and for its rivals."""
     steps = []
     own = Rival(finding.name, finding.joints)
     for one in (own, *finding.other_causes):

@@ -46,7 +46,7 @@ _BODY_SIZES = np.array([1.0, *3 * [0.1], *6 * [0.01]])
 @dataclass(frozen=True)
 class Causes:
     """
-    The causes that may be named, with their columns.
+    The causes that a diagnosis may name, with their columns.
 
     Attributes
     ----------
@@ -140,7 +140,7 @@ class Causes:
             yield from (one for one in members if (one.name, one.joints) not in self.fitted)
 
     def _divided(self, effect: Effect, singles: Sequence[Effect]) -> Iterator[Cause]:
-        """Yield a cause for each single effect; all columns are computed together."""
+        """Yield a cause for each single effect; columns of all effects are computed at once."""
         robot, start = self.nuisance.arm.robot, 0
         places: list[tuple[Effect, tuple[int, ...], list[int]]] = []
         for one in singles:
@@ -184,7 +184,7 @@ class Causes:
         self, effect: Effect, kept: tuple[int, ...], columns: Sequence[FloatArray]
     ) -> Cause | None:
         """
-        Make a cause from columns (M, n, p).
+        Make a cause from its columns (M, n, p).
 
         None if all are zero on the diagnosed day, or if an effect that rests never does.
 

@@ -64,21 +64,21 @@ class Cause:
 
     @property
     def key(self) -> tuple[str, tuple[str, ...], tuple[int, ...]]:
-        """Identity of the cause in any shape: name, joints and quantities."""
+        """Identity of the cause without its shape: name, joints and quantities."""
         return self.effect.name, self.effect.joints, self.kept
 
     def acts(self, today: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
-        """Return whether the cause acts in each recording or group: today, or on both days."""
+        """Return in which recordings or groups the cause acts: today, or on both days."""
         return np.ones_like(today) if self.always or self.effect.lasting else today
 
     def at(self, values: FloatArray, robot: Robot) -> NamedEffect:
-        """Return the effect with its fitted values; its other parameters are zero."""
+        """Return the effect with the fitted values of the cause; other parameters are zero."""
         whole = np.zeros(len(self.effect.parameters(robot)))
         whole[list(self.kept)] = values
         return NamedEffect(self.effect, self.kept, whole)
 
     def among(self, effect: Effect, values: npt.NDArray[np.intp], shapes: int) -> Cause:
-        """Return the cause with a subset of its values, for an effect on fewer joints."""
+        """Return the cause with some of its values only, for an effect on fewer joints."""
         return replace(
             self,
             effect=effect,
@@ -133,7 +133,7 @@ class NamedEffect:
 
 
 def room(effect: Effect, arm: ArmModel) -> tuple[FloatArray, FloatArray]:
-    """Return the bounds of values that are added to those of the arm, each (P,)."""
+    """Return the bounds of a change of the arm's values within the bounds of the effect, (P,)."""
     lower, upper = effect.bounds()
     there = {
         name: value

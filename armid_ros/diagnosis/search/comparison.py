@@ -53,7 +53,7 @@ _SAMPLED = 8
 @dataclass(frozen=True)
 class Result:
     """
-    Result of a comparison.
+    Result of a comparison of causes.
 
     Attributes
     ----------
@@ -106,7 +106,7 @@ class CauseComparison:
 
     @cached_property
     def usual(self) -> float:
-        """Return the usual spread of values between recordings."""
+        """Return how much values usually vary between recordings."""
         under = self._likeliest(self.nuisance)
         return usual_spread(self._causes_of(self.nuisance)[::_SAMPLED], self.nuisance, under)
 
@@ -117,7 +117,7 @@ class CauseComparison:
         return Result((), self.nuisance, look.under, look, effects)
 
     def begun(self, before: Result) -> Result:
-        """Return the refitted causes of another comparison that act on the whole arm."""
+        """Return another comparison's causes that act on the whole arm, refitted here."""
         accepted = tuple(trial for trial in before.accepted if not trial.effect.joints)
         nuisance = self.nuisance
         for one in before.nuisance.accepted:

@@ -110,7 +110,7 @@ class Explainer:
         return self._alone() if self.misfit is None else self._explain_change(self.misfit)
 
     def _alone(self) -> Explanation:
-        """Explain the gap of a model without a baseline or a known misfit."""
+        """Explain the gap of a model that has neither a baseline nor a known misfit."""
         prepared, settings = self.prepared, self.settings
         self.tell(0.2, 'what the model lacks')
         evidence = Evidence.over_noise(prepared.data, prepared.sigma)
@@ -182,7 +182,7 @@ class Explainer:
         )
 
     def _since(self, baseline: Baseline) -> Explanation:
-        """Explain the change since the baseline."""
+        """Explain what changed since the baseline."""
         prepared = self.prepared
         now, then = torque_rms(prepared.data), torque_rms(baseline.data)
         misfit = baseline.misfit * louder(now, then)
@@ -200,7 +200,7 @@ class Explainer:
         return replace(found, floor=OWN_MISFIT, misfit=misfit, notes=notes, untested=untested)
 
     def _changes(self, result: Result, evidence: Evidence, spread: float) -> Explanation:
-        """Explain a change relative to the unchanged model."""
+        """Explain a change of the arm, given the model without the change."""
         nuisance = replace(result.nuisance, accepted=())
         fitted = tuple(range(nuisance.rows.before + count_recordings(self.prepared.data)))
         setting = result.under.setting

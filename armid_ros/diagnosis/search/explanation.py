@@ -80,7 +80,7 @@ class Explanation:
 
     @property
     def measured(self) -> bool:
-        """Whether the floor is noise or an estimated misfit, and not a known misfit."""
+        """Whether the floor is noise or an estimate of the misfit, rather than a known misfit."""
         return self.floor in (NOISE, ESTIMATED)
 
     @property
@@ -100,7 +100,7 @@ class Explanation:
         return replace(self, fitted=fitted, steps=tuple(self.steps[k] for k in keep))
 
     def forgetting(self) -> Explanation:
-        """Return the explanation without the data and caches from its computation."""
+        """Return the explanation without the data and caches that were needed to compute it."""
         return replace(
             self,
             given=plain_arm(self.given),
@@ -193,7 +193,7 @@ def _unset(
     result: Result, unknown: Sequence[Effect], settings: DiagnosisSettings
 ) -> Iterator[Trial]:
     """
-    Yield friction and offsets without given values, which are fitted with every cause.
+    Yield friction and offsets whose values are not given; they are fitted with every cause.
 
     The odds of a nonzero value are the prior density at zero over the posterior density at zero
     (Dickey, The weighted likelihood ratio, 1971).

@@ -42,7 +42,7 @@ _RELATIVE_PRIOR_STD = 0.25
 @dataclass(frozen=True)
 class Nuisance:
     """
-    Columns of body, friction and discrepancy.
+    Regression columns of nuisance parameters: rigid body, friction and discrepancy.
 
     Attributes
     ----------
@@ -137,7 +137,7 @@ class Nuisance:
 
     @property
     def rank(self) -> int:
-        """Return the number of columns of the body."""
+        """Return the number of columns of the rigid body."""
         return self.base.rank
 
     @cached_property
@@ -183,7 +183,7 @@ class Nuisance:
 
     @cached_property
     def power(self) -> FloatArray:
-        """Sum of squares of the weighted residual of each recording, (K,)."""
+        """Sum of squares of the weighted residual, for each recording, (K,)."""
         return np.array([np.sum(own**2) for own in self.residual])
 
     def _among_accepted(self, cause: Cause) -> FloatArray:
@@ -192,7 +192,7 @@ class Nuisance:
         return np.concatenate(parts, axis=1)
 
     def _acting(self, cause: Cause) -> FloatArray:
-        """Return one for each recording in which an accepted cause acts, else zero, (K, 1, 1)."""
+        """Return 1 for each recording in which an accepted cause acts, otherwise 0, (K, 1, 1)."""
         return cause.acts(self.rows.today).astype(float)[:, np.newaxis, np.newaxis]
 
     def products(self, cause: Cause) -> FloatArray:
@@ -202,15 +202,15 @@ class Nuisance:
         return np.concatenate([cause.products, self._among_accepted(cause)], axis=1)
 
     def and_cause(self, cause: Cause, size: float = 1.0) -> Nuisance:
-        """Return the nuisance with one more cause, with a standard deviation over its unit."""
+        """Return the nuisance parameters with a cause added, with its deviation in its unit."""
         return replace(self, accepted=(*self.accepted, replace(cause, size=size)))
 
     def without(self, name: int) -> Nuisance:
-        """Return the nuisance without one of the accepted causes."""
+        """Return the nuisance parameters without one of the accepted causes."""
         return replace(self, accepted=(*self.accepted[:name], *self.accepted[name + 1 :]))
 
     def with_residual(self, residual: Sequence[FloatArray]) -> Nuisance:
-        """Return the nuisance with another weighted residual, (n, M) of each recording."""
+        """Return the nuisance parameters for another weighted residual, (n, M) per recording."""
         pairs = zip(self.columns, residual, strict=True)
         aims = np.array([x.reshape(-1, x.shape[2]).T @ y.ravel() for x, y in pairs])
         accepted = tuple(one.aimed_at(residual) for one in self.accepted)
@@ -232,7 +232,7 @@ class Nuisance:
     @cached_property
     def reach(self) -> FloatArray:
         """
-        Return the factor of the discrepancy in states that the first day did not visit, (n, f).
+        Return the factor of the discrepancy in states that the first day did not reach, (n, f).
 
         The misfit limits the discrepancy in visited states only. In other states, the
         discrepancy may be a share of the torque.
@@ -335,7 +335,7 @@ class Nuisance:
         return Marginal(setting, used, lower, values, evidence, loss, motion)
 
     def whole(self, under: Marginal) -> tuple[FloatArray, FloatArray]:
-        """Return the means of all parameters and their covariance; zero where not fitted."""
+        """Return means and covariance of all parameters; zero for those that are not fitted."""
         size = self.cross.shape[1]
         covariance = np.zeros((size, size))
         covariance[np.ix_(under.used, under.used)] = under.root.T @ under.root
@@ -377,7 +377,7 @@ class Nuisance:
 
     def lasting(self, under: Marginal, recordings: Sequence[int], least: float) -> float:
         """
-        Return the median correlation length of the residual [rows].
+        Return for how many rows the residual is correlated, the median over joints [rows].
 
         It is the sum of the correlations at all lags, up to the first one below 0.05.
 

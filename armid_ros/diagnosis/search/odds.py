@@ -139,7 +139,7 @@ class CauseInformation:
         return int(self.vector.shape[-1]) // len(self.today)
 
     def of_day(self, today: bool) -> CauseInformation:
-        """Return the information of one day: the diagnosed day or the baseline."""
+        """Return the information from the diagnosed day only, or from the baseline only."""
         of_it = self.today == today
         found = self._at(np.flatnonzero(np.repeat(of_it, self.size)))
         return replace(found, today=self.today[of_it])
@@ -153,7 +153,7 @@ class CauseInformation:
         return replace(self, matrix=matrix, vector=self.vector[..., kept])
 
     def apart(self, spread: float) -> list[FloatArray]:
-        """Return a root of the prior covariance of differences u_k, in a list; empty if none."""
+        """Return a root of the prior covariance of differences between recordings; or []."""
         if not spread:
             return []
         p, groups = self.size, len(self.today)
@@ -164,7 +164,7 @@ class CauseInformation:
         return [_block_diagonal(np.stack([root] * groups, axis=-3))]
 
     def there(self) -> FloatArray:
-        """Return a root of the prior covariance of values that act on both days (g0)."""
+        """Return a root of the prior covariance of values that are the same on both days (g0)."""
         return np.tile(THERE * np.eye(self.size), (len(self.today), 1))
 
 
@@ -282,7 +282,7 @@ def posteriors(
 
 
 def allowed(cause: Cause, fit: CauseFit, nuisance: Nuisance) -> float:
-    """Return the log ratio of posterior to prior probability within the bounds, value by value."""
+    """Return the log of posterior over prior probability within the bounds, for each value."""
     arm, kept = nuisance.arm, list(cause.kept)
     whole, std = np.zeros((2, len(cause.effect.parameters(arm.robot))))
     whole[kept], std[kept] = fit.values, fit.std

@@ -35,7 +35,7 @@ import numpy as np
 @dataclass(frozen=True)
 class Fitted:
     """
-    An arm with named effects at their posterior means.
+    Arm whose named effects have the means of their posteriors as values.
 
     Attributes
     ----------
@@ -95,7 +95,7 @@ class JointFit:
         known: FloatArray | None = None,
     ) -> JointFit:
         """
-        Return a fit in which the body is free and the residual is noise alone.
+        Return a fit with a free rigid body, in which the residual is only noise.
 
         Parameters
         ----------
@@ -171,12 +171,12 @@ class JointFit:
         return patched_arm(arm, named)
 
     def as_described(self) -> JointFit:
-        """Return the fit with the body fixed to the description."""
+        """Return the fit with the rigid body fixed to the description."""
         return replace(self, setting=replace(self.setting, body=0.0))
 
     def residual_of_day(self, fitted: Fitted) -> list[FloatArray]:
         """
-        Return the residual of the diagnosed day without body and discrepancy.
+        Return the residual of the diagnosed day minus the fitted body, friction and discrepancy.
 
         Returns
         -------
@@ -324,7 +324,7 @@ def fitted_parameters(
 
 
 def places(named: Sequence[NamedEffect]) -> list[tuple[range, range]]:
-    """Return the positions of values and of shapes of each effect among the fitted parameters."""
+    """Return where the values and shapes of each effect are among the fitted parameters."""
     found, start = [], 0
     for own in named:
         shapes = start + len(own.kept)

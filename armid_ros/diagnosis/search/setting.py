@@ -19,7 +19,7 @@ LASTING = 2.0
 @dataclass(frozen=True)
 class Setting:
     """
-    Amplitudes of the errors of the body, of discrepancy and of noise.
+    Sizes that are assumed for errors of the rigid body, for discrepancy and for noise.
 
     Attributes
     ----------

@@ -113,17 +113,17 @@ class Ranked:
 
     @property
     def worth(self) -> float:
-        """Log posterior probability up to a constant."""
+        """Log posterior probability of the cause, up to a constant."""
         return self.data + self.cause.prior
 
     @property
     def left(self) -> float:
-        """Half the sum of squares of the remaining weighted residual."""
+        """Half the sum of squares of the weighted residual that the cause leaves."""
         return self.under.loss - self.fit.explained
 
     def ahead(self, other: Ranked, levels: Thresholds) -> float:
         """
-        Return the log odds over another cause; positive if this one is likelier.
+        Return the log odds of this cause over another one; positive if this one is likelier.
 
         As torque laws are inexact, differences below the share `inexact` of the explained part, or
         below the share `same_fit` - 1 of the smaller residual, are ignored. So is the difference
@@ -143,7 +143,7 @@ class Ranked:
         return seen + (self.worth - self.fit.explained) - (other.worth - other.fit.explained)
 
     def is_same_law(self, other: Ranked, inexact: float) -> bool:
-        """Return whether two causes with one value have the same columns, but for a share."""
+        """Return whether two causes of one value have equal columns, except for a small share."""
         one, two = self.cause, other.cause
         if one.joints != two.joints or max(len(one.unit), len(two.unit)) > 1:
             return False
@@ -159,7 +159,7 @@ class Ranked:
 @dataclass(frozen=True)
 class Look:
     """
-    One comparison of all causes.
+    Result of one comparison of all causes.
 
     Attributes
     ----------

@@ -101,7 +101,7 @@ def headline(
 
 
 def predicted(explanation: Explanation, unseen: Evidence) -> Attribution:
-    """Return the gain of each cause on held-out data."""
+    """Return by how much each cause reduces the gap in held-out data."""
     fewer = [explanation.only(range(count)) for count in range(1, len(explanation.steps))]
     every = [explanation.reference, *(one.fitted for one in fewer), explanation.fitted]
     arms = [one.arm for one in every[: len(explanation.steps) + 1]]
@@ -110,7 +110,7 @@ def predicted(explanation: Explanation, unseen: Evidence) -> Attribution:
 
 
 def left_out(explanation: Explanation) -> Attribution:
-    """Return the cross-validated gain of each cause."""
+    """Return by how much each cause reduces the gap in cross-validation."""
     assert explanation.problem is not None
     linear = explanation.problem.linear(explanation.fitted.named)
     size = linear.cross.shape[1]

@@ -59,7 +59,7 @@ def _values(trial: Trial) -> tuple[FloatArray, FloatArray]:
 
 
 def on_outer_link(explanation: Explanation) -> Explanation:
-    """Return the explanation with each load on the outer one of two links that it may be on."""
+    """Return the explanation with each load on the outer link, if two links may carry it."""
     if explanation.problem is None:
         return explanation
     robot, steps, fitted = explanation.given.robot, explanation.steps, explanation.fitted
@@ -80,7 +80,7 @@ def on_outer_link(explanation: Explanation) -> Explanation:
 
 def as_bodies(explanation: Explanation) -> tuple[Explanation, tuple[str, ...]]:
     """
-    Return the explanation with physically consistent links, or unchanged with a note.
+    Return the explanation with physically consistent links; if impossible, unchanged with a note.
 
     A fit of base parameters may give impossible links. They are replaced by consistent links near
     the description with an equally good fit.
@@ -115,7 +115,7 @@ def as_bodies(explanation: Explanation) -> tuple[Explanation, tuple[str, ...]]:
 
 
 def _products(problem: JointFit, fitted: Fitted) -> tuple[FloatArray, float]:
-    """Return the products of the base columns and their target, and the number of rows."""
+    """Return the normal equations of the base columns and their target, and the number of rows."""
     nuisance, base = problem.nuisance, problem.nuisance.base
     rank = nuisance.rank
     then, now = (base.values(x.theta[: len(base.standard)]) for x in (problem.arm, fitted.arm))

@@ -104,7 +104,7 @@ class Finding:
 
     @property
     def rows(self) -> list[tuple[ParameterName, float, float, float]]:
-        """Parameters, values, deviations, and known values of the given model, 0 for a load."""
+        """Parameters, values, deviations, and values of the given model (0 for a load)."""
         given = (0.0,) * len(self.values) if self.weighs or not self.added_to else self.added_to
         return [
             (name, value, std, before if abs(before) > HALF_WIDTH * std else 0.0)
@@ -115,7 +115,7 @@ class Finding:
 
     @property
     def other_causes(self) -> tuple[Rival, ...]:
-        """Rivals without the same body on another link."""
+        """Rivals that are other causes, and not the same body on another link."""
         return tuple(rival for rival in self.rivals if not rival.same_body)
 
     @property
@@ -216,7 +216,7 @@ class Gap:
     @classmethod
     def of(cls, explanation: Explanation, unseen: Evidence | None) -> Gap:
         """
-        Measure the gap on held-out data, or on the fitted data if there are none.
+        Measure the gap on held-out data; if there are none, on the fitted data.
 
         Parameters
         ----------

@@ -267,7 +267,7 @@ def unlisted_laws(explanation: Explanation, settings: DiagnosisSettings) -> list
 
 def _instead(problem: JointFit, linear: Nuisance, law: Cause, levels: Thresholds) -> float:
     """
-    Return what a law explains beyond the named causes of its joint, over its limit.
+    Return what a law explains in addition to the named causes of its joint, over its limit.
 
     The law is fitted in place of these causes. At the limit it is as likely as they are, apart
     from the relative error of the laws of the catalogue.

@@ -214,7 +214,7 @@ def data_remarks(
 
 
 def _worn(found: Sequence[Finding], equal: Collection[str]) -> Iterator[str]:
-    """Yield a sentence on friction that changed at equal temperature, in the given joints."""
+    """Yield a sentence on each given joint whose friction changed, but not its temperature."""
     names, where = dict[str, None](), dict[str, None]()
     for one in found:
         kinds = [CATALOGUE[name] for name in (one.name, *one.ambiguous_with) if name in CATALOGUE]

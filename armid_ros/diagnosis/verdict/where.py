@@ -20,7 +20,7 @@ import numpy.typing as npt
 @dataclass(frozen=True)
 class Axis:
     """
-    The mean residual as a function of one quantity.
+    Mean residual of a joint as a function of one quantity.
 
     Attributes
     ----------
@@ -43,7 +43,7 @@ class Axis:
 @dataclass(frozen=True)
 class Where:
     """
-    The residual of one joint.
+    States in which the residual of one joint is large.
 
     Attributes
     ----------

@@ -121,7 +121,7 @@ def _refit(given_body: Excess | None, robot: Robot, floor: str) -> str:
 
 
 def larger(ratio: float) -> str:
-    """Format the ratio of two errors."""
+    """Write how many times larger one error is than another."""
     if ratio < 1.05:
         return 'a little larger than'
     return f'{ratio:.0f} times as large as' if ratio >= 100.0 else f'{ratio:.1f} times as large as'
@@ -219,7 +219,7 @@ def _subject(finding: Finding) -> str:
 
 
 def _change(finding: Finding) -> str:
-    """Return the change of an effect that the given model has in one joint, or ''."""
+    """Return how an effect of the given model changed in one joint; empty without it."""
     rows = _rows(finding)
     if len(finding.joints) != 1 or len(rows) != 1 or not rows[0][3]:
         return ''

@@ -76,23 +76,28 @@ class Obstacle:
             )
         if self.kind not in KINDS:
             raise TrajectoryError(
-                f"obstacle '{self.name}': no kind '{self.kind}'; there are {', '.join(KINDS)}"
+                f"obstacle '{self.name}': there is no kind '{self.kind}'; kinds are "
+                f'{", ".join(KINDS)}'
             )
         wanted = KINDS[self.kind]
         size = self.size or ((1.0,) if self.kind == 'mesh' else ())
         object.__setattr__(self, 'size', tuple(float(value) for value in size))
         if len(self.size) != len(wanted) or not all(0.0 < v < np.inf for v in self.size):
             raise TrajectoryError(
-                f"obstacle '{self.name}': the size of a {self.kind} is "
-                f'{", ".join(wanted) or "nothing"}, positive; got {self.size}'
+                f"obstacle '{self.name}': the size of a {self.kind} has to be "
+                f'{", ".join(wanted) or "nothing"}, in positive numbers; got {self.size}'
             )
         for name in ('position', 'rpy'):
             values = tuple(float(value) for value in getattr(self, name))
             object.__setattr__(self, name, values)
             if len(values) != 3 or not np.isfinite(values).all():
-                raise TrajectoryError(f"obstacle '{self.name}': {name} is 3 numbers, got {values}")
+                raise TrajectoryError(
+                    f"obstacle '{self.name}': {name} has to be 3 finite numbers, not {values}"
+                )
         if (self.kind == 'mesh') != (self.mesh is not None):
-            raise TrajectoryError(f"obstacle '{self.name}': a mesh, and only a mesh, has a file")
+            raise TrajectoryError(
+                f"obstacle '{self.name}': a mesh needs a file, and no other kind can have one"
+            )
 
     def geometry(self) -> coal.CollisionGeometry:
         """Return the shape in the frame of the obstacle."""

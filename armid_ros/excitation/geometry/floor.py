@@ -223,7 +223,8 @@ def find_floor(
             height = math.nan
         if not math.isfinite(height):
             raise TrajectoryError(
-                f"floor: a height above the origin of the base [m], or {NO_FLOOR}; not '{given}'"
+                f'floor has to be a height above the origin of the base [m], or {NO_FLOOR}, not '
+                f"'{given}'"
             )
         return Floor(height, up, 'given')
     if surroundings:
@@ -235,7 +236,7 @@ def find_floor(
     if reason:
         raise TrajectoryError(
             f'{robot.name}: {reason}, so its base plane is not its floor. Give the height of the '
-            f'floor above the origin of the base [m], --floor Z, or --floor {NO_FLOOR}'
+            f'floor above the origin of the base [m] with --floor Z, or give --floor {NO_FLOOR}'
         )
     return Floor(0.0, np.array([0.0, 0.0, 1.0]), 'base plane')
 

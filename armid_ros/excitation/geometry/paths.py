@@ -91,7 +91,7 @@ def find_path(
             f'on the straight line {blocked.first} and {blocked.second} come within '
             f'{blocked.distance:.4f} m'
         )
-    raise TrajectoryError(f'no free path to the trajectory was found: {reason}')
+    raise TrajectoryError(f'no path to the trajectory was found: {reason}')
 
 
 def clear_line(

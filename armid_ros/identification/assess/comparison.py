@@ -59,7 +59,7 @@ class ParameterChange:
 @dataclass(frozen=True)
 class GroupChange:
     """
-    Group of parameters, with the p-value of their common change.
+    Group of parameters that may change together, with the p-value of their common change.
 
     Attributes
     ----------
@@ -80,7 +80,7 @@ class GroupChange:
 @dataclass(frozen=True)
 class LoadChange:
     """
-    A load on one link.
+    Load on one link that explains the changes of the rigid body.
 
     Attributes
     ----------
@@ -108,7 +108,7 @@ class LoadChange:
 @dataclass(frozen=True)
 class ResidualChange:
     """
-    The residuals of two models in one joint.
+    Change of the residual of one joint between two models.
 
     Attributes
     ----------

@@ -198,7 +198,7 @@ def _worst(errors: FloatArray, fits: Sequence[Fit], result: Identification) -> _
 
 
 def _halves(result: Identification, word: Word, error: str) -> Fault:
-    """Grade by the error with which each half of the data predicts the other."""
+    """Grade an identification by how well each half of the data predicts the other."""
     training = Score.of(result.training).joint_relative_error_percent
     every = result.halves.joint_relative_error_percent
     text = f'torque error of one half of the data, predicted from the other: {error}'

@@ -63,7 +63,7 @@ class Hypothesis:
 
     @property
     def of_masses(self) -> bool:
-        """Whether a common factor of all masses would explain the data equally well."""
+        """Whether an error that all masses share would explain the data equally well."""
         return self.kind in ('gravity', 'scale', 'units')
 
     @property
@@ -283,7 +283,7 @@ def _in_degrees(robot: Robot, joint: int | None = None) -> Hypothesis:
 
 
 def _beyond_masses(factor: float) -> bool:
-    """Whether a factor is too far from 1 to be a common error of all masses."""
+    """Whether a torque factor is too far from 1 to be an error that all masses share."""
     return not 1.0 / LIMITS.torque_factor < factor < LIMITS.torque_factor
 
 

@@ -216,7 +216,7 @@ def _error(
 
 
 def _first(rows: Sequence[_Tested], ratio: str, before: PredictionError) -> Mistake:
-    """Return the mistake with the largest ratio, and equally likely ones of other kinds."""
+    """Return the likeliest mistake, and mistakes of other kinds that are equally likely."""
     value = attrgetter(ratio)
     first, *others = sorted(rows, key=value, reverse=True)
     likely = {first.hypothesis.kind: first.hypothesis}

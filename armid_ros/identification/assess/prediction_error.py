@@ -49,7 +49,7 @@ class PredictionError:
     off: float = 0.0
 
     def whole(self, robot: Robot) -> float:
-        """Return the larger of the errors of all prismatic and of all revolute joints."""
+        """Return the error of all prismatic or of all revolute joints, the larger of the two."""
         residual = self.joints * self.torque
         return max(
             float(np.linalg.norm(residual[own]) / np.linalg.norm(self.torque[own]))
@@ -59,7 +59,7 @@ class PredictionError:
 
     def gain(self, better: PredictionError) -> float:
         """
-        Return the likelihood ratio of another prediction, per independent sample.
+        Return the likelihood ratio by which another prediction is better, per independent sample.
 
         The likelihood ratio of models with unknown noise is multiplied by the ratio of the
         priors of their links. Errors are limited to the range from the floor to the torque itself.
@@ -68,7 +68,7 @@ class PredictionError:
         return self.of_data(better) * float(np.exp((self.off - better.off) / (2.0 * FREEDOM)))
 
     def of_data(self, better: PredictionError) -> float:
-        """Return the likelihood ratio without the priors of the links."""
+        """Return the likelihood ratio of the data alone, without the priors of the links."""
         before, after = (np.clip(x.joints, LIMITS.floor, 1.0) for x in (self, better))
         return float(np.prod(before / after))
 

@@ -220,7 +220,7 @@ def _stays(
     why: str,
     always: str,
 ) -> Fault:
-    """Return the fault of a channel that is constant for some time, or throughout."""
+    """Return the fault of a channel that stays constant for some time, or throughout."""
     when, remedy = 'throughout', always
     if run != (0, len(recording)):
         first, last = recording.t[run[0]], recording.t[run[1] - 1]
@@ -357,7 +357,7 @@ def held_elsewhere(
 
 
 def _elsewhere(joint: HeldJoint, lowest: float, highest: float, moves: bool, makes: str) -> str:
-    """Describe the position of a joint, its effect on the torque, and the remedy."""
+    """Describe where an undriven joint is, how that affects the torque, and the remedy."""
     name, unit = joint.name, joint.unit
     model = f'the model has it at {joint.position:.3g} {unit}'
     if not moves:

@@ -70,7 +70,7 @@ class ForwardScore:
 
     @property
     def worst(self) -> str:
-        """Format the largest position error and its joint."""
+        """Write the largest position error and its joint as text."""
         joint = int(np.argmax(self.position_error))
         return (
             f'{1e3 * self.position_error[joint]:.3g} m{self.units[joint]} ({self.joints[joint]})'
@@ -165,12 +165,12 @@ class ForwardValidation:
 
     @property
     def same(self) -> bool:
-        """Whether both models are the same, so that their errors are equal."""
+        """Whether both models are equal, so that they have equal position errors."""
         before = self.before
         return before is not None and np.array_equal(before.simulated, self.after.simulated)
 
     def errors(self) -> str:
-        """Return the largest error of the model, or of both models."""
+        """Return the largest position error of the model, or of both models."""
         if self.before is None or self.same:
             return self.after.worst
         return f'{self.before.worst} before, {self.after.worst} after'
@@ -189,7 +189,7 @@ class ForwardValidation:
         return tuple(name for name, more in zip(self.after.joints, grown, strict=True) if more)
 
     def comment(self) -> str:
-        """Return a sentence on joints whose error increased; '' if there are none."""
+        """Return a sentence on joints whose position error increased; empty if there are none."""
         return f'the error increased in {", ".join(self.worse)}' if self.worse else ''
 
     def document(self) -> dict[str, Any]:

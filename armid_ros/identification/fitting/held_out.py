@@ -208,7 +208,7 @@ def _windows(recordings: Sequence[Recording], samples: int) -> list[Recording]:
 def _shared(
     problem: Sequence[Sequence[Regression]], shorter: Sequence[Sequence[Regression]]
 ) -> list[Regression]:
-    """Return the rows of each recording that remain with a lower cut-off."""
+    """Return the rows of each recording that a lower cut-off also has."""
     # A lower cut-off removes more rows at the ends, while the arm starts and stops.
     result = []
     for parts, others in zip(problem, shorter, strict=True):
@@ -222,7 +222,7 @@ def _shared(
 
 
 def _as_good(losses: FloatArray, best: FloatArray) -> bool:
-    """Whether losses equal the smallest loss within one standard error or a tenth."""
+    """Whether losses are within one standard error, or a tenth, of the smallest loss."""
     # smallest gain, as a share of the error, for which a cut-off is lowered. Jitter and backlash
     # increase the error by a third or more on every tested machine.
     min_gain = 0.1

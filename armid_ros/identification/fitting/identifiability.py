@@ -180,7 +180,7 @@ def determined(
     arm: ArmModel, base: BaseParameters, problem: Sequence[Regression], method: Method
 ) -> tuple[BaseParameters, tuple[Regression, ...], Solution]:
     """
-    Fix parameters to the description if it is more certain than the data.
+    Fix parameters to their described values if these are more certain than the data.
 
     Parameters are fixed one at a time, as each fixed parameter makes the others more certain.
 
@@ -249,5 +249,5 @@ def base_spread(arm: ArmModel, base: BaseParameters) -> FloatArray:
 
 
 def near_deviation(robot: Robot) -> FloatArray:
-    """Return the prior standard deviation of rigid parameters, shape (10 n,)."""
+    """Return the prior standard deviation of rigid parameters about the description, (10 n,)."""
     return np.asarray(robot.described_spread.ravel() / np.sqrt(3.0))

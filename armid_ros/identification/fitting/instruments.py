@@ -194,7 +194,7 @@ class NoiseCheck:
 
     @property
     def consistent(self) -> bool:
-        """Whether the test is not significant."""
+        """Whether the test found no significant effect of encoder noise."""
         # significance of the test
         return self.p_value >= 0.05
 
@@ -205,7 +205,7 @@ class NoiseCheck:
 
     @property
     def harmless(self) -> bool:
-        """Whether the bias of every parameter is negligible against its standard deviation."""
+        """Whether the bias of every parameter is small against its standard deviation."""
         # smallest bias that matters, in standard deviations: it reduces 95 % intervals to 94 %
         return bool(np.max(np.abs(self.relative_bias), initial=0.0) < 0.25)
 

@@ -98,7 +98,7 @@ class NormalEquations:
         cls, problem: Sequence[Regression], weights: npt.NDArray[np.floating] | None = None
     ) -> NormalEquations:
         """
-        Sum up the rows of one or more stretches.
+        Compute the normal equations of one or more stretches.
 
         Parameters
         ----------
@@ -129,7 +129,7 @@ class NormalEquations:
         return NormalEquations(self.products + other.products, self.counts + other.counts)
 
     def restrict(self, columns: Sequence[int] | npt.NDArray[np.intp]) -> NormalEquations:
-        """Return the normal equations restricted to some columns."""
+        """Return the normal equations of some of the columns."""
         kept = np.append(np.asarray(columns, dtype=np.intp), self.rank)
         return NormalEquations(self.products[:, kept[:, np.newaxis], kept], self.counts)
 
@@ -321,7 +321,7 @@ def within(
     values: FloatArray, factor: FloatArray, bounds: tuple[FloatArray, FloatArray]
 ) -> FloatArray:
     """
-    Return the bounded fit whose predictions are nearest to those of the unbounded fit.
+    Return the fit within bounds whose predictions are nearest to those without bounds.
 
     Parameters
     ----------

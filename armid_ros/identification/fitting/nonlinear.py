@@ -97,7 +97,7 @@ def fit_values(
     solution: Solution | None = None,
 ) -> FittedValues:
     """
-    Fit base parameters, by Gauss-Newton if the torque is not linear in them.
+    Fit base parameters: one linear solution, or Gauss-Newton steps if effects make them nonlinear.
 
     Parameters
     ----------
@@ -146,7 +146,7 @@ def fit_values(
 
 def curved(before: ArmModel, after: ArmModel, motions: Sequence[Motion]) -> bool:
     """
-    Whether the torque is nonlinear in the parameters between two arms.
+    Whether the torque between two arms is nonlinear in their parameters.
 
     Parameters
     ----------
@@ -233,7 +233,7 @@ def torques(arm: ArmModel, recordings: Sequence[Recording], used: Conditioning) 
 def through(
     problem: Sequence[Regression], predicted: Torques, values: FloatArray
 ) -> tuple[Regression, ...]:
-    """Shift linear models so that they predict the torque at the given values."""
+    """Shift linear models so that they predict the exact torque at the given values."""
     return tuple(
         replace(part, constant=torque - part.columns @ values)
         for part, torque in zip(problem, predicted, strict=True)
@@ -347,7 +347,7 @@ class _State:
 
 
 def ungrouped(arm: ArmModel, base: BaseParameters) -> FloatArray:
-    """Return directions of the rigid parameters that change no base parameter, (10 n, k)."""
+    """Return changes of the rigid parameters that change no base parameter, (10 n, k)."""
     return np.asarray(scipy.linalg.null_space(base.grouping[:, : len(arm.robot.rigid_parameters)]))
 
 

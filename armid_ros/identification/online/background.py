@@ -24,7 +24,7 @@ Pieces = Generator[None, None, Result]
 
 
 def at_once(work: Pieces[Result]) -> Result:
-    """Run a job to its end; return the result."""
+    """Run all pieces of a job; return its result."""
     while True:
         try:
             next(work)

@@ -89,7 +89,7 @@ class Change:
 
     @property
     def reopened(self) -> FloatArray:
-        """Independent directions of all possible changes, rivals included, shape (P, k)."""
+        """Directions of all changes that are possible, rivals included, shape (P, k)."""
         columns = np.hstack([c.reopened for c in (self.candidate, *self.rivals)])
         columns = columns / np.linalg.norm(columns, axis=0)
         directions, size, _ = np.linalg.svd(columns, full_matrices=False)

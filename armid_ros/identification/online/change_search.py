@@ -228,7 +228,7 @@ class ChangeSearch:
         self.reset()
 
     def set_chance(self, chance: float) -> None:
-        """Set the false alarm probability; 0 disables detection."""
+        """Set the probability of a false alarm; 0 switches detection off."""
         self._chance = chance / (len(self._sizes) * len(_WINDOW_LENGTHS))
 
     def reset(self) -> None:
@@ -241,7 +241,7 @@ class ChangeSearch:
         self.interrupt()
 
     def interrupt(self) -> None:
-        """Begin a new stretch after an interruption."""
+        """Begin a new stretch of rows after an interruption of the stream."""
         self._blocks: deque[Block] = deque(maxlen=_WINDOW_LENGTHS[-1] + 1)
         self._waiting: deque[dict[int, tuple[FloatArray, FloatArray]]] = deque()
 

@@ -202,7 +202,7 @@ class ChangeWatch:
 
     def use(self, false_alarm_time: float | None, forgetting: float) -> None:
         """
-        Change settings and keep the estimate.
+        Use other settings, without loss of the estimate.
 
         Parameters
         ----------
@@ -218,7 +218,7 @@ class ChangeWatch:
         self._wider.forgetting = forgetting
 
     def interrupt(self) -> None:
-        """Begin a new stretch of rows after an interruption."""
+        """Begin a new stretch of rows after an interruption of the stream."""
         self._open = self._open or _Stretch(0.0)
         self._queue(None)
 
@@ -232,7 +232,7 @@ class ChangeWatch:
         self._estimator.update(*row.sample)
 
     def _among_all(self, directions: FloatArray) -> FloatArray:
-        """Extend directions by zeros for the nuisance parameters."""
+        """Extend directions of the parameters by zeros for the nuisance parameters."""
         more = len(self._wider.parameters) - self._count
         return np.vstack([directions, np.zeros((more, directions.shape[1]))])
 

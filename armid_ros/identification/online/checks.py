@@ -48,7 +48,7 @@ class StreamChecks:
 
     @property
     def silent(self) -> bool:
-        """Whether all torques have been constant so far."""
+        """Whether all torques have been constant since the start."""
         n = self._robot.n_joints
         return bool((self._gate.highest[-n:] <= self._gate.lowest[-n:]).all())
 

@@ -291,17 +291,20 @@ class OnlineIdentifier:
         for part in fields(settings):
             same = getattr(settings, part.name) == getattr(self.settings, part.name)
             if part.name not in self.CHANGEABLE and not same:
-                raise IdentificationError(f'{part.name} cannot change; restart the identification')
+                raise IdentificationError(
+                    f'{part.name} cannot change during the identification; restart it'
+                )
         if self._watch is None and settings.false_alarm_time is not None:
             raise IdentificationError(
-                'change detection was off from the start: restart the identification'
+                'change detection was off at the start and cannot begin now: restart the '
+                'identification'
             )
         check_forgetting(settings.forgetting)
         check_gap(settings.max_gap)
 
     def use(self, settings: OnlineSettings) -> None:
         """
-        Change settings and keep the estimate.
+        Use other settings, without loss of the estimate.
 
         Parameters
         ----------

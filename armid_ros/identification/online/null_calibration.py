@@ -181,7 +181,7 @@ class NullCalibration:
 
     def excess(self, ratios: FloatArray, strength: FloatArray, chance: float) -> FloatArray:
         """
-        Return the ratios of statistics to their critical values; 0 before calibration.
+        Return statistics divided by their critical values; 0 before the calibration.
 
         Model discrepancy has biased the parameters, so the critical values are larger for motion
         that is stronger than usual.

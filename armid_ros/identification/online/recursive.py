@@ -111,7 +111,8 @@ class RecursiveLeastSquares:
         self._noise = np.array(noise, dtype=np.float64)
         if self._noise.ndim != 1 or not np.all((self._noise > 0.0) & (self._noise < np.inf)):
             raise IdentificationError(
-                f'noise {self._noise}: has to be one finite standard deviation > 0 for each joint'
+                f'noise is {self._noise}, but has to be one finite standard deviation > 0 for '
+                'each joint'
             )
         self.noise_is_relative = scale_covariance
         count = len(parameters)
@@ -128,7 +129,7 @@ class RecursiveLeastSquares:
         return wider
 
     def restricted(self, count: int) -> RecursiveLeastSquares:
-        """Return the estimator of the first parameters, with zero for all others."""
+        """Return the estimator of the first parameters, with all others fixed to zero."""
         fewer = copy(self)
         fewer.parameters, fewer._start = self.parameters[:count], self._start[:count]
         root, right = self._root[:count, :count].copy('F'), self._root @ self._values
@@ -228,7 +229,7 @@ class RecursiveLeastSquares:
 
     def reopen(self, directions: FloatArray) -> None:
         """
-        Remove the information along some directions.
+        Forget the information on the parameters along some directions.
 
         Parameters
         ----------
@@ -353,5 +354,5 @@ def check_forgetting(factor: float) -> None:
     """Raise an error for a forgetting factor out of range."""
     if not MIN_FORGETTING <= factor <= 1.0:
         raise IdentificationError(
-            f'forgetting factor {factor}: has to be from {MIN_FORGETTING} to 1'
+            f'the forgetting factor is {factor}, but has to be from {MIN_FORGETTING} to 1'
         )

@@ -72,7 +72,7 @@ class RobustCovariance:
         self.interrupt()
 
     def interrupt(self) -> None:
-        """Begin a new stretch of rows after an interruption."""
+        """Begin a new stretch of rows after an interruption of the stream."""
         self._rows: FloatArray | None = None
         self._count = 0
 
@@ -99,7 +99,7 @@ class RobustCovariance:
 
     def reopen(self, directions: FloatArray, values: FloatArray) -> None:
         """
-        Allow for an unknown change of the parameters between earlier and later rows.
+        Assume an unknown change of the parameters between earlier and later rows.
 
         The last window, in which they may have changed, is left out. The torque of the change that
         fits best is subtracted from the torques of all earlier rows.

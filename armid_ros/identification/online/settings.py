@@ -54,7 +54,8 @@ class OnlineSettings:
         """Raise an error unless the time between false alarms is positive."""
         if self.false_alarm_time is not None and not self.false_alarm_time > 0.0:
             raise IdentificationError(
-                f'time between false alarms {self.false_alarm_time} s: has to be above 0'
+                f'the time between false alarms is {self.false_alarm_time} s, but has to be above '
+                '0'
             )
 
     def rows_per_second(self) -> float:
@@ -72,8 +73,8 @@ class OnlineSettings:
         rate = 40.0 * self.cutoff if self.row_rate is None else self.row_rate
         if not (np.isfinite(rate) and rate >= 2.0 * self.cutoff):
             raise IdentificationError(
-                f'{rate} rows per second: a cut-off frequency of {self.cutoff:g} Hz needs at '
-                f'least {2.0 * self.cutoff:g}'
+                f'{rate} rows per second are too few: a cut-off frequency of {self.cutoff:g} Hz '
+                f'needs at least {2.0 * self.cutoff:g}'
             )
         return rate
 

@@ -64,16 +64,18 @@ class PhysicalSettings:
     def __post_init__(self) -> None:
         """Check the values."""
         if self.total_mass is not None and not 0.0 < self.total_mass < np.inf:
-            raise IdentificationError(f'total mass {self.total_mass} kg: it has to be positive')
+            raise IdentificationError(
+                f'the total mass is {self.total_mass} kg, but has to be positive'
+            )
         if self.mass_range is not None and not 1.0 < self.mass_range < np.inf:
             raise IdentificationError(
-                f'a mass range of {self.mass_range:g}: it has to be a factor above 1'
+                f'the mass range is {self.mass_range:g}, but has to be a factor above 1'
             )
         for joint, (lower, upper) in self.boxes.items():
             if len(lower) != 3 or len(upper) != 3 or not np.all(np.less(lower, upper)):
                 raise IdentificationError(
-                    f"box of joint '{joint}': {tuple(lower)} has to be below {tuple(upper)} "
-                    'along x, y and z'
+                    f"box of joint '{joint}': its lower corner {tuple(lower)} has to be below its "
+                    f'upper corner {tuple(upper)} along x, y and z'
                 )
 
 
@@ -320,7 +322,7 @@ def _bodies(
 
 
 def _walls_reached(parameters: FloatArray, box: Box) -> list[str]:
-    """Return the active limits of the box of a link with ten inertial parameters."""
+    """Return which limits of its box a link with ten inertial parameters reaches."""
     width = box[1] - box[0]
     largest = np.concatenate([width, width, 0.25 * width**2]) * parameters[0]
     near = box_conditions(box) @ parameters < _ACTIVE_SHARE * largest

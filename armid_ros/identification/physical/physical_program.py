@@ -138,8 +138,9 @@ class PhysicalProgram:
         ).solve()
         if str(solution.status) not in ('Solved', 'AlmostSolved'):
             raise IdentificationError(
-                f'no physically consistent parameters: the solver ends with {solution.status}; '
-                'check the total mass and the boxes of the links against each other'
+                'no physically consistent parameters were found, as the solver ended with '
+                f'{solution.status}; check whether the total mass and the boxes of the links '
+                'contradict each other'
             )
         theta = origin + change @ np.array(solution.x[:size])
         theta[rigid:] = np.clip(theta[rigid:], self.lower, self.upper)

@@ -38,7 +38,9 @@ MAX_MAGNITUDE = 1e6
 def check_gap(samples: int) -> None:
     """Raise an error for a largest gap below 1 sample."""
     if samples < 1:
-        raise IdentificationError(f'largest gap of {samples} samples: has to be at least 1')
+        raise IdentificationError(
+            f'the largest gap is {samples} samples, but has to be at least 1'
+        )
 
 
 class TripleLag:
@@ -74,7 +76,7 @@ class TripleLag:
 
     def update(self, dt: float, signal: FloatArray) -> FloatArray:
         """
-        Advance by one sample.
+        Filter the next sample of a stack of signals.
 
         Parameters
         ----------
@@ -185,7 +187,9 @@ class CausalFilter:
         measured_velocity: bool = False,
     ) -> None:
         if not (np.isfinite(cutoff) and cutoff > 0.0):
-            raise IdentificationError(f'cut-off frequency {cutoff} Hz: has to be above 0')
+            raise IdentificationError(
+                f'the cut-off frequency is {cutoff} Hz, but has to be above 0'
+            )
         check_gap(max_gap)
         self._n_joints = n_joints
         self._cutoff = cutoff
@@ -202,7 +206,7 @@ class CausalFilter:
         self._begin()
 
     def restart(self, reason: str) -> None:
-        """Begin a new stretch after an interruption."""
+        """Begin a new stretch of samples after an interruption of the stream."""
         self.restarts[reason] += 1
         self._begin()
 

@@ -95,8 +95,8 @@ def resting(robot: Robot, source: str, ranges: FloatArray) -> tuple[str, ...]:
     names = [name for name, size in zip(robot.joints, ranges, strict=True) if size < REST_RANGE]
     if len(names) == robot.n_joints:
         raise IdentificationError(
-            f'{source}: no motion, every joint stays within {REST_RANGE} rad; '
-            'record the arm while it follows an excitation'
+            f'{source}: the arm does not move: every joint stays within {REST_RANGE} rad; record '
+            'the arm while it follows an excitation'
         )
     if names:
         return (
@@ -138,14 +138,14 @@ def check_torque(
         if np.all(factors < 0.0):
             raise IdentificationError(
                 f'{source}: torques of {joints} have the opposite sign of what the description '
-                'takes; positive is along the URDF joint axis. Negate them: --effort-scale -1, or '
-                'without that option if it is given'
+                'predicts; positive is along the URDF joint axis. Negate them with --effort-scale '
+                '-1, or leave that option out if it is given'
             )
         for unit, factor in TORQUE_UNITS.items():
             if np.all((factors > 0.5 * factor) & (factors < 2.0 * factor)):
                 raise IdentificationError(
                     f'{source}: torques of {joints} are {factor:g} times what the description '
-                    f'takes; they seem to be in {unit}: convert them to N m'
+                    f'predicts; they seem to be in {unit}: convert them to N m'
                 )
     driven = driven_by_friction(robot, motions)
     if driven:

@@ -130,7 +130,7 @@ def _suspects(
     t: FloatArray, x: FloatArray, floor: FloatArray
 ) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.bool_], ErrorModel]:
     """
-    Compare all samples with the straight lines through the two samples before.
+    Find samples that are off the straight line through the two samples before them.
 
     Returns the first sample of the stretch of each sample, (N,), whether a signal of a sample is
     off its line by more than the largest allowed error, (N,), and the usual error in the noisiest

@@ -345,7 +345,7 @@ def held_samples(
     arm: ArmModel, motion: Motion
 ) -> tuple[npt.NDArray[np.bool_], npt.NDArray[np.bool_]]:
     """
-    Return the samples of joints with dry friction whose friction is unknown.
+    Return at which samples dry friction holds a joint, so that its friction is unknown.
 
     Returns
     -------
@@ -374,7 +374,7 @@ def held_samples(
 
 def bridged(values: FloatArray, unsure: npt.NDArray[np.bool_]) -> FloatArray:
     """
-    Interpolate values of each joint linearly across its samples with unknown friction.
+    Interpolate values of each joint across its samples whose friction is unknown.
 
     Parameters
     ----------

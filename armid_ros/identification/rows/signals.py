@@ -70,9 +70,11 @@ class SignalSettings:
     def __post_init__(self) -> None:
         """Raise an error for a cut-off or decimation out of range."""
         if self.cutoff_hz is not None and not self.cutoff_hz > 0.0:
-            raise IdentificationError(f'cut-off {self.cutoff_hz} Hz: it has to be positive')
+            raise IdentificationError(
+                f'the cut-off is {self.cutoff_hz} Hz, but has to be positive'
+            )
         if self.decimation is not None and self.decimation < 1:
-            raise IdentificationError(f'decimation {self.decimation}: it has to be 1 or more')
+            raise IdentificationError(f'decimation is {self.decimation}, but has to be 1 or more')
 
 
 @dataclass(frozen=True)
@@ -223,7 +225,7 @@ def segments(recording: Recording, used: Conditioning) -> Iterator[Motion]:
 
 
 def unbroken(recording: Recording, rate: float) -> list[npt.NDArray[np.intp]]:
-    """Return the indices of the samples of every stretch without a gap."""
+    """Return the samples of every stretch without a gap, by their indices."""
     longest = GAP_PERIODS * max(1.0 / rate, recording.period)
     breaks = np.flatnonzero(np.diff(recording.t) > longest) + 1
     return np.split(np.arange(len(recording.t)), breaks)

@@ -21,7 +21,7 @@ Moment = tuple[float, FloatArray]
 
 @dataclass
 class _Part:
-    """Joints of a sender, and those of its samples that are still needed, shape (s, k)."""
+    """Joints that one sender sends, and its samples that are still needed, shape (s, k)."""
 
     joints: tuple[int, ...]
     samples: deque[Moment] = field(default_factory=lambda: deque(maxlen=1000))
@@ -41,11 +41,11 @@ class _Part:
         self.samples.append((t, values))
 
     def reaches(self, t: float) -> bool:
-        """Return whether the samples of the sender reach a time."""
+        """Return whether the sender has samples up to a time."""
         return bool(self.samples) and self.samples[-1][0] >= t
 
     def at(self, t: float) -> FloatArray | None:
-        """Return the interpolated values at a time; None if no sample is near."""
+        """Return the sender's values interpolated at a time; None if no sample is near."""
         while len(self.samples) > 1 and self.samples[1][0] <= t:
             self.samples.popleft()
         first, values = self.samples[0]
@@ -151,7 +151,7 @@ def joint_places(joints: Sequence[str], names: Sequence[str]) -> npt.NDArray[np.
     missing = [joint for joint in joints if joint not in names]
     if missing:
         raise RecordingError(
-            f'joint states without {", ".join(missing)}; they name '
+            f'joint states do not contain {", ".join(missing)}; they name '
             f'{", ".join(names) or "no joints"}'
         )
     twice = [joint for joint in joints if list(names).count(joint) > 1]

@@ -171,7 +171,7 @@ class SpikeGate:
 
     def settle(self) -> bool:
         """
-        Update the usual errors if a window is nearly complete; return whether it was.
+        Update the usual errors if a window is almost full; return whether it was.
 
         Otherwise `take` does so with the sample that completes the window. A stream calls this
         with a sample that needs no other work.
@@ -186,7 +186,7 @@ class SpikeGate:
         curvature: FloatArray | float = 0.0,
     ) -> None:
         """
-        Begin within a recording whose usual errors are known.
+        Begin within a recording; its usual errors are known.
 
         Parameters
         ----------
@@ -321,7 +321,7 @@ class SpikeGate:
         return []
 
     def _release(self) -> list[StreamSample]:
-        """Pass on the held samples, which are valid; check them for damaged samples again."""
+        """Pass on samples that were held back and are valid; check them for damage again."""
         held, self._pending = self._pending, []
         innovations = self._lines_through(held)
         steady = ~self._pulsing

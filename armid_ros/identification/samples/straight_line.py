@@ -80,7 +80,7 @@ class Excursion:
 @dataclass(frozen=True, eq=False)
 class ErrorModel:
     """
-    Usual prediction errors of a stream.
+    Prediction errors that undamaged samples of a stream usually have.
 
     Attributes
     ----------
@@ -101,7 +101,7 @@ class ErrorModel:
     quantile: float
 
     def growth(self, noise: Factor, acceleration: Factor) -> FloatArray:
-        """Return the growth of the errors over other times, shape (m,) or (N, m)."""
+        """Return by which factor errors grow over other times, shape (m,) or (N, m)."""
         squares = acceleration**2
         return np.asarray(np.sqrt(squares + self.white * (noise**2 - squares)))
 
@@ -132,7 +132,7 @@ class ErrorModel:
 
 class Innovation(NamedTuple):
     """
-    Prediction error of one sample.
+    Error with which one sample was predicted.
 
     Attributes
     ----------
@@ -276,7 +276,7 @@ class NoiseLevel:
         self._window.append((innovation, move))
 
     def settle(self, period: float, count: int = WINDOW) -> bool:
-        """Update the usual error if a number of errors is known; return whether it was."""
+        """Update the usual error if enough errors are known; return whether they were."""
         if len(self._window) < count:
             return False
         innovations, moves = zip(*self._window, strict=True)

@@ -206,7 +206,7 @@ def band_of_motion(
 
 
 def _white(signals: FloatArray) -> FloatArray:
-    """Return the standard deviation of white noise in signals of shape (N, n)."""
+    """Return the standard deviation of the white noise in signals of shape (N, n)."""
     # order of the differences from which noise is computed
     order = 6
     # Differences of high order remove a densely sampled motion.

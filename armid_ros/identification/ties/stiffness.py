@@ -170,7 +170,9 @@ def _least_squares(problem: InteractionProblem, columns: FloatArray) -> FloatArr
     # the spring is not extended if its RMS torque per stiffness [m^2] is smaller
     if not np.all(springs > 1e-9 * np.sqrt(len(w))):
         name = problem.segments[int(np.argmin(springs))]
-        raise IdentificationError(f'{name}: its spring is never extended: not identifiable')
+        raise IdentificationError(
+            f'{name}: its spring is never extended, so its stiffness is not identifiable'
+        )
     y = problem.tau - problem.known
     return np.asarray(np.linalg.lstsq(w / scale, y.ravel(), rcond=None)[0] / scale)
 

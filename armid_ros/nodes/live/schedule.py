@@ -110,7 +110,7 @@ class LiveDiagnosis:
 
     @property
     def due(self) -> bool:
-        """Return whether the motion since the last request is long enough."""
+        """Return whether enough motion followed the last request."""
         if self.learning or not self._holds(self.settings.shortest):
             return False
         return self.window.moved - self._asked_at >= self._next

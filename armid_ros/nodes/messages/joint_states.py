@@ -137,7 +137,7 @@ class JointStateReader:
         if len(field) != len(names):
             hint = '; identification needs measured torque' if name == 'effort' else ''
             raise RecordingError(
-                f'joint states with {len(names)} names but {len(field)} of {name}{hint}'
+                f'joint states have {len(names)} names but {len(field)} values of {name}{hint}'
             )
         return field[self._order]
 
@@ -147,6 +147,6 @@ class JointStateReader:
         if not math.isfinite(sum(values.tolist())) and not np.all(np.isfinite(values)):
             bad = int(np.argmin(np.isfinite(values)))
             raise RecordingError(
-                f"joint states where the {name} of '{self._joints[bad]}' is not a number"
+                f"joint states contain a {name} of '{self._joints[bad]}' that is not a number"
             )
         return values

@@ -36,7 +36,7 @@ SHUTDOWN_TIMEOUT = 20.0
 @contextmanager
 def steady() -> Iterator[None]:
     """
-    Use one linear algebra thread, and exclude existing objects from garbage collection.
+    Limit linear algebra to one thread, and exclude existing objects from garbage collection.
 
     For matrices of a hundred rows, the synchronisation of threads takes longer than the
     computation: 20 ms instead of 0.2 ms if the second core is busy. A garbage collection of the
@@ -154,7 +154,7 @@ def _made(make_node: Callable[[], ArmidNode], args: Sequence[str] | None) -> Arm
         raise ParameterError(unreadable(error)) from error
     others = remove_ros_args(['', *own])[1:]
     if others:
-        raise ParameterError(f'{" ".join(others)}: no ROS arguments; {_SYNTAX}')
+        raise ParameterError(f'{" ".join(others)}: these are not ROS arguments; {_SYNTAX}')
     node = make_node()
     node.warn_of_unknown()
     return node

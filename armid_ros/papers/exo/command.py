@@ -90,7 +90,9 @@ def exo(
     pair, gait = leg_pair(stiffness), read_gait(gait_file)
     names = topics.split(',')
     if len(names) != 2:
-        raise ModelError(f'--topics {topics}: give two topics, of the machine and of its wearer')
+        raise ModelError(
+            f'--topics {topics}: two topics are needed, one of the machine and one of its wearer'
+        )
     if bag is None:
         require_new(out / 'recording')
     staged = options.stage(out, work.SCHEMA)

@@ -57,7 +57,7 @@ class Slack:
 
 def find_slack(problem: Callable[[float], InteractionProblem]) -> Slack:
     """
-    Fit one slack of all ties, together with their stiffnesses.
+    Fit one slack that all ties (straps) share, together with their stiffnesses.
 
     Parameters
     ----------
@@ -239,7 +239,7 @@ class OnlineInteraction:
         n = robot.n_joints
         if len(self._own.t) < 2 or len(self._far.t) < 2:
             raise IdentificationError(
-                f'{robot.name} and {other.name}: joint states of both are needed'
+                f'joint states of both {robot.name} and {other.name} are needed'
             )
         begin = self._own.t[0]
         rows = np.array(self._own.rows)

@@ -45,7 +45,7 @@ LOAD = 0.3
 @dataclass(frozen=True, eq=False)
 class PaperTable:
     """
-    One table of the paper.
+    One table of the paper, as published.
 
     Attributes
     ----------
@@ -77,7 +77,7 @@ class PaperTable:
 
     @property
     def uniform(self) -> bool:
-        """Whether noise and error are mean absolute values."""
+        """Whether noise and errors of the table are mean absolute values."""
         return self.number == 6
 
     @property
@@ -150,7 +150,7 @@ class MethodErrors:
 @dataclass(frozen=True, eq=False)
 class Repeated:
     """
-    Reproduction of one table.
+    Result of the reproduction of one table.
 
     Attributes
     ----------
@@ -184,7 +184,7 @@ class Repeated:
 @dataclass(frozen=True)
 class Composite:
     """
-    One minimal gravity parameter.
+    One gravity parameter of the paper's minimal set.
 
     Attributes
     ----------

@@ -39,8 +39,8 @@ def joint_state_blocks(bag: Bag, topic: Topic) -> Iterator[MessageBlock]:
     where = f'{bag.path}: {topic.name}'
     if topic.encoding != 'cdr':
         raise RecordingError(
-            f"{where} is serialised as '{topic.encoding}'; CDR of ROS 2 can be read: record it "
-            'with ros2 bag record'
+            f"{where} is serialised as '{topic.encoding}', and only CDR of ROS 2 can be read: "
+            'record again with ros2 bag record'
         )
     if not _standard(topic.message_type):
         raise RecordingError(

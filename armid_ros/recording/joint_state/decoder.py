@@ -217,13 +217,13 @@ class _Plan:
 
     @classmethod
     def make(cls, layout: JointStateLayout, length: int, wanted: Sequence[str]) -> _Plan:
-        """Find the columns of the requested joints."""
+        """Make a plan: find the columns of the requested joints."""
         if len(set(layout.names)) != len(layout.names):
             raise MalformedMessage(f'a joint is named twice: {", ".join(layout.names)}')
         for name, count in zip(QUANTITIES, layout.counts, strict=True):
             if count not in (0, len(layout.names)):
                 raise MalformedMessage(
-                    f'{count} values of {name} for {len(layout.names)} joint names'
+                    f'there are {count} values of {name} for {len(layout.names)} joint names'
                 )
         joints = tuple(name for name in wanted if name in layout.names)
         columns = [layout.names.index(name) for name in joints]

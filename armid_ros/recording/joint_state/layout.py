@@ -73,7 +73,7 @@ class JointStateLayout:
             position = _align(_FRAME_OFFSET + 4 + frame_length, 4)
             (count,) = struct.unpack_from(order + 'I', cdr, position)
             if count > len(cdr):
-                raise MalformedMessage(f'{count} joint names in {len(cdr)} bytes')
+                raise MalformedMessage(f'{count} joint names cannot fit into {len(cdr)} bytes')
             position += 4
             names: tuple[str, ...] = ()
             for _ in range(count):
@@ -92,7 +92,9 @@ class JointStateLayout:
             raise MalformedMessage(f'not a JointState: {error}') from error
         layout = cls(order, frame_length, names, tuple(counts))
         if not 0 <= len(cdr) - layout.end <= layout.spare:
-            raise MalformedMessage(f'{len(cdr)} bytes, but this JointState needs {layout.end}')
+            raise MalformedMessage(
+                f'the message has {len(cdr)} bytes, but this JointState needs {layout.end}'
+            )
         return layout
 
     @property
@@ -176,7 +178,7 @@ class JointStateLayout:
 
     @cached_property
     def fixed(self) -> tuple[npt.NDArray[np.void], npt.NDArray[np.void]]:
-        """Values that are equal in all messages of this layout, and a mask of their bits, (1,)."""
+        """Bytes that are equal in all messages of this layout, and a mask of their bits, (1,)."""
         expected, mask = np.zeros((2, 1), self.record)
         numbers = {'encapsulation': int(self.order == '<'), 'frame_length': self.frame_length}
         numbers |= {f'n_{name}': n for name, n in zip(QUANTITIES, self.counts, strict=True)}
@@ -228,5 +230,5 @@ class JointStateLayout:
 
 
 def _align(position: int, size: int) -> int:
-    """Return the next position aligned to a size, counted from the end of the encapsulation."""
+    """Return the next position that is aligned to a size, counted from after the encapsulation."""
     return ((position - 4 + size - 1) & -size) + 4

@@ -73,7 +73,7 @@ def read_chunks(
 def _read_ahead(
     found: FileMap, groups: Sequence[Sequence[Chunk]], settings: ReadSettings
 ) -> Iterator[tuple[Contents, list[str]]]:
-    """Yield contents and damage of groups that threads read ahead of the reader."""
+    """Yield contents and damage of groups of chunks, which threads read in advance."""
     begun: deque[tuple[int, Future[tuple[Contents, list[str]]]]] = deque()
     # Decompression and checksums release the GIL.
     count = min(2, os.cpu_count() or 1)
@@ -131,7 +131,7 @@ def _content(found: FileMap, chunk: Chunk, settings: ReadSettings) -> bytes | me
     if chunk.compression:
         content: bytes | memoryview = decompressed(stored, chunk.compression, chunk.size, settings)
     elif len(stored) != chunk.size:
-        raise ValueError(f'has {len(stored)} bytes instead of the stated {chunk.size}')
+        raise ValueError(f'it has {len(stored)} bytes, but the bag states {chunk.size}')
     else:
         content = stored
     if settings.check_crc and zlib.crc32(content) != chunk.crc:
@@ -193,7 +193,7 @@ def tiled(
     data: bytes | mmap.mmap, offsets: IntArray, ranges: IntArray
 ) -> npt.NDArray[np.void] | None:
     """
-    Return the heads of messages if the indexes of their chunks are complete and correct.
+    Return the heads of messages by the indexes of their chunks, if these are complete.
 
     The indexes are correct if messages and definitions fill the chunks without gaps: each record
     begins at the end of the previous one.

@@ -140,7 +140,7 @@ def map_file(data: bytes | mmap.mmap, path: Path, *, check: bool = True) -> File
 
     """
     if data[: len(MAGIC)] != MAGIC:
-        raise RecordingError(f'{path}: not an MCAP file, or its beginning is damaged')
+        raise RecordingError(f'{path}: this is not an MCAP file, or its beginning is damaged')
     found = FileMap(data)
     definitions, data_end, footer, position = _walk(found)
     if not found.finished:

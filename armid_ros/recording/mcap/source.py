@@ -166,7 +166,7 @@ class McapSource(Source):
         return self._counts
 
     def _possible(self, offsets: IntArray, rows: _Rows, wanted: Sequence[int]) -> IntArray:
-        """Return the messages of some channels with a valid time."""
+        """Return the messages of some channels whose time is valid."""
         channels = rows['channel']
         chosen = np.isin(channels, wanted) if len(wanted) != 1 else channels == wanted[0]
         late = (rows['log_time'] < 0) | (rows['publish_time'] < 0)

@@ -262,7 +262,7 @@ class McapWriter:
         self._index.close()
 
     def _note(self, record: bytes) -> int:
-        """Append the index of a chunk to the index file, and return its end."""
+        """Append the index of a chunk to the index file; return where it ends."""
         position, rest = self.committed.index_size, memoryview(record)
         try:
             while len(rest):
@@ -273,7 +273,7 @@ class McapWriter:
         return position
 
     def _append(self, data: bytes) -> int:
-        """Write data after the committed data, and return their end."""
+        """Write data after the committed data; return where they end."""
         position = self.committed.position
         try:
             if self._stream.tell() != position:

@@ -141,7 +141,7 @@ def choose(
     found = _matching(table, pattern)
     if not found:
         raise RecordingError(
-            f"{table.source}: no column is '{pattern}', given for {quantity}; its columns are "
+            f"{table.source}: '{pattern}', given for {quantity}, fits no column; its columns are "
             f'{table.listed()}'
         )
     labels = [label for label, _ in found]
@@ -163,10 +163,10 @@ def choose(
     fit = ', '.join(column.name for column in members.values())
     lacking = ', '.join(joint for joint in joints if joint not in names)
     raise RecordingError(
-        f"{table.source}: for {quantity}, '{pattern}': {fit} fit, and no column is that of "
-        f'{lacking}; columns are matched to the {len(joints)} joints by name, or by number if '
-        'there is one for each: name them in the order of the joints, with commas, or see '
-        '--rename and --joints'
+        f"{table.source}: for {quantity}, '{pattern}' fits {fit}, but none of these columns "
+        f'belongs to {lacking}. Columns are matched to the {len(joints)} joints by name, or by '
+        'number if there is one for each. Name them in the order of the joints, with commas, or '
+        'see --rename and --joints'
     )
 
 
@@ -300,7 +300,7 @@ def _matching(table: Table, pattern: str) -> list[tuple[str, TableColumn]]:
 def _readings(
     column: TableColumn, joints: Sequence[str] | None, rename: Rules
 ) -> Iterator[tuple[str, str]]:
-    """Yield all splits of a column name into pattern and label of the joint."""
+    """Yield all ways to split a column name into a pattern and the label of a joint."""
     name = column.bare_name
     if column.array and name.endswith(']'):
         element = name[len(column.array) + 1 : -1]

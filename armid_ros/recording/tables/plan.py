@@ -192,7 +192,7 @@ def _source(
     settings: ColumnSettings,
     joints: Sequence[str] | None,
 ) -> QuantityColumns:
-    """Return the given or guessed columns of a quantity, without columns if it is missing."""
+    """Return the columns of a quantity, given or guessed; without columns if it is missing."""
     given = getattr(settings, quantity)
     if given is not None and given.lower() == 'none':
         return QuantityColumns(quantity, '')
@@ -284,8 +284,8 @@ def _time(table: Table, settings: ColumnSettings) -> tuple[TableColumn | None, s
     rate = settings.rate_hz or table.rate_hz
     if rate is None:
         raise RecordingError(
-            f'{table.source}: no column of time; name it with --time, or give the samples per '
-            f'second with --rate. Its columns are {table.listed()}'
+            f'{table.source}: it has no column of time; name one with --time, or give the samples '
+            f'per second with --rate. Its columns are {table.listed()}'
         )
     return None, 's', rate
 

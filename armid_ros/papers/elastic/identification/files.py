@@ -174,7 +174,7 @@ def _common(
     if len(common) < 0.9 * max(map(len, stamps)):
         counts = ', '.join(f'{name} ({len(s)})' for name, s in zip(names, stamps, strict=True))
         raise RecordingError(
-            f'{path}: of the samples of {counts} only {len(common)} have equal timestamps; '
-            'use one timestamp for simultaneous measurements, and record all topics'
+            f'{path}: only {len(common)} timestamps are common to all of {counts}; use one '
+            'timestamp for simultaneous measurements, and record all topics'
         )
     return common

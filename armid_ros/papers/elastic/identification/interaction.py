@@ -266,7 +266,7 @@ def fit_joints(
 
 
 def frequencies(parameters: TwoLinkParameters) -> tuple[FloatArray, FloatArray]:
-    """Return antiresonance and resonance of each motor's velocity, undamped, shape (2,) [Hz]."""
+    """Return antiresonance and resonance of each motor without damping, shape (2,) [Hz]."""
     by_link, by_motor = (parameters.stiffness / x for x in (parameters.inertia, parameters.rotor))
     return np.sqrt(by_link) / (2.0 * np.pi), np.sqrt(by_link + by_motor) / (2.0 * np.pi)
 

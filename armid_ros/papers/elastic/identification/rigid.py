@@ -85,7 +85,7 @@ def fit_rigid(runs: Sequence[ElasticRun]) -> RigidFit:
     products = normal.summed()[:-1, :-1]
     scale = np.sqrt(np.diag(products))
     if not np.all(scale > 0.0):
-        raise IdentificationError('the rigid fit needs motion of both joints; one rests')
+        raise IdentificationError('the rigid fit needs motion of both joints, but one rests')
     sizes = np.linalg.eigvalsh(products / np.outer(scale, scale))
     # smallest singular value of identifiable columns, relative to the largest
     if sizes[0] < 1e-6**2 * sizes[-1]:

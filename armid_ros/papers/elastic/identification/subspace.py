@@ -184,7 +184,7 @@ def _outputs(modal: ComplexArray, states: ComplexArray) -> ComplexArray:
 
 
 def _driven(u: FloatArray, dt: float, poles: ComplexArray, hold: Hold) -> ComplexArray:
-    """Return the response of modes with unit input gain to an input, shape (N, r)."""
+    """Return how modes with unit input gain respond to an input, shape (N, r)."""
     states = np.empty((len(u), len(poles)), complex)
     for k, pole in enumerate(poles):
         factor = np.exp(pole * dt)

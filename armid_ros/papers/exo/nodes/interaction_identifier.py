@@ -171,7 +171,9 @@ class InteractionIdentifierNode(ArmidNode):
         parts = [np.array(getattr(message, name)) for name in fields]
         for name, part in zip(fields, parts, strict=True):
             if len(part) != len(message.name):
-                raise RecordingError(f'{len(message.name)} names but {len(part)} of {name}')
+                raise RecordingError(
+                    f'there are {len(message.name)} names but {len(part)} values of {name}'
+                )
         signal = np.concatenate([part[order] for part in parts])
         if not np.all(np.abs(signal) <= MAX_MAGNITUDE):
             raise RecordingError('implausibly large values')

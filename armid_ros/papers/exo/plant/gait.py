@@ -32,7 +32,7 @@ _COLUMNS = ['phase', 'hip_deg', 'knee_deg', 'ankle_deg']
 @dataclass(frozen=True)
 class Assumption:
     """
-    One assumption.
+    One assumption of the leg pair that the source does not state.
 
     Attributes
     ----------

@@ -60,7 +60,7 @@ class TiedPair(TiedMachines):
                 spread = np.broadcast_to(np.asarray(0.0 if values is None else values), size)
             except ValueError:
                 raise ModelError(
-                    f'{name}: {np.shape(values)} values for {size[0]} ties, '
+                    f'{name} has shape {np.shape(values)}, but there are {size[0]} ties: '
                     f'{", ".join(tie.name for tie in self.ties)}'
                 ) from None
             if np.any(spread < 0.0) or not np.all(np.isfinite(spread)):
@@ -123,7 +123,7 @@ class PairMotion(NamedTuple):
 @dataclass(frozen=True)
 class PairTorques:
     """
-    Torques and spring forces of a motion of a pair.
+    Joint torques of a moving pair of machines, and the forces of its springs.
 
     Attributes
     ----------
@@ -283,7 +283,7 @@ EXERCISES = {
 
 def exercise(pair: TiedPair, name: str, t: FloatArray, gait: Gait | None = None) -> PairMotion:
     """
-    Return the motion of the shipped pair, on one foot, during an exercise.
+    Return the motion of the shipped pair during an exercise on one foot.
 
     Parameters
     ----------
@@ -303,7 +303,7 @@ def exercise(pair: TiedPair, name: str, t: FloatArray, gait: Gait | None = None)
     (middle, reach), w = np.radians(angles), 2.0 * np.pi / period
 
     def moving(joints: tuple[str, ...], time: FloatArray) -> Motion:
-        """Return sines of hips and knees with a flat foot and an upright trunk."""
+        """Return a motion of hips and knees along sines, with a flat foot and an upright trunk."""
         cosine, sine = (np.outer(f(w * time), reach) for f in (np.cos, np.sin))
         parts = [
             np.column_stack([knee - hip, knee, hip, far_hip, far_knee, np.zeros_like(time)])

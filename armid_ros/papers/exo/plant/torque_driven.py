@@ -114,7 +114,8 @@ def drive_by_torque(
     """
     if len(motion) % 2 == 0:
         raise TrajectoryError(
-            f'{len(motion)} samples; integration steps of two samples need an odd number'
+            f'there are {len(motion)} samples, but integration in steps of two samples needs an '
+            'odd number'
         )
     columns = [pair.robot.index(joint) for joint in driven]
     rate = _forward_dynamics(pair, PairMotion(motion, other_motion), columns, torque, on_ground)

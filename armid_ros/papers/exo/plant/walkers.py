@@ -299,7 +299,7 @@ def columns(robot: Robot, side: str) -> list[int]:
 
 
 def floating(robot: Robot) -> list[int]:
-    """Return the indices of forward, up and lean of the trunk."""
+    """Return the indices of the trunk's coordinates: forward, up and lean."""
     prefix = robot.joints[0].split('_')[0]
     return [robot.index(f'{prefix}_{name}') for name in FLOATING]
 

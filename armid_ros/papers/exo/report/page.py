@@ -135,7 +135,7 @@ def _stiffness_section(
 
 
 def _range(values: FloatArray) -> str:
-    """Format least and largest value to two digits, or one value if both are equal."""
+    """Write the least and the largest value in two digits, or one value if both are equal."""
     ends = dict.fromkeys(f'{end:.2g}' for end in (values.min(), values.max()))
     return ' to '.join(ends)
 

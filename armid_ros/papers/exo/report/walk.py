@@ -92,7 +92,7 @@ class Walk(Section):
 
     @property
     def choices(self) -> list[str]:
-        """Return the choices of the animation."""
+        """Return what a reader can choose in the animation."""
         names = [one.right.joint.removeprefix('exo_') for one in self.walked.driven]
         return [
             'as prescribed',
@@ -104,7 +104,7 @@ class Walk(Section):
 
     @property
     def held(self) -> list[str]:
-        """Return the largest external moments on the trunks, machine and wearer [N m]."""
+        """Return the largest external moments on the trunks of machine and wearer [N m]."""
         cycle = self.walked.cycle
         return [f'{np.abs(one.trunk_moment).max():.0f}' for one in (cycle.own, cycle.other)]
 
@@ -234,7 +234,7 @@ def _bodies(robot: Robot, motion: Motion, ahead: FloatArray) -> list[Any]:
 
 
 def _placed(points: FloatArray, ahead: FloatArray) -> FloatArray:
-    """Return points forward and up [m] in px, relative to the wearer."""
+    """Convert points forward and up [m] to px, relative to the wearer."""
     shape = (-1,) + (1,) * (points.ndim - 2)
     x = 300.0 + _SCALE * (points[..., 0] - ahead.reshape(shape))
     return np.stack([x, _GROUND - _SCALE * points[..., 1]], axis=-1)
