@@ -3,7 +3,6 @@
 """What golden results do not hold is what the schemas say, which describe every key of it."""
 
 import json
-import shutil
 
 import armid_ros as ar
 from armid_ros.cli import main
@@ -54,11 +53,6 @@ def test_a_diagnosis_with_everything(at_desk):
         *('--model', 'monday_result/model.yaml', '--out', 'found'),
     )
     check('diagnosis', json.loads((at_desk / 'found' / 'diagnosis.json').read_text()))
-
-
-def test_a_comparison_with_a_model_alone(at_desk):
-    shutil.copy('friday_result/model.yaml', 'alone.yaml')
-    check('comparison', ar.compare('monday_result', 'alone.yaml').document())
 
 
 def test_an_inspection(at_desk):
