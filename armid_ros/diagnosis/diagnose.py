@@ -144,7 +144,7 @@ def diagnose(
             return _as_diagnosis(tied, notes, explainer, doubt, given)
     explanation = explainer.explanation()
     result = _as_diagnosis(explanation, notes, explainer, doubt, given)
-    if result.verdict != 'consistent' and _hardly_explained(result, settings):
+    if _hardly_explained(result, settings):
         timed = _of_spans(explanation, explainer, recordings, validate, notes, doubt)
         result = timed or result
     if (result.verdict in OPEN or result.doubt) and settings.partner is None:

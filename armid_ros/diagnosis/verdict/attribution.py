@@ -4,8 +4,8 @@
 Shares of the held-out gap that the causes explain, and the choice of the headline.
 
 The gap is the sum of squares of the weighted residual of the model. Causes are added one by one,
-in the order in which they were found; intervals come from resampled blocks (bootstrap). The
-headline lists the causes with a large enough share, the others are minor.
+in order of gain; intervals come from resampled blocks (bootstrap). The headline lists the causes
+with a large enough share, the others are minor.
 
 """
 
@@ -31,13 +31,16 @@ class Attribution:
 
     Attributes
     ----------
+    order : tuple of int
+        Indices of the named causes in the order in which they are added, largest gain first.
     gap : ndarray, shape (B,)
         Squared held-out residual without named causes.
     gains : ndarray, shape (K, B)
-        Gain of each named cause, added to those before it.
+        Gain of each named cause, in the order of the explanation.
 
     """
 
+    order: tuple[int, ...]
     gap: FloatArray
     gains: FloatArray
 
@@ -80,9 +83,9 @@ def headline(
 
     """
     if not explanation.steps:
-        return explanation, Attribution(np.ones(1), np.zeros((0, 1)))
+        return explanation, Attribution((), np.ones(1), np.zeros((0, 1)))
     fitted = left_out(explanation)
-    held_out = None if unseen is None else predicted(explanation, unseen)
+    held_out = None if unseen is None else predicted(explanation, fitted.order, unseen)
     causes = range(len(explanation.steps))
     measured = [fitted] if held_out is None else [fitted, held_out]
     share = np.array([max(one.share([k]) for one in measured) for k in causes])
@@ -100,31 +103,48 @@ def headline(
     return explanation, held_out or fitted
 
 
-def predicted(explanation: Explanation, unseen: Evidence) -> Attribution:
-    """Return by how much each cause reduces the gap in held-out data."""
-    fewer = [explanation.only(range(count)) for count in range(1, len(explanation.steps))]
+def predicted(explanation: Explanation, order: Sequence[int], unseen: Evidence) -> Attribution:
+    """Return the gain of each cause on held-out data; causes are added in a given order."""
+    fewer = [explanation.only(order[:count]) for count in range(1, len(order))]
     every = [explanation.reference, *(one.fitted for one in fewer), explanation.fitted]
-    arms = [one.arm for one in every[: len(explanation.steps) + 1]]
+    arms = [one.arm for one in every[: len(order) + 1]]
     squares = [unseen.block_squares(unseen.residuals(arm)).sum(axis=1) for arm in arms]
-    return Attribution(squares[0], -np.diff(squares, axis=0))
+    gains = np.zeros((len(order), len(squares[0])))
+    gains[list(order)] = -np.diff(squares, axis=0)
+    return Attribution(tuple(order), squares[0], gains)
 
 
 def left_out(explanation: Explanation) -> Attribution:
-    """Return by how much each cause reduces the gap in cross-validation."""
+    """Return the cross-validated gain of each cause, added in order of gain."""
     assert explanation.problem is not None
-    linear = explanation.problem.linear(explanation.fitted.named)
-    size = linear.cross.shape[1]
-    first = [*(span.start for span in linear.spans), size]
-    squares: list[list[float]] = [[] for _ in first]
-    for columns, target, means, covariance in _folds(explanation.problem, linear):
-        for found, start in zip(squares, first, strict=True):
-            values, absent = means, np.arange(start, size)
-            if start < size:  # all causes from here on are zero
+    problem, named = explanation.problem, explanation.fitted.named
+    linear = problem.linear(named)
+    folds, spans = list(_folds(problem, linear)), linear.spans
+    remaining, order = list(range(len(named))), list[int]()
+
+    def squared_residual(causes: Sequence[int]) -> FloatArray:
+        """Return the squared held-out residual of each block, all other causes being zero."""
+        others = [spans[n] for n in range(len(named)) if n not in causes]
+        absent = [k for span in others for k in range(span.start, span.stop)]
+        squares = []
+        for columns, target, means, covariance in folds:
+            values = means
+            if absent:
                 border = covariance[:, absent]
                 values = means - border @ np.linalg.solve(border[absent], means[absent])
             pairs = zip(columns, target, strict=True)
-            found += [float(np.sum((y - x @ values) ** 2)) for x, y in pairs]
-    return Attribution(np.array(squares[0]), -np.diff(squares, axis=0))
+            squares += [np.sum((y - x @ values) ** 2) for x, y in pairs]
+        return np.array(squares)
+
+    before = gap = squared_residual(())
+    gains = np.zeros((len(named), len(gap)))
+    while remaining:
+        after = {k: squared_residual([*order, k]) for k in remaining}
+        best = min(remaining, key=lambda k: float(after[k].sum()))
+        gains[best], before = before - after[best], after[best]
+        order.append(best)
+        remaining.remove(best)
+    return Attribution(tuple(order), gap, gains)
 
 
 def _folds(
