@@ -155,9 +155,7 @@ class Estimate:
         own = [one for one in self.parameters if one.joint == joint] or self.parameters
         known = ', '.join(f'{p.name} [{p.joint}]' if p.joint else p.name for p in own)
         guess = meant(name, [one.name for one in own])
-        raise ModelError(
-            f"there is no parameter '{name}' of joint '{joint}'; parameters are {known}{guess}"
-        )
+        raise ModelError(f"no parameter '{name}' of joint '{joint}'; there are {known}{guess}")
 
 
 def parameter_table(

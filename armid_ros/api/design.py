@@ -168,7 +168,7 @@ def _with_limits(
     joint_limits: str | Path | Mapping[str, float] | None,
     acceleration: FloatArray | None,
 ) -> Robot:
-    """Return a robot with given limits, which may only narrow its own."""
+    """Return the robot with given limits, which may only be narrower than its own."""
     if isinstance(joint_limits, Mapping):
         robot = with_joint_limits(robot, None, [f'{j}:={v}' for j, v in joint_limits.items()])
     elif joint_limits is not None:

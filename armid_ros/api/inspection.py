@@ -173,9 +173,7 @@ def inspect(
     if recording is None:  # the only argument
         robot, recording = None, robot
     if recording is None or isinstance(recording, Robot | ArmModel):
-        raise RecordingError(
-            'no recording was given: give the path of a bag or a table, or a Recording'
-        )
+        raise RecordingError('no recording was given: give a bag, a table or a Recording')
     if isinstance(robot, Recording):
         raise RecordingError('two recordings were given: the first argument has to be the robot')
     described = None if robot is None else robot_of(robot)

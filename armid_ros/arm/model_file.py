@@ -330,9 +330,7 @@ def _rows(
     for k, entry in enumerate(document['effects']):
         if not isinstance(entry, dict):
             line = yaml_line(text, ('effects', k))
-            raise ModelError(
-                f'line {line}: this is not an effect, which has {", ".join(_NEEDED_OF_EFFECT)}'
-            )
+            raise ModelError(f'line {line}: an effect has to have {", ".join(_NEEDED_OF_EFFECT)}')
         _require(entry, _NEEDED_OF_EFFECT, f"effect '{str(entry.get('name'))[:40]}'")
         kind = CATALOGUE.find(str(entry['name']))
         known: tuple[Quantity | Shape, ...] = (*kind.quantities, *kind.shapes)

@@ -370,7 +370,7 @@ def _ratio(series: ParameterHistory, spread: Spread) -> float:
 
 
 def _freedom(bags: int) -> float:
-    """Return the degrees of freedom of the variance of a series, from the median of squares."""
+    """Return the degrees of freedom of a history's variance, from the median of squares."""
     # a line through simulated series of white noise; right to 6 % from 4 to 80 bags
     return 0.8 + 0.31 * bags
 

@@ -51,7 +51,7 @@ def tail(
     square: npt.ArrayLike, rank: npt.ArrayLike, freedom: npt.ArrayLike = np.inf
 ) -> FloatArray:
     """
-    Return the p value of a quadratic form under no change.
+    Return the p value of a quadratic form if nothing changed.
 
     Parameters
     ----------
@@ -70,7 +70,7 @@ def tail(
 
 
 def limits(chance: float, rank: FloatArray, freedom: FloatArray) -> FloatArray:
-    """Return the thresholds of quadratic forms for a false alarm probability."""
+    """Return the thresholds that quadratic forms exceed with a given false alarm probability."""
     # Fisher's distribution by the beta distribution, as scipy.stats takes ten times as long
     share = special.betaincinv(0.5 * freedom, 0.5 * rank, chance)
     return np.asarray(freedom * (1.0 - share) / share)

@@ -63,9 +63,7 @@ def convert(
         return
     if len(files) > 1:
         named = ', '.join(str(path) for path in files)
-        raise RecordingError(
-            f'{named}: only tables can be converted together; convert bags one by one'
-        )
+        raise RecordingError(f'{named}: only tables can be merged; convert bags one by one')
     _bag(files[0], None if dry_run else out)
 
 
@@ -107,7 +105,7 @@ def _bag(path: Path, out: Path | None) -> None:
     refuse_columns(path, columns.settings(), copied=True)
     if out is None:
         raise RecordingError(
-            f'{path}: this is a bag, but --dry-run is for tables; armid inspect shows a bag'
+            f'{path}: this is a bag; --dry-run is for tables, armid inspect for bags'
         )
     if not is_ros1(path):
         topics(path)  # raises an error if the path is not a bag

@@ -154,9 +154,7 @@ def diagnose(
 ) -> None:
     """Find which effect a model lacks, and add it."""
     if baseline and no_baseline:
-        raise click.UsageError(
-            '--baseline and --no-baseline were both given; give only one of them'
-        )
+        raise click.UsageError('--baseline and --no-baseline were both given; give only one')
     if against and (model or baseline):
         raise click.UsageError('--against cannot be used together with --model or --baseline')
     from armid_ros.api.diagnosis import diagnose as run
@@ -213,7 +211,7 @@ def diagnose(
 
 
 def _identified_from(model: Path, diagnosed: list[Path]) -> tuple[Path, ...]:
-    """Return the recordings of the identification as baseline; empty if one is diagnosed."""
+    """Return the recordings of the identification as the baseline; none if one is diagnosed."""
     from armid_ros.identification.output import identified_from, require_as_identified
 
     found = identified_from(model)
@@ -323,7 +321,5 @@ def _point(text: str, numbers: str) -> tuple[float, float, float]:
     try:
         x, y, z = (float(number) for number in numbers.split(','))
     except ValueError:
-        raise ModelError(
-            f"--tie '{text}': a point has to be X,Y,Z in the frame of its joint [m]"
-        ) from None
+        raise ModelError(f"--tie '{text}': points are X,Y,Z in the joint's frame [m]") from None
     return x, y, z

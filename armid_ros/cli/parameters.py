@@ -187,9 +187,7 @@ def with_packages(context: click.Context, source: str | None) -> str | None:
     for text in context.meta.get(PACKAGES, []):
         name, _, folder = text.partition('=')
         if not name or not folder:
-            raise click.BadParameter(
-                f"'{text}' has to be PACKAGE=FOLDER", param_hint='--package'
-            )
+            raise click.BadParameter(f"'{text}' has to be PACKAGE=FOLDER", param_hint='--package')
         if source in (None, '-'):
             raise click.BadParameter(
                 f"'{text}': packages need a file of a description, --robot FILE",

@@ -156,7 +156,7 @@ def diagnose(
 
 
 def _hardly_explained(result: Diagnosis, settings: DiagnosisSettings) -> bool:
-    """Return whether a gap remains, or no named cause explains half of the gap."""
+    """Return whether a gap remains, or every named cause explains less than half of the gap."""
     largest = max((one.share for one in result.findings), default=0.0)
     return result.verdict in OPEN or largest <= settings.thresholds.open_share
 

@@ -314,7 +314,7 @@ def _merge_hysteresis(elements: list[Hysteresis]) -> Hysteresis | None:
 
 
 def _merge_transmissions(parts: list[Transmission]) -> Transmission | None:
-    """Put transmissions in series: compliances and gaps are summed."""
+    """Combine transmissions in series: compliances and gaps are summed."""
     if not parts:
         return None
     compliance = np.sum([1.0 / part.stiffness for part in parts], axis=0)

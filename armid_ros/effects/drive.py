@@ -228,7 +228,7 @@ class ActuatorSaturation(TorqueReading):
         return joint_columns(self, motion, asked, -beyond)
 
     def _spread(self, values: FloatArray, motion: Motion) -> tuple[FloatArray, ...]:
-        """Return both shares and the level for all joints of a motion, each of shape (n,)."""
+        """Return shares and level with a value for every joint of a motion, each of shape (n,)."""
         spread = np.zeros((3, motion.n_joints))
         spread[2] = np.inf
         columns = self.indices(motion.joints)

@@ -41,7 +41,7 @@ class _GravityEffect(Effect):
 @dataclass(frozen=True)
 class GravityMagnitude(_GravityEffect):
     """
-    Difference of the magnitude of gravity from the model's, |g| = |g_model| + dg.
+    Difference of the magnitude of gravity from that of the model, |g| = |g_model| + dg.
 
     After a fit of the base parameters, it is identifiable only through masses that also cause
     inertia torques. Fast motion makes it identifiable.
@@ -70,7 +70,7 @@ class GravityMagnitude(_GravityEffect):
 @dataclass(frozen=True)
 class BaseTilt(_GravityEffect):
     """
-    Rotation of the base relative to the world that the model does not contain.
+    Rotation of the base relative to the world that the model lacks.
 
     The base is turned by the rotation vector (tilt_x, tilt_y) about two axes normal to gravity:
     the base's own x and y for a base that is upright in the model. A rotation about gravity has no
@@ -104,7 +104,7 @@ class BaseTilt(_GravityEffect):
 @dataclass(frozen=True)
 class GravityVector(_GravityEffect):
     """
-    Difference of the gravity vector from the model's: any mounting on any planet.
+    Difference of the gravity vector from that of the model: any mounting on any planet.
 
     The torque is exactly linear in the vector at any angle. A search uses this effect, and reports
     the result as base_tilt and gravity_magnitude.
@@ -152,9 +152,7 @@ def _turned(gravity: FloatArray, tilt: FloatArray) -> FloatArray:
 def _unit(gravity: FloatArray) -> FloatArray:
     length = np.linalg.norm(gravity)
     if not length > 0.0:
-        raise ModelError(
-            'an effect of gravity cannot be used, because the gravity vector of the model is zero'
-        )
+        raise ModelError('an effect of gravity cannot act, as the gravity of the model is zero')
     return np.asarray(gravity / length)
 
 

@@ -40,7 +40,7 @@ class Displacing(Effect):
         """
 
     def columns(self, motion: Motion, arm: Arm) -> FloatArray:
-        """Return dtau/dtheta along the displacements, shape (N, n, P)."""
+        """Return how torques change with the displacements, dtau/dtheta, shape (N, n, P)."""
         return arm.torque_change(motion, self.displacements(motion, arm))
 
     def action(self, values: FloatArray, arm: Arm) -> Action:

@@ -45,7 +45,7 @@ class Hysteresis:
         return np.asarray(end - (end - state) * np.exp(-np.abs(travel) / self.distance))
 
     def torque(self, state: FloatArray) -> FloatArray:
-        """Return the joint torques, shape (..., n) [N m], of states of shape (..., m)."""
+        """Return the joint torques, (..., n) [N m], for states of the springs, (..., m)."""
         return np.asarray((self.level * state) @ self.directions)
 
     def along(self, q: FloatArray, dq: FloatArray) -> FloatArray:

@@ -161,9 +161,7 @@ def tied_effect(
     """
     known = {kind.name: kind for kind in (TiedInteraction, TiedSlack)}
     if name not in known:
-        raise ModelError(
-            f"{name} cannot have 'ties'; effects that can have ties are {', '.join(known)}"
-        )
+        raise ModelError(f"{name} cannot have 'ties'; effects that can are {', '.join(known)}")
     by_joint: dict[str, Tie] = {}
     for tie in ties:
         if tie.joint in by_joint:

@@ -46,7 +46,7 @@ class JointElasticity(Displacing):
     instantaneous = False
 
     def displacements(self, motion: Motion, arm: Arm) -> Displacement:
-        """Return the negative torque that twists the transmission, and its time derivatives."""
+        """Return minus the torque that twists the transmission, with its time derivatives."""
         load = within_band(motion, arm.load(motion))
         (retardation,) = scatter(self, self.shape_values, arm.robot)
         for joint in np.flatnonzero(retardation):

@@ -69,7 +69,7 @@ class FourierTrajectory:
             )
         if not (np.isfinite(self.period) and self.period > 0.0):
             raise TrajectoryError(
-                f'Fourier trajectory: the period is {self.period} s, but has to be positive'
+                f'Fourier trajectory: its period, {self.period} s, has to be positive'
             )
         for name in ('q0', 'a', 'b'):
             bad = ~np.isfinite(getattr(self, name).reshape(n, -1)).all(axis=1)

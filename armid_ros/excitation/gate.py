@@ -230,7 +230,7 @@ class Ending:
     def stopped_again(
         self, monitor: PoseMonitor, now: float, tolerance: float, duration: float
     ) -> Motion | None:
-        """Return a new stop if the arm still moves along the path of the run, else None."""
+        """Return a new stop if the arm still moves along its path; otherwise None."""
         phase = now - self.begun
         if self.last is None or now - self.sent < self.last.t[-1]:
             return None

@@ -53,15 +53,13 @@ class Excitation:
     run_in: float = 2.0
 
     def __post_init__(self) -> None:
-        """Check the numbers."""
+        """Check that periods and run-in are possible."""
         if int(self.n_periods) != self.n_periods or self.n_periods < 1:
             raise TrajectoryError(
-                f'excitation: it has {self.n_periods} periods, but needs at least one'
+                f'excitation: {self.n_periods} periods are too few; at least one is needed'
             )
         if not (np.isfinite(self.run_in) and self.run_in > 0.0):
-            raise TrajectoryError(
-                f'excitation: its run-in is {self.run_in} s, but has to be positive'
-            )
+            raise TrajectoryError(f'excitation: its run-in, {self.run_in} s, has to be positive')
         if not self.duration <= MAX_DURATION:
             raise TrajectoryError(
                 f'excitation: {self.n_periods} periods of {self.trajectory.period:g} s, run-ins '
@@ -148,9 +146,7 @@ class Excitation:
 
         """
         if not 0.0 < share <= 1.0:
-            raise TrajectoryError(
-                f'the speed share is {share:g}, but has to be above 0 and at most 1'
-            )
+            raise TrajectoryError(f'the speed share, {share:g}, has to be above 0 and at most 1')
         samples = self._period_samples(rate)
         longer = float(np.ceil(samples / share - _SAMPLE_TOLERANCE)) / samples
         path = self.trajectory.stretched(self.trajectory.period * longer)
@@ -158,7 +154,7 @@ class Excitation:
 
     def motion(self, rate: float) -> Motion:
         """
-        Sample the run.
+        Sample the run at a rate.
 
         Parameters
         ----------
@@ -222,9 +218,7 @@ def save_excitation(excitation: Excitation, path: str | Path) -> None:
     path = Path(path)
     writer = {'.yaml': excitation_text, '.yml': excitation_text, '.csv': _to_csv}.get(path.suffix)
     if writer is None:
-        raise TrajectoryError(
-            f'{path}: the name of an excitation file has to end in .yaml or .csv'
-        )
+        raise TrajectoryError(f'{path}: an excitation file has to end in .yaml or .csv')
     write_file(path, writer(excitation))
 
 
@@ -265,9 +259,7 @@ def read_excitation(text: str, source: str) -> Excitation:
     with reading(source, TrajectoryError):
         content: Any = load_yaml(text)
         if not isinstance(content, dict) or content.get('schema') != SCHEMA:
-            raise TrajectoryError(
-                f'this is not an excitation, which has to contain schema: {SCHEMA}'
-            )
+            raise TrajectoryError(f'this is not an excitation: it needs schema: {SCHEMA}')
         if content.get('start') is not None:  # it changes the motion
             raise TrajectoryError(
                 'an excitation cannot contain a start pose; remove it, and give it with --start'

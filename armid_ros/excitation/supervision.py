@@ -219,7 +219,7 @@ class Rehearsal:
 
     def add(self, phase: float, q: FloatArray, tau: FloatArray) -> None:
         """
-        Add a joint state.
+        Add a joint state to the rehearsal.
 
         Parameters
         ----------

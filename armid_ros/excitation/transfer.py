@@ -125,9 +125,7 @@ class TransferPlanner:
             if not violations:
                 return transfer
             transfer = transfer.lasting(1.3 * transfer.duration)
-        raise TrajectoryError(
-            f'no transfer to the trajectory stays inside the limits: {violations[0]}'
-        )
+        raise TrajectoryError(f'no transfer to the trajectory keeps the limits: {violations[0]}')
 
     def fault(self, q: FloatArray) -> str:
         """Return why a pose, (n,), is not allowed; empty if it is allowed."""

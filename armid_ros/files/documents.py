@@ -122,8 +122,7 @@ def load_yaml(text: str) -> Any:
             open_nodes.append((event.anchor, total))
             if len(open_nodes) > most_levels:
                 raise ValueError(
-                    f'line {_line(event)}: the document is nested more than {most_levels} levels '
-                    'deep'
+                    f'line {_line(event)}: the text is nested more than {most_levels} levels deep'
                 )
         elif isinstance(event, (yaml.SequenceEndEvent, yaml.MappingEndEvent)):
             anchor, begin = open_nodes.pop()
@@ -133,8 +132,7 @@ def load_yaml(text: str) -> Any:
             sizes[event.anchor] = 1
         if total > most_nodes:
             raise ValueError(
-                f'line {_line(event)}: the document has more than {most_nodes} nodes after its '
-                'aliases are expanded'
+                f'line {_line(event)}: the text has more than {most_nodes} nodes, aliases expanded'
             )
     return yaml.load(text, Loader=_Loader)
 

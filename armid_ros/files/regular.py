@@ -91,9 +91,7 @@ def read_text(path: str | Path, error: type[ArmidError]) -> str:
         except OSError as problem:
             raise error(f'{path}: cannot be read: {problem_text(problem)}') from problem
     if len(content) > TEXT_LIMIT:
-        raise error(
-            f'{path}: the file is larger than {TEXT_LIMIT >> 20} MiB, the limit of a text file'
-        )
+        raise error(f'{path}: larger than {TEXT_LIMIT >> 20} MiB, the limit of a text file')
     try:
         return content.decode('utf-8-sig')
     except UnicodeDecodeError as problem:

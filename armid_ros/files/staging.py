@@ -28,7 +28,7 @@ from armid_ros.files.output import DOCUMENTS, locked, STAGING
 @dataclass(frozen=True)
 class Staged:
     """
-    A staged result.
+    A result that is written to a staging folder, and moved to its place at the end.
 
     Attributes
     ----------

@@ -167,7 +167,7 @@ class MergedBags:
 
     @classmethod
     def of(cls, bags: Sequence[BagSummary | Refused]) -> MergedBags:
-        """Merge bags, in order."""
+        """Merge the normal equations of bags, in order."""
         used = [one for one in bags if isinstance(one, BagSummary)]
         parts = [
             cls(one.normal, one.seconds, ((one.bag.url, one.bag.version),), not one.computed)

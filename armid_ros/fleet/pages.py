@@ -189,7 +189,7 @@ def _verdict(found: Watch, diagnoses: Diagnoses) -> VerdictSection:
 
 
 def _explained(found: Watch, diagnoses: Diagnoses) -> list[str]:
-    """Return what the diagnoses of changed arms name, in three sentences at most."""
+    """Return up to three sentences on what the diagnoses of changed arms name."""
     sentences = []
     for arm in found.arms:
         diagnosis = diagnoses.get(arm.arm)

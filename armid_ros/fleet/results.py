@@ -215,7 +215,7 @@ def arm_is_done(store: Store, arm: str, bags: Sequence[BagFile], job: Job) -> li
 
 
 def _versions(versions: Sequence[tuple[str, str]]) -> str:
-    """Return a hash of the versions of a set of bags."""
+    """Return a hash of the versions of some bags."""
     return digest(*sorted('\t'.join(pair) for pair in versions))
 
 

@@ -169,10 +169,7 @@ def watch_fleet(store: Store, alpha: float = 0.05) -> Watch:
     facts = document(store)
     kind_of: Mapping[str, str] = facts.get('arms', {})
     if not kind_of:
-        raise FleetError(
-            f'{store.url}: this folder holds no results of a fleet; run `armid fleet identify` '
-            'first'
-        )
+        raise FleetError(f'{store.url}: holds no fleet results; run `armid fleet identify` first')
     bags = _by_arm(_table(store, 'bags').drop_columns(['normal_equations']))
     for rows in bags.values():
         rows.sort(key=lambda row: (row['start_ns'], row['bag']))

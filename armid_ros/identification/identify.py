@@ -88,7 +88,7 @@ class IdentificationSettings:
     prefers_bodies: bool = False
 
     def __post_init__(self) -> None:
-        """Check the method, and its combination with physical constraints."""
+        """Check that the method exists, and that it permits physical constraints if requested."""
         if self.method not in ESTIMATORS:
             raise IdentificationError(
                 f"no method '{self.method}'; use one of {', '.join(ESTIMATORS)}"
@@ -112,7 +112,7 @@ class IdentificationSettings:
 @dataclass(frozen=True)
 class Identification:
     """
-    A model fitted to recordings.
+    Result of an identification: a model fitted to recordings.
 
     Attributes
     ----------

@@ -370,7 +370,5 @@ def _covariance(rows: list[list[float]] | None, size: int) -> FloatArray | None:
     largest = np.outer(deviations, deviations)
     # numbers in the file have 16 digits
     if (np.diag(matrix) < 0.0).any() or (np.abs(matrix) > largest * (1.0 + 1e-9)).any():
-        raise ValueError(
-            'the covariance contains a negative variance, or a correlation beyond one'
-        )
+        raise ValueError('the covariance has a negative variance, or a correlation beyond one')
     return matrix

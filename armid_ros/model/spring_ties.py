@@ -48,7 +48,7 @@ class TiedMachines:
 
 class TieGeometry(NamedTuple):
     """
-    Ties along a motion.
+    Geometry of the ties along a motion.
 
     Attributes
     ----------

@@ -107,7 +107,7 @@ def _text(document: minidom.Document) -> str:
 
 
 def _children(parent: minidom.Element, name: str) -> Iterator[minidom.Element]:
-    """Return the children with a tag."""
+    """Return the children of an XML element with a given tag."""
     return (
         child
         for child in parent.childNodes

@@ -82,7 +82,7 @@ class ArmidNode(Node):
         self.look_every(5.0, self.look_for_trouble)
 
     def parameters(self) -> Sequence[NodeParameter]:
-        """Return the parameters to declare."""
+        """Return the parameters that the node has to declare."""
         return (*self.table, *COMMON)
 
     def create_subscription(

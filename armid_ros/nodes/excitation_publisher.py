@@ -281,9 +281,7 @@ class ExcitationPublisherNode(ArmidNode):
 
     def _loaded(self, path: str) -> Excitation:
         if not path:
-            raise TrajectoryError(
-                'a running node cannot design an excitation; name the file of one'
-            )
+            raise TrajectoryError('a running node cannot design an excitation; name a file')
         return checked(load_excitation(path), self._planner, path)
 
     def close(self) -> None:

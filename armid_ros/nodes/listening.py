@@ -156,7 +156,7 @@ class ListeningNode(ArmidNode):
                 self.take_sample(sample)
 
     def described_robot(self, description: str | None) -> Robot:
-        """Return the robot of a URDF, or without a URDF the robot of the parameters."""
+        """Return the robot of a URDF; without a URDF, the robot that the parameters name."""
         given = {'gravity': self.value('gravity'), 'joints': self.value('joints') or None}
         if description is None:
             return load_robot(self.value('robot'), **given)

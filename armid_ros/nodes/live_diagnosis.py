@@ -287,7 +287,7 @@ class LiveDiagnosisNode(ListeningNode):
         return LiveSettings(**{name: values.get(name, self.value(name)) for name in names})
 
     def _described(self, description: str | None = None) -> LiveDiagnosis:
-        """Make the diagnosis that the parameters describe, for their robot or that of a URDF."""
+        """Make the diagnosis that parameters describe, for their robot or for that of a URDF."""
         robot = model = None
         if description is not None or self.value('robot'):
             robot = self.described_robot(description)

@@ -258,7 +258,7 @@ class OnlineIdentifierNode(ListeningNode):
         return replace(identifier.settings, **can_change)
 
     def _described(self, description: str | None = None) -> OnlineIdentifier:
-        """Make the identifier that the parameters describe, for their robot or that of a URDF."""
+        """Make the identifier that parameters describe, for their robot or for that of a URDF."""
         arm = ArmModel.of(self.described_robot(description), effects=self.value('effects'))
         settings = self._described_settings(arm, {})
         return OnlineIdentifier(arm, settings, rng=np.random.default_rng(0))

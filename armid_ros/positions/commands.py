@@ -62,9 +62,7 @@ def read_commands(
     columns = columns or ColumnSettings()
     if is_table(path):
         if name is None:
-            raise RecordingError(
-                f'{path}: this is a table; name its columns of commanded positions with --commands'
-            )
+            raise RecordingError(f'{path}: a table needs its columns of commands: give --commands')
         columns = replace(columns, position=name, velocity='none', effort='none')
         topic = None
     else:

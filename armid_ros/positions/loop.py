@@ -54,7 +54,7 @@ class CommandedMotion:
 
     @classmethod
     def of(cls, commanded: Recording, recording: Recording) -> CommandedMotion:
-        """Return commands that were recorded with a recording."""
+        """Return the commands that were recorded together with a recording."""
         t = commanded.t + 1e-9 * (commanded.start_ns - recording.start_ns)
         dq = np.zeros_like(commanded.q) if commanded.dq is None else commanded.dq
         return cls(t, commanded.q, dq)

@@ -90,9 +90,7 @@ class ColumnSettings:
     def __post_init__(self) -> None:
         """Raise a RecordingError for invalid settings."""
         if self.time_unit is not None and self.time_unit not in TIME_UNITS:
-            raise RecordingError(
-                f"time unit '{self.time_unit}' is not known: use {', '.join(TIME_UNITS)}"
-            )
+            raise RecordingError(f"no time unit '{self.time_unit}': use {', '.join(TIME_UNITS)}")
         if self.rate_hz is not None and not self.rate_hz > 0.0:
             raise RecordingError(f'the rate is {self.rate_hz} Hz, but has to be positive')
         if self.coupling and not self.gear:

@@ -184,7 +184,7 @@ class Damage:
         return '; '.join([*shown, *([f'and {more} more'] if more else [])])
 
     def add(self, problem: str) -> None:
-        """Add a problem."""
+        """Add a problem to the list."""
         self._problems[problem] = None
 
 

@@ -164,7 +164,7 @@ class SqliteSource(Source):
             self._damage.add(f'{lost} rows of messages have no topic; they are left out')
 
     def _fetch(self, query: str, parameters: tuple[str, ...]) -> Iterator[list[tuple[Any, ...]]]:
-        """Yield rows in batches, until the first damage of the database."""
+        """Yield rows in batches, until damage of the database is met."""
         rows: list[tuple[Any, ...]] = []
         size = 0
         try:

@@ -148,9 +148,7 @@ def read_waypoints(
             f'{where} does not name {", ".join(missing)}; its joints are {", ".join(found.joints)}'
         )
     if len(found.t) < 2:
-        raise RecordingError(
-            f'{where}: a trajectory needs two points, but this one has {len(found.t)}'
-        )
+        raise RecordingError(f'{where}: a trajectory needs two points, but has {len(found.t)}')
     return found.of_joints(tuple(joints))
 
 

@@ -57,7 +57,7 @@ _TONES = {'consistent': 'good', 'named': 'fair', 'ambiguous': 'fair', 'partial':
 
 
 def tone_of(diagnosis: Diagnosis) -> str:
-    """Return the colour of a verdict; good only without doubt and with all joints checked."""
+    """Return the colour of a verdict; green only without doubt and if all joints were checked."""
     tone = _TONES.get(diagnosis.verdict, 'bad')
     return 'fair' if tone == 'good' and (diagnosis.not_checked or diagnosis.doubt) else tone
 
@@ -227,7 +227,7 @@ class Story(Section):
 
     @property
     def rows(self) -> list[tuple[str, list[str]]]:
-        """Questions and answers."""
+        """Questions that a reader has, and their answers."""
         diagnosis, patched = self.diagnosis, not self.diagnosis.harmful
         meaning = {effect.name: effect.summary for effect in diagnosis.arm.effects}
         names = list(dict.fromkeys(one.name for one in diagnosis.findings if patched))

@@ -141,7 +141,7 @@ def _verdict(
     notes: Sequence[str],
     step: str,
 ) -> VerdictSection:
-    """Return the verdict: identifiable parameters, the least accurate one, and clearance."""
+    """Return the verdict with identifiable parameters, the least accurate one, and clearance."""
     settings, links, joints = design.settings, robot.links, design.limits.joints
     unseen = [
         full_label(name, links)
@@ -258,7 +258,7 @@ def _input_section(
 def _motion_section(
     limits: Limits, motion: Motion, shares: Mapping[str, FloatArray]
 ) -> ContentSection:
-    """Return the joints' paths, rates and torques with the limits in force."""
+    """Return the section on paths, rates and torques of the joints, with the limits in force."""
     assert motion.tau is not None
     quantities = (
         ('position', motion.q, limits.lower, limits.upper),
@@ -302,7 +302,7 @@ def _motion_section(
 def _clearance_section(
     t: FloatArray, curves: Mapping[str, FloatArray], margin: float, notes: Sequence[str]
 ) -> ContentSection:
-    """Return the distances of bodies, from each other and from the environment."""
+    """Return the section on the distances of bodies, from each other and from obstacles."""
     roles: tuple[Role, ...] = ('residual', 'before')
     blocks: list[Templated] = [
         Chart(

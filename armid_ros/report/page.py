@@ -78,7 +78,7 @@ class Section(Templated):
 @dataclass(frozen=True)
 class Page:
     """
-    A report.
+    Page of a report.
 
     Attributes
     ----------

@@ -87,7 +87,7 @@ class Mechanism:
 
     @property
     def constant(self) -> bool:
-        """Whether J is constant."""
+        """Whether the Jacobian J is constant."""
         return not self.loops
 
     def at(self, u: FloatArray, du: FloatArray | None = None) -> Configuration:
@@ -138,7 +138,7 @@ class Mechanism:
 
     def _solved(self, u: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """
-        Return the moving joints with closed loops, and J, in one state of the driven joints.
+        Return the moving joints and J for one state of the driven joints, with loops closed.
 
         The third result, (m, 3 L), is the change of the moving joints that closes a gap of 1 m.
 

@@ -79,9 +79,7 @@ class Reference:
                     f'{values[point, joint]}'
                 )
         if not self.t[0] >= 0.0:
-            raise TrajectoryError(
-                f'trajectory: its first time is {self.t[0]} s, but has to be 0 or later'
-            )
+            raise TrajectoryError(f'trajectory: its first time is {self.t[0]} s, before 0')
         late = np.flatnonzero(~((np.diff(self.t) > 0.0) & np.isfinite(self.t[1:])))
         if len(late):
             point = int(late[0]) + 1

@@ -248,9 +248,7 @@ class MotorControl(Controller):
         """
         robot, springs = plant.robot, plant.springs
         if springs is None:
-            raise ModelError(
-                f'{robot.name} has no elastic joint; control its rigid joints with ComputedTorque'
-            )
+            raise ModelError(f'{robot.name} has only rigid joints; use ComputedTorque')
         joints, e = springs.joints, len(springs.joints)
         link = np.diag(robot.inertia(robot.model.createData(), robot.middle_pose))
         rotor = np.array(np.diag(springs.rotors)[e:])

@@ -154,7 +154,7 @@ class SimulatedArm:
 
     @property
     def t(self) -> float:
-        """Time [s]."""
+        """Time of the arm since its start [s]."""
         return self.steps * self.plant.dt
 
     @property
@@ -292,7 +292,7 @@ class SimulatedArm:
         return self.read()
 
     def traces(self, steps: int) -> Iterator[Trace]:
-        """Simulate some steps, and yield their traces, each of some hundred steps."""
+        """Simulate some steps; yield the results in traces of some hundred steps each."""
         self._end_block()
         while steps:
             trace = self._take(steps)

@@ -222,7 +222,7 @@ def _log_bodies(stream: Any, robot: Robot, marked: Sequence[str]) -> list[str]:
 
 
 def _entity(shape: LinkShape, colour: tuple[int, int, int]) -> Any:
-    """Convert a shape in its frame to an entity of rerun; RobotError for an invalid mesh."""
+    """Convert a shape, in its own frame, to an entity of rerun; RobotError for an invalid mesh."""
     rr = rerun()
     if shape.path is not None:
         load_mesh(shape.path, np.ones(3))  # the viewer ignores invalid meshes without a message

@@ -73,13 +73,9 @@ def export(
     for name, kinds in _KINDS_OF.items():
         typed = context.get_parameter_source(name) is ParameterSource.COMMANDLINE
         if typed and kind not in kinds:
-            raise click.UsageError(
-                f'--{name} can be used only with --to {", ".join(kinds)}, not with {kind}'
-            )
+            raise click.UsageError(f'--{name} is only for --to {", ".join(kinds)}, not for {kind}')
     if out.exists() and model.exists() and out.samefile(model):
-        raise OutputError(
-            f'--out {out} is the model itself and would be overwritten; name another file'
-        )
+        raise OutputError(f'--out {out} would overwrite the model itself; name another file')
     robot = None
     if robot_source is not None:
         robot = options.open_robot(robot_source, 'earth', joints)

@@ -14,7 +14,7 @@ import pinocchio as pin
 
 
 def urdf_or_mjcf(arm: ArmModel, kind: str, source: str) -> tuple[str, tuple[str, ...]]:
-    """Return the 'urdf' or 'mjcf' of an arm, with a comment, and lines on omitted parts."""
+    """Return an arm as text, 'urdf' or 'mjcf', with a comment, and lines on omitted parts."""
     exported, root = (arm_urdf(arm), '<robot') if kind == 'urdf' else (arm_mjcf(arm), '<mujoco')
     comment = f'<!-- written by armid export, from {source.replace("--", "- -")} -->'
     return exported.text.replace(root, f'{comment}\n{root}', 1), exported.without_place

@@ -229,7 +229,7 @@ def not_repeating(
     floors: Sequence[NoiseFloor], thresholds: Thresholds, least: FloatArray
 ) -> list[int]:
     """
-    Return the joints whose equal periods differ slowly and by a material amount.
+    Return the joints whose equal periods differ slowly and materially.
 
     Parameters
     ----------

@@ -116,7 +116,7 @@ class Trajectory:
         return self.reduce(self.motion.tau - arm.torque(self.motion))
 
     def columns(self, arm: ArmModel, effect: Effect) -> FloatArray:
-        """Return the columns of an effect of an arm, in rows, shape (M, n, P)."""
+        """Return the columns of one effect of an arm in the rows of the trajectory, (M, n, P)."""
         if effect.smooth:
             return arm.columns_of(effect, self.at_rows)
         return self.reduce(arm.columns_of(effect, self.motion))
@@ -125,7 +125,7 @@ class Trajectory:
         self, arm: ArmModel, effects: Sequence[Effect], chosen: npt.NDArray[np.intp]
     ) -> FloatArray:
         """
-        Return chosen columns of rigid parameters and of effects of an arm, in rows, (M, n, r).
+        Return columns of some rigid parameters and of effects in the rows, shape (M, n, r).
 
         Parameters
         ----------

@@ -104,7 +104,7 @@ class Explainer:
     unseen: Sequence[Trajectory] = ()
 
     def explanation(self) -> Explanation:
-        """Explain the gap."""
+        """Explain the gap, by the way that model and baseline permit."""
         if self.baseline is not None:
             return self._since(self.baseline)
         return self._alone() if self.misfit is None else self._explain_change(self.misfit)

@@ -187,7 +187,7 @@ def _rivals(
     trials: Sequence[Trial], own: Rival, others: set[str], arm: ArmModel
 ) -> tuple[Rival, ...]:
     """
-    Return the two likeliest rivals of an effect in its joints (`own`), with their joints.
+    Return the two likeliest rivals of an effect on its joints (`own`), with their joints.
 
     The same effect in another joint is a rival as well; effects of other findings are not.
 

@@ -77,7 +77,7 @@ def doubted(
     baseline: Baseline | None,
 ) -> tuple[Verdict, str]:
     """
-    Return the verdict under a doubt of the model, and the doubt, which findings may add.
+    Return the verdict after a doubt about the model, and the doubt, which findings may add to.
 
     A model with a large residual in the baseline is consistent with any data: these are bad data.
     With a smaller one, the doubt precedes the verdict.

@@ -95,9 +95,7 @@ class Obstacle:
                     f"obstacle '{self.name}': {name} has to be 3 finite numbers, not {values}"
                 )
         if (self.kind == 'mesh') != (self.mesh is not None):
-            raise TrajectoryError(
-                f"obstacle '{self.name}': a mesh needs a file, and no other kind can have one"
-            )
+            raise TrajectoryError(f"obstacle '{self.name}': only a mesh has a file, and needs one")
 
     def geometry(self) -> coal.CollisionGeometry:
         """Return the shape in the frame of the obstacle."""

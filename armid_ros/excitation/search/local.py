@@ -142,7 +142,7 @@ class Search:
         return cost
 
     def step(self) -> None:
-        """Count a step, for the progress."""
+        """Count a step of the search, to report the progress."""
         self._steps += 1
         self._watch(min(self._steps / self._work, 1.0), self.cost)
         if time.process_time() - self._begun > self.problem.settings.time_budget:

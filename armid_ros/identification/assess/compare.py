@@ -150,7 +150,7 @@ def _single_changes(
     before: ParameterFile, after: ParameterFile, names: Sequence[ParameterName]
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """
-    Return values and standard deviations of both files, (2, p), and p-values of changes, (p,).
+    Return values and standard deviations of two results, (2, p), and p-values of changes, (p,).
 
     Standard deviations are those of noise. If the scatter between recordings exceeds the noise of
     a joint, they are multiplied by the ratio.

@@ -183,7 +183,7 @@ class _Worst(NamedTuple):
 
 
 def _worst(errors: FloatArray, fits: Sequence[Fit], result: Identification) -> _Worst:
-    """Return the joint with the largest error without noise, or otherwise the largest error."""
+    """Return the joint with the largest error without noise; of equal ones, the largest error."""
     joints, beyond = result.arm.robot.joints, beyond_noise(errors, fits, result.used)
     moves = moving(fit.motion for fit in fits)
     worst = int(np.lexsort((np.where(moves, errors, -1.0), beyond))[-1])

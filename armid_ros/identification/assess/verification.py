@@ -205,7 +205,7 @@ class ForwardValidation:
 @dataclass(frozen=True)
 class Verification:
     """
-    Tests of an identification.
+    Results of the tests of an identification.
 
     Attributes
     ----------

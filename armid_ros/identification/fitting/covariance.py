@@ -161,7 +161,7 @@ def _noise_spectrum(
 
 
 def _smoothed(spectrum: FloatArray, reach: int) -> FloatArray:
-    """Smooth a spectrum on the bins of an rfft: keep lags below a reach, Parzen-weighted."""
+    """Smooth a spectrum on the bins of an rfft: keep small lags, with Parzen's weights."""
     size = 2 * (len(spectrum) - 1)
     lags = np.fft.irfft(spectrum, size)
     x = np.arange(reach) / reach

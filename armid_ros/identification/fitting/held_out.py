@@ -263,7 +263,7 @@ def _fit(
     weights: npt.NDArray[np.floating] | npt.NDArray[np.bool_],
     precision: FloatArray | float = 0.0,
 ) -> FloatArray:
-    """Fit weighted rows by least squares, with the precision of a prior at zero, shape (r,)."""
+    """Fit weighted rows by least squares with a prior at zero, given its precision, (r,)."""
     rows = (x * weights[:, :, np.newaxis]).reshape(-1, x.shape[2])
     normal = rows.T @ rows
     normal[np.diag_indices_from(normal)] += precision

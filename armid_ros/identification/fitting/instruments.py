@@ -51,7 +51,7 @@ from scipy.stats import chi2
 
 
 class _Instrumented(NamedTuple):
-    """Estimate of r parameters by instrumental variables."""
+    """Result of an estimate of r parameters by instrumental variables."""
 
     values: FloatArray
     covariance: FloatArray  # correlation of the residuals included

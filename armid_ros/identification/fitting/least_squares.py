@@ -49,7 +49,7 @@ IN_WORDS: dict[Estimator, str] = {
 @dataclass(frozen=True)
 class Solution:
     """
-    A least-squares fit.
+    Result of a least-squares fit.
 
     Attributes
     ----------

@@ -69,7 +69,7 @@ class Background:
             self.advance()
 
     def clear(self) -> None:
-        """Drop all jobs."""
+        """Drop all jobs that are pending."""
         for job in self._jobs:
             job.close()
         self._jobs.clear()

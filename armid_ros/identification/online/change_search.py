@@ -104,7 +104,7 @@ class ScoreStatistics:
 
     def ratios(self, sets: npt.NDArray[np.intp]) -> FloatArray:
         """
-        Return twice the log likelihood ratio of G sets of changes, shape (G,).
+        Return twice the log likelihood ratio of each of G sets of changes, shape (G,).
 
         Parameters
         ----------

@@ -237,7 +237,7 @@ class ChangeWatch:
         return np.vstack([directions, np.zeros((more, directions.shape[1]))])
 
     def _queue(self, end: float | None) -> None:
-        """Queue the open stretch for the search."""
+        """Add the open stretch of rows to the stretches to be searched."""
         assert self._open is not None
         self._open.end = end
         self._queued.append(self._open)
@@ -247,7 +247,7 @@ class ChangeWatch:
             self._work.begin(self._search_queue(), urgent=True)
 
     def _search_queue(self) -> Job:
-        """Search the queued stretches."""
+        """Search the stretches that wait for a search."""
         try:
             while self._queued:
                 stretch = self._queued.popleft()

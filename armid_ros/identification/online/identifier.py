@@ -292,7 +292,7 @@ class OnlineIdentifier:
             same = getattr(settings, part.name) == getattr(self.settings, part.name)
             if part.name not in self.CHANGEABLE and not same:
                 raise IdentificationError(
-                    f'{part.name} cannot change during the identification; restart it'
+                    f'{part.name} cannot change now; restart the identification'
                 )
         if self._watch is None and settings.false_alarm_time is not None:
             raise IdentificationError(

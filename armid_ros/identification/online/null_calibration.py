@@ -64,7 +64,7 @@ class History:
 
 class NullCalibration:
     """
-    Calibration of test statistics by factors over their size in white noise.
+    Factors by which test statistics exceed their size in white noise, for calibration.
 
     The factor of a statistic is the ratio of its mean to its mean in white noise; the largest 5
     % are limited to their quantile. The mean covers the last three quarters of at most ten

@@ -121,7 +121,7 @@ class RecursiveLeastSquares:
         self.reset()
 
     def with_more(self, parameters: tuple[ParameterName, ...]) -> RecursiveLeastSquares:
-        """Return a reset estimator with more parameters, which begin at 0 with a weak prior."""
+        """Return a reset estimator with added parameters, which begin at 0 with a weak prior."""
         wider = copy(self)
         wider.parameters = self.parameters + parameters
         wider._start = np.concatenate([self._start, np.zeros(len(parameters))])
@@ -354,5 +354,5 @@ def check_forgetting(factor: float) -> None:
     """Raise an error for a forgetting factor out of range."""
     if not MIN_FORGETTING <= factor <= 1.0:
         raise IdentificationError(
-            f'the forgetting factor is {factor}, but has to be from {MIN_FORGETTING} to 1'
+            f'the forgetting factor, {factor}, has to be from {MIN_FORGETTING} to 1'
         )

@@ -64,12 +64,10 @@ class PhysicalSettings:
     def __post_init__(self) -> None:
         """Check the values."""
         if self.total_mass is not None and not 0.0 < self.total_mass < np.inf:
-            raise IdentificationError(
-                f'the total mass is {self.total_mass} kg, but has to be positive'
-            )
+            raise IdentificationError(f'the total mass, {self.total_mass} kg, has to be positive')
         if self.mass_range is not None and not 1.0 < self.mass_range < np.inf:
             raise IdentificationError(
-                f'the mass range is {self.mass_range:g}, but has to be a factor above 1'
+                f'the mass range, {self.mass_range:g}, has to be a factor above 1'
             )
         for joint, (lower, upper) in self.boxes.items():
             if len(lower) != 3 or len(upper) != 3 or not np.all(np.less(lower, upper)):

@@ -38,9 +38,7 @@ MAX_MAGNITUDE = 1e6
 def check_gap(samples: int) -> None:
     """Raise an error for a largest gap below 1 sample."""
     if samples < 1:
-        raise IdentificationError(
-            f'the largest gap is {samples} samples, but has to be at least 1'
-        )
+        raise IdentificationError(f'the largest gap, {samples} samples, has to be at least 1')
 
 
 class TripleLag:
@@ -187,9 +185,7 @@ class CausalFilter:
         measured_velocity: bool = False,
     ) -> None:
         if not (np.isfinite(cutoff) and cutoff > 0.0):
-            raise IdentificationError(
-                f'the cut-off frequency is {cutoff} Hz, but has to be above 0'
-            )
+            raise IdentificationError(f'the cut-off frequency, {cutoff} Hz, has to be above 0')
         check_gap(max_gap)
         self._n_joints = n_joints
         self._cutoff = cutoff

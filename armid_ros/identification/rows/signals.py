@@ -70,9 +70,7 @@ class SignalSettings:
     def __post_init__(self) -> None:
         """Raise an error for a cut-off or decimation out of range."""
         if self.cutoff_hz is not None and not self.cutoff_hz > 0.0:
-            raise IdentificationError(
-                f'the cut-off is {self.cutoff_hz} Hz, but has to be positive'
-            )
+            raise IdentificationError(f'the cut-off, {self.cutoff_hz} Hz, has to be positive')
         if self.decimation is not None and self.decimation < 1:
             raise IdentificationError(f'decimation is {self.decimation}, but has to be 1 or more')
 
@@ -238,7 +236,7 @@ def _shortest(used: Conditioning) -> float:
 
 
 def no_stretch(recording: Recording, used: Conditioning) -> IdentificationError:
-    """Return the error for a recording without a long enough stretch, with the cause."""
+    """Return the error for a recording whose stretches are all too short, with the cause."""
     uneven = uneven_stamps(recording, used.cutoff_hz)
     if uneven:
         return IdentificationError(uneven)

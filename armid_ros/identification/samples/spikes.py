@@ -186,7 +186,7 @@ class SpikeGate:
         curvature: FloatArray | float = 0.0,
     ) -> None:
         """
-        Begin within a recording; its usual errors are known.
+        Begin within a recording whose usual errors are known.
 
         Parameters
         ----------
@@ -235,7 +235,7 @@ class SpikeGate:
 
     @property
     def _tail(self) -> StreamSample | None:
-        """Return the newest sample that is not damaged, as far as known."""
+        """Return the newest sample that is undamaged, as far as is known."""
         latest = self._pending or self._first or self._reference
         return latest[-1] if latest else None
 

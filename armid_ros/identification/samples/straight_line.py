@@ -159,7 +159,7 @@ def growth_over(step: Time, ahead: Time, period: float) -> tuple[Time, Time]:
 def innovation_of(
     reference: Sequence[StreamSample], sample: StreamSample, period: float
 ) -> Innovation:
-    """Return the error of the straight line through two samples at another one."""
+    """Return the error with which a straight line through two samples predicts another one."""
     before, last = reference
     step, ahead = last.t - before.t, sample.t - last.t
     error = sample.x - last.x - ahead / step * (last.x - before.x)

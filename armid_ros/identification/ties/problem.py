@@ -175,10 +175,7 @@ def interaction_problem(
     """
     robot, other, ties = machines.robot, machines.other, machines.ties
     if motion.tau is None:
-        raise IdentificationError(
-            f'{robot.name}: its motion has no torques, but the stiffness cannot be found without '
-            'them'
-        )
+        raise IdentificationError(f'{robot.name}: its motion has no torques to find the stiffness')
     if len(motion) != len(other_motion) or np.max(np.abs(motion.t - other_motion.t)) > 1e-6:
         raise IdentificationError(
             f'{robot.name} and {other.name}: their motions have to be on one time base'

@@ -170,9 +170,7 @@ def _least_squares(problem: InteractionProblem, columns: FloatArray) -> FloatArr
     # the spring is not extended if its RMS torque per stiffness [m^2] is smaller
     if not np.all(springs > 1e-9 * np.sqrt(len(w))):
         name = problem.segments[int(np.argmin(springs))]
-        raise IdentificationError(
-            f'{name}: its spring is never extended, so its stiffness is not identifiable'
-        )
+        raise IdentificationError(f'{name}: a spring that never stretches is not identifiable')
     y = problem.tau - problem.known
     return np.asarray(np.linalg.lstsq(w / scale, y.ravel(), rcond=None)[0] / scale)
 
@@ -188,7 +186,7 @@ class _Step(NamedTuple):
 
 
 def _gauss_newton(problem: InteractionProblem, theta: FloatArray, variance: FloatArray) -> _Step:
-    """Linearise at the most likely motion, given the residuals."""
+    """Linearise the problem at the most likely motion, given the residuals."""
     by_motion = problem.sensitivity(theta)
     covariance = _noise(problem, by_motion, variance)
     residual = problem.residual(theta)

@@ -27,7 +27,7 @@ class Freshness:
         self._heard: float | None = None
 
     def heard(self) -> None:
-        """Register a message."""
+        """Register that a message has arrived."""
         self._heard = self.now()
 
     @property

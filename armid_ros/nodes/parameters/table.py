@@ -170,7 +170,7 @@ def declare(node: Node, table: Iterable[NodeParameter]) -> dict[str, NodeParamet
 
 
 def overrides(node: Node) -> Mapping[str, Parameter]:
-    """Return the parameter overrides of a node by name, declared or not."""
+    """Return the parameters with which a node was started, by name, declared or not."""
     given: Mapping[str, Parameter] = node._parameter_overrides
     return given
 

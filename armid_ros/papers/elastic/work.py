@@ -36,7 +36,7 @@ DEMO_BAGS = ('resonances', 'steps')
 
 
 def machine(**given: str | None) -> tuple[FloatArray, TwoLinkParameters, VelocityLoop]:
-    """Return positions of accelerometers, drives and loop: as given, or of the shipped arm."""
+    """Return where accelerometers are, drives and loop: as given, or of the shipped arm."""
     shipped = two_link_set('after')
     loop = two_link_loop(shipped)
     defaults = {

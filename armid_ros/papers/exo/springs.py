@@ -238,9 +238,7 @@ class OnlineInteraction:
         robot, other = self.machines.robot, self.machines.other
         n = robot.n_joints
         if len(self._own.t) < 2 or len(self._far.t) < 2:
-            raise IdentificationError(
-                f'joint states of both {robot.name} and {other.name} are needed'
-            )
+            raise IdentificationError(f'joint states of {robot.name} and {other.name} are needed')
         begin = self._own.t[0]
         rows = np.array(self._own.rows)
         own, far = (

@@ -128,7 +128,7 @@ _RATE = 100.0
 @dataclass(frozen=True, eq=False)
 class MethodErrors:
     """
-    Errors of one method of identification.
+    Torque errors of one method of identification.
 
     Attributes
     ----------

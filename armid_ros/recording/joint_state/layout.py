@@ -168,7 +168,7 @@ class JointStateLayout:
 
     @cached_property
     def number(self) -> np.dtype[np.float64]:
-        """Format of a value."""
+        """Format of one value in a message."""
         return np.dtype(self.order + 'f8')
 
     @cached_property

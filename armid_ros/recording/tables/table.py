@@ -42,7 +42,7 @@ _ENDINGS += ('ms', 'us', 'ns', 'nsec', 'sec', 's')
 @dataclass(frozen=True, eq=False)
 class TableColumn:
     """
-    One column.
+    One column of a table: name, values and unit.
 
     Attributes
     ----------
@@ -83,7 +83,7 @@ class TableColumn:
 
     @property
     def finite(self) -> FloatArray:
-        """Return the finite values."""
+        """Return the values of the column that are finite."""
         return self.values[np.isfinite(self.values)]
 
 

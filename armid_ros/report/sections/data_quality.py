@@ -31,7 +31,7 @@ def data_quality_section(
     at_fault: Collection[str] = (),
 ) -> ContentSection:
     """
-    Return rate, gaps and repairs of every recording.
+    Return the section on rate, gaps and repairs of every recording.
 
     Parameters
     ----------

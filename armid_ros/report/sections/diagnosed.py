@@ -334,7 +334,7 @@ def gap_section(diagnosis: Diagnosis, gap: Gap) -> ContentSection:
 
 
 def gap_bars(diagnosis: Diagnosis, gap: Gap) -> BarChart:
-    """Return the errors of each joint over its floor, the largest first."""
+    """Return bars of the error of each joint in units of its floor, the largest first."""
     robot = diagnosis.arm.robot
     roles: list[tuple[Role, str, FloatArray]] = [
         ('before', 'given model', gap.before),

@@ -120,7 +120,7 @@ def test_omitted_values_are_one_note_of_two_digits(carrying, tmp_path):
 
 def test_what_cannot_be_written_is_an_error_with_the_answer(carrying, tmp_path):
     to_cpp = (carrying, '--to', 'cpp', '--out', tmp_path / 'o')
-    assert '--frame can be used only with --to ur' in run(*to_cpp, '--frame', 'forearm', code=2)
+    assert '--frame is only for --to ur' in run(*to_cpp, '--frame', 'forearm', code=2)
     with pytest.raises(ArmidError, match='--out'):
         run(carrying, '--to', 'ranges', '--out', carrying)
     coupled = tmp_path / 'coupled.urdf'

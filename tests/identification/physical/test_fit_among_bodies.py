@@ -172,7 +172,7 @@ def test_a_nearly_singular_described_inertia_is_no_narrow_prior(arm):
 @pytest.mark.parametrize(
     ('settings', 'said'),
     [
-        ({'total_mass': -1.0}, r'total mass is -1.*positive'),
+        ({'total_mass': -1.0}, r'total mass, -1.*positive'),
         ({'boxes': {'elbow': ((0, 0, 0), (1, -1, 1))}}, r"joint 'elbow'.*below"),
         *(({'mass_range': factor}, 'a factor above 1') for factor in (1.0, 0.5, np.inf, np.nan)),
     ],

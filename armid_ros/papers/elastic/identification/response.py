@@ -202,7 +202,7 @@ class _Arm:
         modes: npt.NDArray[np.int_],
         torque: DualArray,
     ) -> tuple[DualArray, DualArray, DualArray, npt.NDArray[np.int_]]:
-        """Return angle of joint 2, state, accelerations and friction modes one step later."""
+        """Return angle of joint 2, state, accelerations and friction modes after one step."""
         dt, a = self.dt, self.a
         middle = q2 + 0.5 * dt * (x[:, 5] + 0.25 * dt * dv[:, 3])
         v = x[:, 4:] + 0.5 * dt * dv[:, 2:]

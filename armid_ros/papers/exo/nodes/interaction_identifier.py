@@ -71,7 +71,7 @@ class InteractionIdentifierNode(ArmidNode):
     )
 
     def __init__(self, **kwargs: Any) -> None:
-        """Identify the ties of the shipped leg pair."""
+        """Make the node, which identifies the ties of the shipped leg pair."""
         super().__init__('interaction_identifier', **kwargs)
         pair = leg_pair()
         names = ('memory', 'period', 'slack_period', 'inertias')
@@ -171,9 +171,7 @@ class InteractionIdentifierNode(ArmidNode):
         parts = [np.array(getattr(message, name)) for name in fields]
         for name, part in zip(fields, parts, strict=True):
             if len(part) != len(message.name):
-                raise RecordingError(
-                    f'there are {len(message.name)} names but {len(part)} values of {name}'
-                )
+                raise RecordingError(f'{len(message.name)} names but {len(part)} values of {name}')
         signal = np.concatenate([part[order] for part in parts])
         if not np.all(np.abs(signal) <= MAX_MAGNITUDE):
             raise RecordingError('implausibly large values')

@@ -80,7 +80,7 @@ class WalkingMachine:
 
     @property
     def weight(self) -> float:
-        """Return the weight [N]."""
+        """Return the weight of the machine [N]."""
         mass = self.robot.rigid_parameters[::10].sum()
         return float(mass * np.linalg.norm(self.robot.gravity))
 
