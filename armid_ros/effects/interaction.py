@@ -36,7 +36,7 @@ _ATTACHMENT_SHAPES = tuple(
 
 @dataclass(frozen=True)
 class Attached(Effect):
-    """An effect between a point of each link and an anchor."""
+    """An effect, such as a spring, that joins one point of a link to an anchor."""
 
     @classmethod
     def _possible_joints(cls, robot: Robot) -> tuple[str, ...]:

@@ -36,7 +36,7 @@ class JointSpring(JointLaw):
     on_links = True
 
     def law(self, x: JointStates) -> tuple[FloatArray, ...]:
-        """Return the torque per stiffness and per preload: q and 1."""
+        """Return the torque per unit of stiffness, q, and per unit of preload, 1."""
         return x.q, np.ones_like(x.q)
 
     def plausible(self, values: FloatArray, std: FloatArray, arm: Arm) -> bool:

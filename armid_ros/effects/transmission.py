@@ -112,7 +112,7 @@ class Backlash(Displacing):
 
 
 def place_in_gap(t: FloatArray, pull: FloatArray, width: float) -> FloatArray:
-    """Return the position of an accelerated body between two stops, shape (N,)."""
+    """Return the position of a body in the backlash, accelerated between its stops, (N,)."""
     speed = cumulative_trapezoid(pull, t, initial=0.0)
     way = cumulative_trapezoid(speed, t, initial=0.0)
     times, speeds, ways = t.tolist(), speed.tolist(), way.tolist()

@@ -303,8 +303,8 @@ def refuse_foreign(folder: Path, schema: str, also: Collection[str] = ()) -> Non
     for name in names:
         if not any(fnmatch(name.removeprefix('.').removesuffix('.part'), one) for one in writes):
             raise OutputError(
-                f'{folder}: holds {name}, which this command does not write; name another '
-                'folder, or keep that file with --force'
+                f'{folder}: contains {name}, which this command does not write; choose another '
+                'folder, or write beside that file with --force'
             )
     for name in _foreign(folder, names):
         raise OutputError(

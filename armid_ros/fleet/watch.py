@@ -87,7 +87,7 @@ ARMS = pa.schema(
 @dataclass(frozen=True, eq=False)
 class WatchedArm:
     """
-    The history of an arm.
+    The estimates of an arm so far, and the changes in them.
 
     Attributes
     ----------

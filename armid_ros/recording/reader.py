@@ -281,8 +281,8 @@ def read_pieces(
         chosen, *others = choose_topics(bag, joints, topic)
         if others:
             raise RecordingError(
-                f'{path}: joints are spread over {chosen.name} and {others[0].name}, which cannot '
-                'be read piece by piece: merge them with joint_state_merger'
+                f'{path}: joints are spread over the topics {chosen.name} and {others[0].name}, '
+                'so the bag cannot be read in pieces: merge the topics with joint_state_merger'
             )
         decoder = JointStateDecoder(joints)
         held: list[JointSamples] = []

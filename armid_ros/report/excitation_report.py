@@ -141,7 +141,7 @@ def _verdict(
     notes: Sequence[str],
     step: str,
 ) -> VerdictSection:
-    """Return the verdict with identifiable parameters, the least accurate one, and clearance."""
+    """Return the verdict: number of identifiable parameters, least accurate one, clearance."""
     settings, links, joints = design.settings, robot.links, design.limits.joints
     unseen = [
         full_label(name, links)

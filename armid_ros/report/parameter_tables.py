@@ -78,7 +78,7 @@ def grouping(name: ParameterName, links: Sequence[str] = ()) -> str:
 
 
 def arm_facts(arm: ArmModel, robot: str) -> list[tuple[str, str]]:
-    """Return the description as given, driven joints, gravity and effects of an arm."""
+    """Return the facts of an arm: description file, driven joints, gravity and effects."""
     gravity = ', '.join(f'{g:.4g}' for g in arm.robot.gravity)
     return [
         ('Robot', robot),

@@ -163,10 +163,9 @@ def split_constant(friction: DryFriction | None, n_joints: int) -> tuple[DryFric
         worst = int(pushing[0])
         joint = int(np.argmax(friction.directions[worst] != 0.0)) + 1  # noqa: RUF069 - directions of single joints are exact
         raise ModelError(
-            f'dry friction of joint {joint} is negative: its torque forwards is less than '
-            f'backwards '
-            f'({friction.upper[worst]:g} against {friction.lower[worst]:g} N m); friction torques '
-            'have to be positive'
+            f'dry friction of joint {joint} is negative: its upper limit, '
+            f'{friction.upper[worst]:g} N m, is below its lower limit, '
+            f'{friction.lower[worst]:g} N m'
         )
     share = np.zeros(len(friction.lower)) if friction.load_share is None else friction.load_share
     constant = (span <= NO_FRICTION) & (np.abs(share) <= NO_FRICTION)

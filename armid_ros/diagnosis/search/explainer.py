@@ -297,7 +297,7 @@ def _noise_within(
     misfit: FloatArray, prepared: Prepared, contained: FloatArray
 ) -> tuple[FloatArray, ...]:
     """
-    Return the noise of each trajectory if the misfit already contains some noise, (n,).
+    Return the torque noise of each trajectory, limited by the misfit of each joint, (n,).
 
     An event in one of two periods increases their difference, but it belongs to the gap. The
     noise is limited to the misfit plus the excess of row-to-row differences over those in it.

@@ -290,7 +290,7 @@ def _beyond_masses(factor: float) -> bool:
 def _times(
     robot: Robot, quantity: Quantity, joint: int | slice, factor: float
 ) -> Callable[[Motion], Motion]:
-    """Return a function that multiplies a quantity of one or several joints."""
+    """Return a function that multiplies a quantity of one or all joints by a factor."""
     scale = np.ones(robot.n_joints)
     scale[joint] = factor
     return partial(_changed, quantity, np.diag(scale))

@@ -142,7 +142,7 @@ def _forward_score(
 @dataclass(frozen=True)
 class ForwardValidation:
     """
-    A held-out recording, simulated before and after the identification.
+    A held-out recording, simulated with the models before and after the identification.
 
     Attributes
     ----------

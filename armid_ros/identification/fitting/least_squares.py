@@ -228,7 +228,7 @@ def solve(
 def _robust(
     problem: Sequence[Regression], used: npt.NDArray[np.bool_], fit: WeightedFit
 ) -> tuple[WeightedFit, FloatArray]:
-    """Reduce the weight of outliers; return the fit and the unscaled row factors, (N, n)."""
+    """Reduce the weight of outliers; return the fit and the weights before scaling, (N, n)."""
     relative: FloatArray = used.astype(float)
     for _ in range(_MAX_ITERATIONS):
         before = (fit.scale, relative)

@@ -38,7 +38,9 @@ MAX_MAGNITUDE = 1e6
 def check_gap(samples: int) -> None:
     """Raise an error for a largest gap below 1 sample."""
     if samples < 1:
-        raise IdentificationError(f'the largest gap, {samples} samples, has to be at least 1')
+        raise IdentificationError(
+            f'the longest interruption to bridge has to be at least 1 sample, not {samples}'
+        )
 
 
 class TripleLag:

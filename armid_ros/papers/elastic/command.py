@@ -100,7 +100,9 @@ def elastic(
         identify_springs(bags, robot, robot_source, model, out, as_json)
         return
     if model is not None:
-        raise RobotError('--model is not available here: the three steps identify the inertias')
+        raise RobotError(
+            '--model is not available here: this method identifies the inertias itself'
+        )
     radius, drives, loop = work.machine(**given)
     staged = options.stage(out, report.SCHEMA, robot_source)
     with progress('reading') as tick:

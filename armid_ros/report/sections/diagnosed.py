@@ -317,7 +317,7 @@ def _candidate_value(diagnosis: Diagnosis, trial: Trial) -> str:
 
 
 def gap_section(diagnosis: Diagnosis, gap: Gap) -> ContentSection:
-    """Return the errors of each joint before and after, in units of its noise floor."""
+    """Return the errors of joints before and after the named effects, over their floors."""
     floor, harmful = diagnosis.baseline, bool(diagnosis.harmful)
     where = 'recordings not used for the fit' if gap.predicted else gap.data
     kept = ' The model in model.yaml does not have the named cause.' * harmful

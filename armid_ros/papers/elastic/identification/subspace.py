@@ -106,8 +106,8 @@ def identify_subspace(
     columns = sum(max(len(e.u) - 2 * _HORIZON + 1, 0) for e in experiments)
     if columns < needed:
         raise IdentificationError(
-            f'subspace identification: {columns} samples after the first {2 * _HORIZON} of each '
-            f'experiment are too few; {needed} are needed'
+            f'the recordings are too short for subspace identification: {needed} samples after '
+            f'the first {2 * _HORIZON} of each experiment are needed, but there are {columns}'
         )
     u_scale, y_scale = (
         np.sqrt(np.mean(np.concatenate([getattr(e, name) for e in experiments]) ** 2, axis=0))
