@@ -36,6 +36,7 @@ from armid_ros.identification import (
     identification_document,
     IdentificationSettings,
     PhysicalSettings,
+    Score,
     SignalSettings,
     Verification,
     write_document,
@@ -121,6 +122,17 @@ class IdentificationResult(ShownModel):
     def estimate(self) -> Estimate:
         """Return the base and effect parameters with covariance."""
         return self.core.estimate
+
+    @property
+    def training(self) -> Score:
+        """Errors on the training data."""
+        return Score.of(self.core.training)
+
+    @property
+    def held_out_score(self) -> Score | None:
+        """Errors on held-out recordings; None if there are none."""
+        fits = [fit for part in self.validation.values() for fit in part]
+        return Score.of(fits) if fits else None
 
     @property
     def error_percent(self) -> float:

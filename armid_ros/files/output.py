@@ -304,7 +304,7 @@ def refuse_foreign(folder: Path, schema: str, also: Collection[str] = ()) -> Non
         if not any(fnmatch(name.removeprefix('.').removesuffix('.part'), one) for one in writes):
             raise OutputError(
                 f'{folder}: contains {name}, which this command does not write; choose another '
-                'folder, or write beside that file with --force'
+                'folder, or add --force to keep that file and write there'
             )
     for name in _foreign(folder, names):
         raise OutputError(

@@ -3,10 +3,8 @@
 """The share of a gap that names explain of data that they were not fitted to."""
 
 from dataclasses import replace
-from types import SimpleNamespace
 
 from armid_ros.diagnosis.data.evidence import Evidence, noise_floor
-from armid_ros.diagnosis.data.trajectory import block_rows
 from armid_ros.diagnosis.search.cause import NamedEffect
 from armid_ros.diagnosis.search.explanation import Explanation
 from armid_ros.diagnosis.search.posterior import JointFit
@@ -46,11 +44,11 @@ def test_a_share_is_that_of_the_squares_and_lies_in_its_interval():
     rng = np.random.default_rng(0)
     whole = rng.uniform(1.0, 2.0, size=40)
     taken = np.array([0.6, 0.1])[:, np.newaxis] * whole * rng.uniform(0.9, 1.1, size=(2, 40))
-    shares = Attribution(whole, taken)
+    shares = Attribution((0, 1), whole, taken)
     low, high = shares.interval([0, 1], rng)
     assert low < shares.share([0, 1]) < high
     assert shares.share([0, 1]) == pytest.approx(0.7, abs=0.02)
-    more = Attribution(whole, taken + whole)
+    more = Attribution((0, 1), whole, taken + whole)
     assert more.share([0]) == 1.0 and more.interval([0], rng) == (1.0, 1.0)
 
 
@@ -59,19 +57,9 @@ def test_a_cause_that_predicts_nothing_of_other_data_is_minor(bench, sprung):
     kept, shares = headline(sprung, evidence_of(bench, spring), 0.1, settings)
     assert kept is sprung and shares.share([0]) > 0.95
     fewer, shares = headline(sprung, evidence_of(bench, None), 0.0, settings)
-    assert (fewer.steps, fewer.minor, len(shares.gains)) == ((), ('spring',), 0)
+    assert (fewer.steps, fewer.minor, shares.order) == ((), ('spring',), ())
 
 
 def test_folds_that_were_not_fitted_show_it_as_well(sprung):
-    sprung = replace(sprung, steps=('spring',))
-    folds, whole = left_out(sprung), predicted(sprung, sprung.evidence)
+    folds, whole = left_out(sprung), predicted(sprung, [0], sprung.evidence)
     assert folds.share([0]) == pytest.approx(whole.share([0]), abs=0.01)
-
-
-@pytest.mark.parametrize('rows', [1, 2, 7, 13, 60, 200])
-def test_every_block_has_rows(rows):
-    """A short stretch makes folds of a row or two."""
-    parts = [SimpleNamespace(fold=k, rows=np.arange(count)) for k, count in enumerate((rows, 90))]
-    block, fold = block_rows(parts)
-    assert np.all(np.bincount(block, minlength=len(fold)) > 0)
-    assert len(block) == rows + 90

@@ -212,7 +212,7 @@ def spoil(good, what):
 
 SPOILED = {
     'unknown joints': 'left, right',
-    'wrong length': '1 of position',
+    'wrong length': '1 values of position',
     'no effort': 'measured torque',
     'nan': "effort of 'elbow'",
     'infinite': "position of 'shoulder'",

@@ -147,6 +147,6 @@ class JointStateReader:
         if not math.isfinite(sum(values.tolist())) and not np.all(np.isfinite(values)):
             bad = int(np.argmin(np.isfinite(values)))
             raise RecordingError(
-                f"joint states contain a {name} of '{self._joints[bad]}' that is not a number"
+                f"the {name} of '{self._joints[bad]}' in joint states is not a number"
             )
         return values
