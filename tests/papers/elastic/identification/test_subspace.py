@@ -67,7 +67,7 @@ def test_spectra_agree_without_a_model(clean) -> None:
 
 def test_too_little_data_is_refused(clean) -> None:
     short = [Signals(e.u[:60], e.y[:60]) for e in clean]
-    with pytest.raises(IdentificationError, match='too few'):
+    with pytest.raises(IdentificationError, match='too short'):
         identify_subspace(short, DT, 3, ('zero', 'first'))
 
 
