@@ -247,14 +247,14 @@ class CauseComparison:
     def look(self, nuisance: Nuisance) -> Look:
         """Compare every cause that is not accepted yet, and refine the shapes of the best."""
         settings, likeliest = self._settings(nuisance), self._likeliest(nuisance)
-        tried = dict[int, Marginal]()  # the best one, and noise only, of each size of link errors
+        tried = list[Marginal]()  # the best one, and noise only, of each size of link errors
         for body in dict.fromkeys(one.setting.body for one in settings):
             own = [one for one in settings if one.setting.body == body]
             best = max(own, key=lambda one: one.evidence)
-            tried |= {id(one): one for one in (best, own[0])}
+            tried += [best] if best is own[0] else [best, own[0]]
         causes = self._causes_of(nuisance)
         first: dict[object, tuple[float, Cause, Marginal]] = {}
-        for one in tried.values():
+        for one in tried:
             for cause, fit in all_odds(causes, nuisance, one):
                 worth = fit.factor + one.evidence + cause.prior
                 if cause.key not in first or worth > first[cause.key][0]:
@@ -323,10 +323,10 @@ def settings_of_baseline(nuisance: Nuisance) -> tuple[Setting, ...]:
     before = np.flatnonzero(~nuisance.rows.today).tolist()
     lasting = 1.0
     for _ in range(2):
-        tried = [
-            nuisance.marginal(Setting(1.0, shared, own, noise, lasting), before)
-            for own, noise, shared in product(_OWN, _NOISE, _SHARED)
-        ]
+        tried = list[Marginal]()
+        for own, noise in product(_OWN, _NOISE):
+            grid = [Setting(1.0, shared, own, noise, lasting) for shared in _SHARED]
+            tried += nuisance.marginals(grid, before)
         found = max(tried, key=lambda one: one.evidence)
         lasting = nuisance.lasting(found, before, LASTING)
     return (replace(found.setting, lasting=lasting),)

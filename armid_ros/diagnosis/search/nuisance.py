@@ -285,13 +285,22 @@ class Nuisance:
         among: Sequence[int] | None = None,
         less: tuple[int, FloatArray, FloatArray] | None = None,
     ) -> Marginal:
+        """Return the posterior under one setting; see `marginals`."""
+        return self.marginals([setting], among, less)[0]
+
+    def marginals(
+        self,
+        settings: Sequence[Setting],
+        among: Sequence[int] | None = None,
+        less: tuple[int, FloatArray, FloatArray] | None = None,
+    ) -> list[Marginal]:
         """
-        Integrate out the discrepancies d_k and fit the other parameters.
+        Integrate out the discrepancies d_k once, and fit the other parameters in each setting.
 
         Parameters
         ----------
-        setting : Setting
-            Amplitudes of discrepancy and noise.
+        settings : sequence of Setting
+            Amplitudes of discrepancy and noise, which differ in those of the priors alone.
         among : sequence of int, optional
             The recordings that are fitted; all by default.
         less : (int, ndarray, shape (S, q + a), ndarray, shape (S,)), optional
@@ -300,20 +309,21 @@ class Nuisance:
         """
         fitted = list(range(len(self.columns)) if among is None else among)
         square, cross, count = self.square[fitted], self.cross[fitted], self.count[fitted].sum()
-        scale, power = setting.precision, float(self.power[fitted].sum())
+        scale, power = settings[0].precision, float(self.power[fitted].sum())
         if less is not None:
             k, x, y = less
             square[fitted.index(k)] -= x.T @ x
             cross[fitted.index(k)] -= x.T @ y
             count, power = count - len(y), power - float(y @ y)
-        used, matrix = self.prior(setting)
-        evidence = 0.5 * float(np.linalg.slogdet(matrix)[1]) + setting.prior
-        matrix += square.sum(axis=0)[np.ix_(used, used)] * scale
+        priors = [self.prior(one) for one in settings]
+        used = priors[0][0]
+        known = square.sum(axis=0)[np.ix_(used, used)] * scale
         vector = cross.sum(axis=0)[used] * scale
         loss, motion = 0.5 * power * scale, None
-        if setting.own:
+        normaliser = -float(count) / settings[0].lasting * np.log(settings[0].noise)
+        if settings[0].own:
             place, functions = self.discrepancy, self.discrepancy.shape[1]
-            size = setting.own * np.array(self.rows.amplitude)[fitted]
+            size = settings[0].own * np.array(self.rows.amplitude)[fitted]
             precision = square[:, place[:, :, np.newaxis], place[:, np.newaxis, :]] * scale
             precision += np.eye(functions) * size[:, :, np.newaxis, np.newaxis] ** -2.0
             covariance = np.asarray(np.linalg.inv(precision))
@@ -321,18 +331,21 @@ class Nuisance:
             regressed = covariance @ border.reshape(*precision.shape[:3], -1)
             regressed = regressed.reshape(border.shape)
             aim = cross[:, place] * scale
-            matrix -= border.reshape(-1, len(used)).T @ regressed.reshape(-1, len(used))
+            known -= border.reshape(-1, len(used)).T @ regressed.reshape(-1, len(used))
             vector -= aim.ravel() @ regressed.reshape(-1, len(used))
             loss -= 0.5 * float(np.einsum('kjf,kjfg,kjg->', aim, covariance, aim))
-            evidence -= 0.5 * float(np.linalg.slogdet(precision)[1].sum())
-            evidence -= functions * float(np.log(size).sum())
+            normaliser -= 0.5 * float(np.linalg.slogdet(precision)[1].sum())
+            normaliser -= functions * float(np.log(size).sum())
             motion = MotionDiscrepancy(covariance, aim, regressed)
-        lower = np.asarray(np.linalg.cholesky(matrix))
-        values = linalg.cho_solve((lower, True), vector)
-        loss -= 0.5 * float(vector @ values)
-        evidence -= loss + float(count) / setting.lasting * np.log(setting.noise)
-        evidence -= float(np.sum(np.log(np.diag(lower))))
-        return Marginal(setting, used, lower, values, evidence, loss, motion)
+        found = []
+        for setting, (_, prior) in zip(settings, priors, strict=True):
+            lower = np.asarray(np.linalg.cholesky(prior + known))
+            values = linalg.cho_solve((lower, True), vector)
+            left = loss - 0.5 * float(vector @ values)
+            evidence = 0.5 * float(np.linalg.slogdet(prior)[1]) + setting.prior + normaliser - left
+            evidence -= float(np.sum(np.log(np.diag(lower))))
+            found.append(Marginal(setting, used, lower, values, evidence, left, motion))
+        return found
 
     def whole(self, under: Marginal) -> tuple[FloatArray, FloatArray]:
         """Return means and covariance of all parameters; zero for those that are not fitted."""
