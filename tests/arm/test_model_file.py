@@ -15,7 +15,7 @@ import pytest
 import yaml
 
 READERS = (load_model, load_misfit, read_parameters)
-#: What is written in place of what, and what is said then.
+#: Fault in a model file: old text, new text, and words of the error message.
 FAULTS = {
     'a key of the model': ('rigid_parameters:', 'rigid_paramters:', 'rigid_paramters'),
     'a key that is missing': ('gravity:\n- 0.0\n- 0.0\n- -9.81\n', '', 'gravity'),

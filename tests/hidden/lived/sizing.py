@@ -62,7 +62,7 @@ def rows_of(described: Chain, path: Path, tau: FloatArray) -> Rows:
 
 
 def misfit(recordings: Sequence[Rows]) -> FloatArray:
-    """Return what is left of each joint where the other recordings are fitted, rms, (n,) [N m]."""
+    """Return the residual of joints with the other recordings fitted, rms, (n,) [N m]."""
     left = []
     for k, (columns, tau) in enumerate(recordings):
         left.append(tau - columns @ _fit([*recordings[:k], *recordings[k + 1 :]]))
