@@ -15,7 +15,7 @@ from armid_ros.diagnosis.search.cause import NamedEffect
 from armid_ros.diagnosis.search.comparison import Result
 from armid_ros.diagnosis.search.posterior import Fitted, JointFit
 from armid_ros.diagnosis.search.trial import Key, Look, Trial
-from armid_ros.diagnosis.settings import DiagnosisSettings
+from armid_ros.diagnosis.settings import DiagnosisSettings, HOW_OFTEN, SIZES
 from armid_ros.effects import Effect
 from armid_ros.motion import FloatArray
 import numpy as np
@@ -195,8 +195,9 @@ def _unset(
     """
     Yield friction and offsets whose values are not given; they are fitted with every cause.
 
-    The odds of a nonzero value are the prior density at zero over the posterior density at zero
-    (Dickey, The weighted likelihood ratio, 1971).
+    The prior of a value is the one of every other effect: a mixture of normal distributions with
+    standard deviations `SIZES`, times the value whose torque is that of the joint. Most joints have
+    friction and an offset, so the default frequency of these effects is 'often'.
 
     """
     nuisance = result.nuisance
@@ -216,8 +217,12 @@ def _unset(
         sigma = float(nuisance.rows.sigma[-1][joint])
         rms = sigma * np.sqrt(square / count)
         variance = float(covariance[k, k])
-        precision = max(float(nuisance.prior_precision[k, k]), 1e-12)  # of the prior
-        odds = 0.5 * (means[k] ** 2 / variance + np.log(precision * variance))
+        prior = SIZES * nuisance.rows.torque[joint] / max(rms, 1e-300)
+        wide = 1.0 + prior**2 / variance
+        explained = 0.5 * means[k] ** 2 / variance * (1.0 - 1.0 / wide)
+        odds = float(np.logaddexp.reduce(explained - 0.5 * np.log(wide)) - np.log(len(SIZES)))
+        odds += HOW_OFTEN[settings.prior.get(effect.name, 'often')]
+        precision = float(nuisance.prior_precision[k, k])
         resolution = float(np.clip(1.0 - variance * precision, 0.0, 1.0))
         yield Trial(
             effect,
