@@ -117,11 +117,11 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
-    """Import a public name when it is first used."""
+    """Import a public name of the package at its first use; raise AttributeError if unknown."""
     if name not in _HOMES:
         raise AttributeError(
-            f"armid_ros has no '{name}'; it has {', '.join(__all__)}, and packages such as "
-            'armid_ros.excitation'
+            f"armid_ros has no public name '{name}'; its public names are {', '.join(__all__)}, "
+            'and it has packages such as armid_ros.excitation'
         )
     value = getattr(import_module(_HOMES[name]), name)
     globals()[name] = value
@@ -129,5 +129,5 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    """Return the public names of the package."""
+    """Return the public names of the package, for completion."""
     return [*__all__, '__version__']

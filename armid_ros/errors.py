@@ -9,13 +9,13 @@ from difflib import get_close_matches
 
 
 def nearest(name: str, names: Iterable[str]) -> str:
-    """Return the name that is most similar to a text; empty if none is similar enough."""
-    # up to a quarter of the letters may differ
+    """Return the known name that is spelled most like a given name; empty if none is similar."""
+    # 0.75: up to a quarter of the letters may differ
     return next(iter(get_close_matches(name, list(names), 1, 0.75)), '')
 
 
 def meant(name: str, names: Iterable[str]) -> str:
-    """Return the suggestion "; did you mean 'NAME'?"; empty if no name is similar."""
+    """Return a suggestion such as "; did you mean 'elbow'?"; empty if no known name is similar."""
     found = nearest(name, names)
     return f"; did you mean '{found}'?" if found else ''
 
@@ -34,7 +34,7 @@ def visible(text: str) -> str:
 
 class ArmidError(Exception):
     """
-    Base class of errors from bad input; the command line prints the message and exits with 2.
+    Base class of errors caused by bad input; commands print the message and exit with 2.
 
     Examples
     --------
@@ -53,32 +53,32 @@ class ArmidError(Exception):
 
 
 class RobotError(ArmidError):
-    """A robot description cannot be used."""
+    """Error in a robot description, such as an invalid URDF."""
 
 
 class RecordingError(ArmidError):
-    """A recording cannot be read, or does not fit the robot."""
+    """Error in a recording that cannot be read or that does not fit the robot."""
 
 
 class ModelError(ArmidError):
-    """A model file, an effect or a parameter set is not valid."""
+    """Error in a model file, an effect or a set of parameters."""
 
 
 class TrajectoryError(ArmidError):
-    """A trajectory violates the limits of the robot, or no trajectory satisfies them."""
+    """Error of a trajectory that violates limits of the robot, or of a search that found none."""
 
 
 class IdentificationError(ArmidError):
-    """The data do not determine the parameters."""
+    """Error in an identification whose data do not determine the parameters."""
 
 
 class RecordingEnded(RecordingError):
-    """Recording cannot continue: the disk is full, or the file was removed."""
+    """Error that ends a recording: the disk is full, or the file was removed."""
 
 
 class OutputError(ArmidError):
-    """A result cannot be written, or would overwrite another one."""
+    """Error in writing a result, or refusal to overwrite another result."""
 
 
 class FleetError(ArmidError):
-    """A run over a fleet cannot start or cannot continue."""
+    """Error that prevents the start or the continuation of a run over a fleet."""

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Estimated parameters: names, values and covariance."""
+"""Parameters estimated from data: their names, values and covariance."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from armid_ros.errors import meant, ModelError
 from armid_ros.motion import FloatArray, read_only
 import numpy as np
 
-#: Name of a rigid-body parameter: its symbol, with a prefix for a load or a difference.
+#: Names of rigid-body parameters: a symbol, such as 'payload_m' of a payload or 'mx_difference'.
 _OF_BODY = re.compile(r'(?:payload_)?(m[xyz]?|I[xyz]{2})(_difference)?')
 _RIGID = re.compile(r'(m[xyz]?|I[xyz]{2})\d+( |$)')
 
@@ -23,7 +23,7 @@ _RIGID = re.compile(r'(m[xyz]?|I[xyz]{2})\d+( |$)')
 @dataclass(frozen=True)
 class ParameterName:
     """
-    One scalar parameter of a model.
+    Name, joint, unit and effect of one scalar parameter of a model.
 
     Attributes
     ----------
@@ -45,27 +45,27 @@ class ParameterName:
 
     @property
     def words(self) -> str:
-        """Return the name in words, without the joint: 'viscous coefficient'."""
+        """Return the name in words, such as 'viscous coefficient', without the joint."""
         found = _OF_BODY.fullmatch(self.name)
         if found is None:
             return name_in_words(self.name)
-        what = symbol_in_words(found[1])
-        return f'difference of {what}' if found[2] else what
+        quantity = symbol_in_words(found[1])
+        return f'difference of {quantity}' if found[2] else quantity
 
     @property
     def rigid(self) -> bool:
-        """Whether the parameter is, or begins with, a mass, first moment or inertia of a link."""
+        """Whether the name is or begins with the mass, a first moment or inertia of a link."""
         return _RIGID.match(self.name) is not None
 
 
 def name_in_words(name: str) -> str:
-    """Return the name of an effect or parameter in words: 'Coulomb friction'."""
+    """Return an identifier of an effect or parameter in words: 'Coulomb friction'."""
     words = name.replace('_', ' ')
     return words.replace('coulomb', 'Coulomb').replace('stribeck', 'Stribeck')
 
 
 def symbol_in_words(symbol: str) -> str:
-    """Return the name of a rigid-body symbol in words: 'product of inertia xy' for Ixy."""
+    """Return the meaning of an inertial symbol: 'product of inertia xy' for 'Ixy'."""
     if symbol == 'm':
         return 'mass'
     if symbol[0] == 'm':
@@ -107,18 +107,19 @@ class Estimate:
     covariance: FloatArray
 
     def __post_init__(self) -> None:
-        """Freeze the arrays and check their shapes."""
+        """Make the arrays read-only; raise ModelError if they do not fit the parameters."""
         count = len(self.parameters)
         object.__setattr__(self, 'values', read_only(self.values))
         object.__setattr__(self, 'covariance', read_only(self.covariance))
         if self.values.shape != (count,) or self.covariance.shape != (count, count):
             raise ModelError(
-                f'estimate: {count} parameters, but values of shape {self.values.shape} '
-                f'and a covariance of shape {self.covariance.shape}'
+                f'estimate: {count} parameters need {count} values and a covariance of shape '
+                f'{(count, count)}, but the values have shape {self.values.shape} and the '
+                f'covariance has shape {self.covariance.shape}'
             )
 
     def __repr__(self) -> str:
-        """Format the first values with standard deviations, in ten lines at most."""
+        """Return the first values and their standard deviations in at most ten lines."""
         rows = [
             f'  {(p.joint + " ") if p.joint else ""}{p.name} {value:.4g} ± {std:.2g} {p.unit}'
             for p, value, std in zip(self.parameters, self.values, self.std, strict=True)
@@ -129,16 +130,16 @@ class Estimate:
 
     @property
     def std(self) -> FloatArray:
-        """Return the standard deviations, shape (P,)."""
+        """Return the standard deviation of each parameter, shape (P,)."""
         return np.asarray(np.sqrt(np.diag(self.covariance)))
 
     def interval(self, confidence: float = 0.95) -> FloatArray:
-        """Return lower and upper ends of confidence intervals, shape (P, 2)."""
+        """Return lower and upper limits of the parameters' confidence intervals, (P, 2)."""
         reach = NormalDist().inv_cdf(0.5 + confidence / 2.0) * self.std
         return np.column_stack([self.values - reach, self.values + reach])
 
     def __getitem__(self, key: str | tuple[str, str]) -> float:
-        """Return the value of a parameter, or of an effect that has only one parameter."""
+        """Return the value of a parameter, or of the only parameter of an effect."""
         name, joint = (key, '') if isinstance(key, str) else key
         own = [
             k
@@ -148,20 +149,23 @@ class Estimate:
         return float(self.values[own[0] if len(own) == 1 else self.index(name, joint)])
 
     def index(self, name: str, joint: str = '') -> int:
-        """Return the index of a parameter; raise ModelError if there is no such parameter."""
+        """Return the index of a parameter in `parameters`; raise ModelError if it is missing."""
         for position, parameter in enumerate(self.parameters):
             if parameter.name == name and parameter.joint == joint:
                 return position
         own = [one for one in self.parameters if one.joint == joint] or self.parameters
         known = ', '.join(f'{p.name} [{p.joint}]' if p.joint else p.name for p in own)
         guess = meant(name, [one.name for one in own])
-        raise ModelError(f"no parameter '{name}' of joint '{joint}'; there are {known}{guess}")
+        raise ModelError(
+            f"the estimate has no parameter '{name}' of joint '{joint}'; its parameters are "
+            f'{known}{guess}'
+        )
 
 
 def parameter_table(
     names: Sequence[ParameterName], values: FloatArray, std: Sequence[float | None]
 ) -> list[dict[str, Any]]:
-    """Return parameters as rows of name, joint, value, std, unit, ready for YAML or JSON."""
+    """Return one dictionary per parameter (name, joint, value, std, unit) for YAML or JSON."""
     return [
         {
             'name': name.name,
@@ -175,7 +179,7 @@ def parameter_table(
 
 
 def measured(value: float, reach: float) -> tuple[str, str]:
-    """Format a value and the half-width of its interval with their significant digits."""
+    """Return a value and the half-width of its confidence interval as texts, rounded alike."""
     if not (math.isfinite(reach) and reach > 0.0):
         return f'{value:.4g}', '0'
     decimals = max(0, 1 - math.floor(math.log10(reach)))

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Motion of an arm on one time base: the data type of models, effects and simulators."""
+"""Joint motion on one time base: the input of models, effects and simulators."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ Samples = slice | npt.NDArray[np.intp] | npt.NDArray[np.bool_]
 
 def read_only(values: npt.ArrayLike) -> FloatArray:
     """
-    Return the values as a read-only contiguous float64 array.
+    Return values as a contiguous float64 array that cannot be written to.
 
     An array that is already a read-only view of immutable memory is not copied.
 
@@ -30,33 +30,35 @@ def read_only(values: npt.ArrayLike) -> FloatArray:
 
 
 def freeze(instance: object, *names: str) -> None:
-    """Make arrays of a frozen dataclass read-only copies; called from its ``__post_init__``."""
+    """Make array attributes of a frozen dataclass read-only, in its ``__post_init__``."""
     for name in names:
         if getattr(instance, name) is not None:
             object.__setattr__(instance, name, read_only(getattr(instance, name)))
 
 
 def freeze_samples(where: str, samples: Any, *names: str) -> None:
-    """Freeze the arrays of samples of joints; RecordingError if one is not (times, joints)."""
+    """Freeze arrays of joint samples; raise RecordingError unless they are (times, joints)."""
     freeze(samples, 't', *names)
     expected = (len(samples.t), len(samples.joints))
     for name in names:
         values = getattr(samples, name)
         if values is not None and values.shape != expected:
-            said = f'{where}: {name} has shape {values.shape}'
-            raise RecordingError(f'{said}, but the times and joints need {expected}')
+            raise RecordingError(
+                f'{where}: {name} has shape {values.shape}, but the {expected[0]} times and '
+                f'{expected[1]} joints need {expected}'
+            )
     heat = samples.temperature
     if heat is not None and heat.values.shape != (len(heat.t), len(samples.joints)):
         raise RecordingError(
-            f'{where}: temperatures have shape {heat.values.shape}, but their times and the '
-            f'joints need {(len(heat.t), len(samples.joints))}'
+            f'{where}: temperatures have shape {heat.values.shape}, but their {len(heat.t)} times '
+            f'and {len(samples.joints)} joints need {(len(heat.t), len(samples.joints))}'
         )
 
 
 @dataclass(frozen=True)
 class MovingPoints:
     """
-    Points of a partner that moves with an arm, such as the wearer of an exoskeleton.
+    Positions and velocities of points of a partner, such as the wearer of an exoskeleton.
 
     Attributes
     ----------
@@ -72,18 +74,18 @@ class MovingPoints:
     velocity: FloatArray
 
     def __post_init__(self) -> None:
-        """Freeze the arrays."""
+        """Make the arrays read-only."""
         freeze(self, 'position', 'velocity')
 
     def select(self, samples: Samples) -> MovingPoints:
-        """Return the points at some of the samples."""
+        """Return the positions and velocities at selected samples."""
         return replace(self, position=self.position[samples], velocity=self.velocity[samples])
 
 
 @dataclass(frozen=True, eq=False)
 class Temperatures:
     """
-    Measured temperatures of joints, or of their motors, at a few times.
+    Measured temperatures of joints or of their motors, usually at fewer times than the motion.
 
     Attributes
     ----------
@@ -98,11 +100,11 @@ class Temperatures:
     values: FloatArray
 
     def __post_init__(self) -> None:
-        """Freeze the arrays."""
+        """Make the arrays read-only."""
         freeze(self, 't', 'values')
 
     def at(self, t: npt.ArrayLike) -> FloatArray:
-        """Return temperatures at other times (N,), constant beyond both ends, (N, n) [degC]."""
+        """Interpolate the temperatures at times (N,), constant beyond both ends; (N, n) [degC]."""
         return np.column_stack([np.interp(np.ravel(t), self.t, one) for one in self.values.T])
 
 
@@ -153,14 +155,14 @@ class Motion:
     temperature: Temperatures | None = field(default=None, kw_only=True)
 
     def __post_init__(self) -> None:
-        """Freeze the arrays and check that their shapes agree."""
+        """Make the arrays read-only; raise RecordingError if their shapes differ."""
         freeze_samples('motion', self, 'q', 'dq', 'ddq', 'tau')
 
     @classmethod
     def of_states(
         cls, joints: tuple[str, ...], q: npt.ArrayLike, dq: npt.ArrayLike, ddq: npt.ArrayLike
     ) -> Motion:
-        """Return a motion of given states, one per second, each (N, n), (n,) or a number."""
+        """Return a motion of independent states, one per second, each (N, n), (n,) or a number."""
         parts = np.broadcast_arrays(np.atleast_2d(q), dq, ddq)
         return cls(joints, np.arange(len(parts[0]), dtype=float), *map(np.array, parts))
 
@@ -174,7 +176,7 @@ class Motion:
         return len(self.joints)
 
     def select(self, samples: Samples) -> Motion:
-        """Return the motion at selected samples."""
+        """Return the motion at selected samples, on the same time base."""
         return replace(
             self,
             t=self.t[samples],
@@ -186,21 +188,21 @@ class Motion:
         )
 
     def at_rest(self) -> Motion:
-        """Return the same positions with zero velocity and acceleration."""
+        """Return the motion with the same positions, and with zero velocity and acceleration."""
         zero = np.zeros_like(self.q)
         return replace(self, dq=zero, ddq=zero)
 
     def with_torque(self, tau: npt.ArrayLike | None) -> Motion:
-        """Return the same motion with another torque, shape (N, n) [N m]."""
+        """Return the motion with another measured torque, shape (N, n) [N m or N]."""
         return replace(self, tau=None if tau is None else read_only(tau))
 
 
 @dataclass(frozen=True)
 class BlurredMotion(Motion):
     """
-    Motion whose direction is smoothed at reversals, as tanh(dq / width).
+    Motion with a smooth direction of each joint, tanh(dq / width), in place of the sign of dq.
 
-    The sign of a velocity has no useful gradient for a search for trajectories.
+    A search for trajectories needs a gradient, which the sign of a velocity does not have.
 
     Attributes
     ----------
@@ -212,7 +214,7 @@ class BlurredMotion(Motion):
     width: FloatArray = field(kw_only=True)
 
     def __post_init__(self) -> None:
-        """Freeze the arrays."""
+        """Make the arrays read-only."""
         super().__post_init__()
         object.__setattr__(self, 'width', read_only(self.width))
 
@@ -220,7 +222,7 @@ class BlurredMotion(Motion):
 @dataclass(frozen=True, eq=False)
 class ElasticRun:
     """
-    True or measured signals of one experiment with an elastic arm.
+    Signals of one experiment with an elastic arm, true ones or measured ones.
 
     Attributes
     ----------

@@ -1,10 +1,11 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Entry points of commands and nodes: of the fleet, of the papers and of other packages.
+Commands and nodes of plug-ins, found by the entry points of installed packages.
 
-A package names a click command in the group ``armid_ros.commands``, and the module of a node,
-which has a function ``main``, in the group ``armid_ros.nodes``. Effects have a separate group.
+The fleet, the papers and packages of other authors are plug-ins. A package names a click command
+in the group ``armid_ros.commands``. It names the module of a node, which has a function ``main``,
+in the group ``armid_ros.nodes``. Effects have a separate group.
 
 """
 
@@ -23,7 +24,7 @@ if TYPE_CHECKING:
 @cache
 def plug_ins(kind: str) -> dict[str, EntryPoint]:
     """
-    Return the installed plug-ins by name; plug-ins with a missing module are left out.
+    Return the entry point of each installed plug-in by name, except those whose module is missing.
 
     Parameters
     ----------
@@ -48,7 +49,7 @@ def plug_ins(kind: str) -> dict[str, EntryPoint]:
 
 def load_plug_in(entry: EntryPoint) -> Any:
     """
-    Import the object that an entry point names.
+    Import the command or module that an entry point of a plug-in names.
 
     Raises
     ------
@@ -65,6 +66,6 @@ def load_plug_in(entry: EntryPoint) -> Any:
     except Exception as error:  # a package of another author may raise any error
         package = entry.dist.name if entry.dist else entry.module
         raise ArmidError(
-            f'{package}: {entry.value} cannot be loaded: {type(error).__name__}: {error}; repair '
-            'or uninstall the package'
+            f'{package}: its plug-in {entry.value} cannot be imported: {type(error).__name__}: '
+            f'{error}; repair or uninstall the package'
         ) from error
