@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Read and write recordings of joints, and the rosbag2 bags that hold them.
+Read and write recordings of arms, and the rosbag2 bags that contain them.
 
 This is the only package that depends on file formats. ``read_recording`` reads a bag with
 JointState messages, and ``write_recording`` writes one. ``BagWriter`` and ``Bag`` write and read

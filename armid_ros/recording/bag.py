@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Open a bag as a source of messages: a file, or a directory with or without metadata."""
+"""Open a bag, which is a file or a directory, and read its topics and messages."""
 
 from __future__ import annotations
 
@@ -37,18 +37,18 @@ _COMPRESSED = ('.zstd', '.zst')
 
 
 class Bag(Source):
-    """Source of the messages of all files of a bag; a context manager."""
+    """Reader of all storage files of one bag; a context manager."""
 
     def __init__(self, path: str | Path, settings: ReadSettings = DEFAULT) -> None:
         """
-        Open a bag.
+        Open all storage files of a bag.
 
         Parameters
         ----------
         path : str or Path
             A rosbag2 directory, a file .mcap, .db3, .mcap.zstd or .db3.zstd, or a .bag of ROS 1.
         settings : ReadSettings
-            Which checks are made, and the memory limit.
+            Checks of the storage files, and the memory limit.
 
         Raises
         ------
@@ -72,25 +72,25 @@ class Bag(Source):
             raise
 
     def __enter__(self) -> Self:
-        """Return the bag."""
+        """Return the open bag."""
         return self
 
     def __exit__(self, *error: object) -> None:
-        """Close the files."""
+        """Close the storage files of the bag."""
         self.close()
 
     @property
     def damage(self) -> str:
-        """Return the damage found in the files so far; empty if none was found."""
+        """Return a description of the damage found so far; empty if none was found."""
         problems = (*(source.damage for source in self._sources), str(self._damage))
         return '; '.join(dict.fromkeys(filter(None, problems)))
 
     def close(self) -> None:
-        """Close the files."""
+        """Close the storage files, and delete their decompressed copies."""
         self._stack.close()
 
     def topics(self) -> tuple[Topic, ...]:
-        """Return the topics, in order of appearance."""
+        """Return the topics of the bag in order of appearance, with counts over all files."""
         merged: dict[str, Topic] = {}
         with reading(self.path, RecordingError):
             for source in self._sources:
@@ -102,7 +102,7 @@ class Bag(Source):
         for name, count in self._metadata.counts.items():
             if count and name not in merged:
                 self._damage.add(
-                    f'{FILE_NAME} states {count} messages of {name}, but the bag has none'
+                    f'{FILE_NAME} states {count} messages of {name}, but the files have none'
                 )
         return tuple(merged.values())
 
@@ -113,7 +113,7 @@ class Bag(Source):
         fits: Callable[[Topic], bool] | None = None,
     ) -> Topic:
         """
-        Return a topic by name or by type: the named topic, or the only one of a matching type.
+        Return the topic with a given name, or the only topic of a message type.
 
         Raises
         ------
@@ -131,16 +131,16 @@ class Bag(Source):
         ]
         if len(found) == 1:
             return found[0]
-        problem = 'several topics' if found else 'no topic'
-        called = f' called {wanted}' if wanted else ''
+        number = 'several topics' if found else 'no topic'
+        name = f' with the name {wanted}' if wanted else ''
         damage = f' ({self.damage})' if self.damage else ''
         raise RecordingError(
-            f'{self.path}: {problem} of {type_name}{called}; the topics are '
+            f'{self.path}: the bag has {number} of type {type_name}{name}; its topics are '
             f'{listed(topics)}{damage}'
         )
 
     def blocks(self, topic: str) -> Iterator[MessageBlock]:
-        """Yield the messages of a topic in the order of storage."""
+        """Yield the messages of a topic in blocks, decompressed and in the order of storage."""
         count = 0
         with reading(self.path, RecordingError):
             for source in self._sources:
@@ -157,25 +157,25 @@ class Bag(Source):
         expected = self._metadata.counts.get(topic, count)
         if count != expected:
             self._damage.add(
-                f'{FILE_NAME} states {expected} messages of {topic}, but the bag has {count}'
+                f'{FILE_NAME} states {expected} messages of {topic}, but the files have {count}'
             )
 
     def messages(self) -> Iterator[RawMessage]:
-        """Yield all messages in the order of log times; only few chunks are in memory."""
-        streams = [source.messages() for source in self._sources]
+        """Yield the messages of all topics in the order of their log times."""
+        streams = [source.messages() for source in self._sources]  # few chunks are in memory
         with reading(self.path, RecordingError):
             for message in heapq.merge(*streams, key=lambda message: message.log_time_ns):
                 cdr = self._content(message.cdr)
                 yield message if cdr is message.cdr else message._replace(cdr=cdr)
 
     def _content(self, message: bytes) -> bytes:
-        """Decompress a message if the metadata or its first bytes show a compression."""
+        """Return the bytes of a message, decompressed if rosbag2 compressed single messages."""
         if not (self._by_message or message[:4] == ZSTD):
             return message
         return b''.join(unpacked(io.BytesIO(message), self._settings, 'a compressed message'))
 
     def _open(self, file: Path) -> Source:
-        """Open a storage file."""
+        """Open one storage file of the bag; decompress it into a temporary file if needed."""
         storage = _STORAGES.get(_storage_suffix(file))
         if storage is None:  # late import, as it takes as long as reading a bag
             from armid_ros.recording.ros1_source import Ros1Source
@@ -199,39 +199,40 @@ class Bag(Source):
 
 
 def is_ros1(path: Path) -> bool:
-    """Return whether a path has the name of a ROS 1 bag."""
+    """Return whether a path has the suffix of a ROS 1 bag, .bag."""
     return path.suffix.lower() == '.bag'
 
 
 def _storage_suffix(file: Path) -> str:
-    """Return the suffix of a file, without the suffix of its compression."""
+    """Return the suffix of a storage file, such as '.mcap' for BAG_0.mcap.zstd."""
     return Path(file.stem).suffix if file.suffix in _COMPRESSED else file.suffix
 
 
 def is_bag_file(path: Path) -> bool:
-    """Return whether a file has the name of a file of a bag."""
+    """Return whether a path has the suffix of a storage file of a ROS 2 or ROS 1 bag."""
     return _storage_suffix(path) in _STORAGES or is_ros1(path)
 
 
 def _files_of(path: Path) -> BagMetadata:
-    """Return the metadata of a bag; only the list of files if metadata.yaml is missing."""
+    """Return the metadata of a bag; without metadata.yaml only its storage files, in order."""
     if not os.path.lexists(path):
-        raise RecordingError(f'{path}: there is no such bag')
+        raise RecordingError(f'{path}: there is no bag or file at this path')
     if not path.is_dir():
         if not is_bag_file(path):
             raise RecordingError(
-                f'{path}: no recording; give a rosbag2 directory, a file .mcap, .db3 or .bag, or '
-                'a table .csv, .tsv, .txt, .dat, .npy, .npz, .mat, .h5, .hdf5 or .parquet'
+                f'{path}: the file is not a recording; give a rosbag2 directory, a file .mcap, '
+                '.db3 or .bag, or a table .csv, .tsv, .txt, .dat, .npy, .npz, .mat, .h5, .hdf5 or '
+                '.parquet'
             )
         return BagMetadata((path,))
     if os.path.lexists(path / FILE_NAME):
         metadata = read_metadata(path)
         files = list(metadata.files)
-        odd = [file.name for file in files if _storage_suffix(file) not in _STORAGES]
-        if odd or not files:
+        foreign = [file.name for file in files if _storage_suffix(file) not in _STORAGES]
+        if foreign or not files:
             raise RecordingError(
-                f'{path / FILE_NAME}: names {", ".join(odd) or "no file"}; '
-                'a bag consists of .mcap or .db3 files'
+                f'{path / FILE_NAME}: lists {", ".join(foreign) or "no file"}, but a bag '
+                'consists of .mcap or .db3 files'
             )
         return metadata
     found = [file for file in path.iterdir() if _storage_suffix(file) in _STORAGES]
@@ -239,12 +240,13 @@ def _files_of(path: Path) -> BagMetadata:
         below = sorted({str(f.parent) for s in _STORAGES for f in path.glob(f'*/*{s}*')})
         hint = f'; there are bags in {", ".join(below)}' if below else ''
         raise RecordingError(
-            f'{path}: this directory is not a bag, as it has no {FILE_NAME}, .mcap or .db3{hint}'
+            f'{path}: the directory is not a bag: it has no {FILE_NAME} and no .mcap or .db3 '
+            f'file{hint}'
         )
     if len({_storage_suffix(file) for file in found}) > 1:
         raise RecordingError(
-            f'{path}: has both .mcap and .db3 files, but no {FILE_NAME} that names the files of '
-            f'the bag; give one of {", ".join(sorted(file.name for file in found))}'
+            f'{path}: the directory has .mcap and .db3 files, but no {FILE_NAME} that lists the '
+            f'files of one bag; give one of {", ".join(sorted(file.name for file in found))}'
         )
     # numeric order: BAG_2.mcap comes before BAG_10.mcap
     found.sort(key=lambda file: re.sub(r'\d+', lambda number: number[0].zfill(20), file.name))

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Settings for the columns of a table: names, units, and motor side or joint side."""
+"""Settings for the columns and units of a recording, and the conversion of a bag to SI."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ import numpy as np
 Rules = Sequence[tuple[str, str]]
 #: Seconds in a unit of time.
 TIME_UNITS = {'s': 1.0, 'ms': 1e-3, 'us': 1e-6, 'ns': 1e-9}
-#: Settings for tables only, and settings of units and signs, for tables and bags.
+#: Settings that apply to tables only; settings of units apply to tables and bags.
 _TABLE_SETTINGS = (
     'time',
     'time_unit',
@@ -31,7 +31,7 @@ _TABLE_SETTINGS = (
     'episode',
 )
 _UNIT_SETTINGS = ('degrees', 'position_scale', 'effort_scale', 'zero', 'gear')
-#: Settings that a copied bag does not take.
+#: Settings that do not apply when a bag is copied.
 _NOT_COPIED = (*_UNIT_SETTINGS, 'rename')
 #: Command-line options whose name differs from that of the setting.
 _OPTIONS = {'rate_hz': '--rate', 'effort_scale': '--effort-scale or --current-gain'}
@@ -40,7 +40,7 @@ _OPTIONS = {'rate_hz': '--rate', 'effort_scale': '--effort-scale or --current-ga
 @dataclass(frozen=True)
 class ColumnSettings:
     """
-    Columns and units of the quantities; None if they are guessed.
+    Columns and units of the recorded quantities; a setting of None is guessed from the file.
 
     Attributes
     ----------
@@ -88,17 +88,19 @@ class ColumnSettings:
     episode: int | None = None
 
     def __post_init__(self) -> None:
-        """Raise a RecordingError for invalid settings."""
+        """Raise RecordingError for an unknown time unit, a rate <= 0, or missing gear ratios."""
         if self.time_unit is not None and self.time_unit not in TIME_UNITS:
-            raise RecordingError(f"no time unit '{self.time_unit}': use {', '.join(TIME_UNITS)}")
+            raise RecordingError(
+                f"'{self.time_unit}' is not a unit of time; use {', '.join(TIME_UNITS)}"
+            )
         if self.rate_hz is not None and not self.rate_hz > 0.0:
-            raise RecordingError(f'the rate is {self.rate_hz} Hz, but has to be positive')
+            raise RecordingError(f'the sampling rate is {self.rate_hz} Hz; give a positive rate')
         if self.coupling and not self.gear:
-            raise RecordingError('a coupling of motors needs their gear ratios, too')
+            raise RecordingError('a coupling of motors needs gear ratios; add --gear')
 
 
 def renamed(name: str, rules: Rules) -> str:
-    """Rename a joint by the first rule that matches its name, or otherwise its beginning."""
+    """Return a joint name with the rule applied that matches it, or matches its beginning."""
     for old, new in sorted(rules, key=lambda rule: rule[0] != name):
         if name.startswith(old):
             return new + name[len(old) :]
@@ -106,7 +108,7 @@ def renamed(name: str, rules: Rules) -> str:
 
 
 def name_in_file(name: str, rules: Rules) -> str:
-    """Return the name of a joint in the file, the inverse of ``renamed``."""
+    """Return the name that the file has for a joint; the inverse of ``renamed``."""
     for old, new in sorted(rules, key=lambda rule: rule[1] != name):
         before = old + name[len(new) :]
         if name.startswith(new) and renamed(before, rules) == name:
@@ -115,9 +117,9 @@ def name_in_file(name: str, rules: Rules) -> str:
 
 
 def renaming(joints: Sequence[str], names: Sequence[str]) -> str:
-    """Return the rule OLD:NEW that turns names of a file into those of all joints; '' if none."""
+    """Return a rule OLD:NEW that turns names in a file into all joint names; '' if none does."""
     ends = [(name[:end], name[end:]) for name in names for end in range(len(name))]
-    # whole words of a name first
+    # first try rules that replace complete words of a name
     for old, rest in sorted(ends, key=lambda end: not end[0].endswith(('_', '/'))):
         new = joints[0].removesuffix(rest)
         made = {renamed(one, [(old, new)]) for one in names}
@@ -128,7 +130,7 @@ def renaming(joints: Sequence[str], names: Sequence[str]) -> str:
 
 def number(text: str) -> float:
     """
-    Parse a number, ratio or angle: '1798/7', '-pi/2', '2*pi', '0.5'.
+    Convert the text of a number, ratio or angle to a float: '1798/7', '-pi/2', '0.5'.
 
     Raises
     ------
@@ -149,22 +151,23 @@ def number(text: str) -> float:
 
 
 def numbers(text: str | None) -> tuple[float, ...]:
-    """Parse numbers separated by commas; empty for an empty text."""
+    """Convert numbers separated by commas to floats; empty for an empty text."""
     return tuple(number(part) for part in text.split(',')) if text else ()
 
 
-def per_joint(values: Sequence[float], joints: Sequence[str], what: str) -> FloatArray:
-    """Return one value per joint, shape (n,); RecordingError for a wrong count."""
+def per_joint(values: Sequence[float], joints: Sequence[str], setting: str) -> FloatArray:
+    """Repeat a single value for all joints, or return one value per joint, shape (n,)."""
     if len(values) not in (1, len(joints)):
         raise RecordingError(
-            f'{what} has {len(values)} values; give one, or {len(joints)} for {", ".join(joints)}'
+            f'{setting} has {len(values)} values; give one value for all joints, or '
+            f'{len(joints)} values for {", ".join(joints)}'
         )
     return np.broadcast_to(np.asarray(values, dtype=float), len(joints)).copy()
 
 
 def refuse_columns(path: str | Path, settings: ColumnSettings, *, copied: bool = False) -> None:
     """
-    Raise a RecordingError if settings for tables are given for a bag.
+    Raise RecordingError if settings that apply to tables only are given for a bag.
 
     Parameters
     ----------
@@ -195,12 +198,12 @@ def in_si(
     recording: Recording, settings: ColumnSettings, slides: Collection[bool] | None = None
 ) -> Recording:
     """
-    Convert a recording of a bag to SI units on the joint side.
+    Return a recording converted to SI units and to the joint side of gears.
 
     Parameters
     ----------
     recording : Recording
-        Recording with the numbers of the bag.
+        Recording in the units of the bag.
     settings : ColumnSettings
         Scales, degrees, gears and zeros.
     slides : collection of bool, optional
@@ -228,7 +231,7 @@ def in_si(
     if settings.zero:
         q = q + per_joint(settings.zero, joints, 'the zero of positions')
     others: list[PositionRange] = []
-    if not (settings.gear or settings.zero) and len(set(turn)) == 1:  # with known unit
+    if not (settings.gear or settings.zero) and len(set(turn)) == 1:  # the unit is known
         for one in recording.others:
             ends = sorted([float(one.lowest * turn[0]), float(one.highest * turn[0])])
             others.append(PositionRange(one.joint, *ends))
@@ -236,11 +239,12 @@ def in_si(
 
 
 def _position(joint: str, joints: Sequence[str]) -> int:
+    """Return the index of a joint that a coupling gives by its name, or by its number from 1."""
     if joint in joints:
         return list(joints).index(joint)
     if joint.isdigit() and 1 <= int(joint) <= len(joints):
         return int(joint) - 1
     raise RecordingError(
-        f"a coupling names '{joint}', which is not a joint; joints are {', '.join(joints)}, or "
-        'their numbers from 1'
+        f"the coupling has the joint '{joint}', which the recording does not have; give a name "
+        f'of {", ".join(joints)}, or a number from 1 to {len(joints)}'
     )

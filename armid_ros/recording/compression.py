@@ -1,10 +1,10 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Decompress data with a limit of the size.
+Decompression of parts of bags, with a limit of the decompressed size.
 
-A few compressed bytes can expand to any size, so at most the stated size is decompressed.
-Content of a different size is damaged.
+A few compressed bytes can expand to any size. At most the size that the bag states is
+decompressed. Content of a different size is damaged.
 
 """
 
@@ -21,7 +21,7 @@ import lz4.frame
 import zstandard
 
 _Buffer = bytes | memoryview
-#: Exceptions of the decompressors for damaged data.
+#: Exceptions that decompressors raise for damaged data.
 CORRUPT = (zstandard.ZstdError, RuntimeError, MemoryError, OverflowError, ValueError)
 #: First bytes of a zstd frame; no CDR message begins with them.
 ZSTD = b'\x28\xb5\x2f\xfd'
@@ -29,16 +29,16 @@ ZSTD = b'\x28\xb5\x2f\xfd'
 
 def decompressed(stored: _Buffer, compression: str, size: int, settings: ReadSettings) -> bytes:
     """
-    Return the content of a frame.
+    Return the decompressed content of a complete zstd or lz4 frame.
 
     Parameters
     ----------
     stored : buffer
-        The frame.
+        The compressed frame.
     compression : {'zstd', 'lz4'}
-        Its kind.
+        Format of the frame.
     size : int
-        Size that the content must have [bytes].
+        Size of the content that the bag states [bytes].
     settings : ReadSettings
         The memory limit.
 
@@ -55,7 +55,9 @@ def decompressed(stored: _Buffer, compression: str, size: int, settings: ReadSet
     else:
         stated = int(lz4.frame.get_frame_info(stored)['content_size']) or -1
     if stated not in (-1, size):  # -1: the frame states no size
-        raise ValueError(f'its header states {stated} bytes of content, but the bag states {size}')
+        raise ValueError(
+            f'the header of the chunk states {stated} bytes of content, but the bag states {size}'
+        )
     settings.require(size, 'a chunk')
     if not size:
         return b''
@@ -65,14 +67,14 @@ def decompressed(stored: _Buffer, compression: str, size: int, settings: ReadSet
         decompressor = lz4.frame.LZ4FrameDecompressor()
         content = bytes(decompressor.decompress(stored, max_length=size))
         if not decompressor.eof and decompressor.decompress(b'', max_length=1):
-            raise ValueError(f'its content has more than the {size} bytes that the bag states')
+            raise ValueError(f'the chunk has more than the {size} bytes that the bag states')
     if len(content) != size:
-        raise ValueError(f'its content has {len(content)} bytes, but the bag states {size}')
+        raise ValueError(f'the chunk has {len(content)} bytes, but the bag states {size}')
     return content
 
 
 class _Zstd(threading.local):
-    """One decompressor per thread: making one takes as long as decompressing 20 kB."""
+    """Decompressor of each thread, since its construction takes as long as decompressing 20 kB."""
 
     def __init__(self) -> None:
         self.decompressor = zstandard.ZstdDecompressor()
@@ -82,7 +84,7 @@ _ZSTD = _Zstd()
 
 
 def partly_decompressed(stored: _Buffer, compression: str, size: int) -> bytes:
-    """Return the readable content of a truncated frame, at most ``size`` bytes."""
+    """Return the first bytes of a truncated frame's content, at most ``size`` bytes."""
     if compression == 'zstd':
         decompressor = zstandard.ZstdDecompressor().decompressobj()
     else:
@@ -97,9 +99,9 @@ def partly_decompressed(stored: _Buffer, compression: str, size: int) -> bytes:
     return bytes(content[:size])
 
 
-def unpacked(stream: BinaryIO, settings: ReadSettings, what: str) -> Iterator[bytes]:
+def unpacked(stream: BinaryIO, settings: ReadSettings, content_name: str) -> Iterator[bytes]:
     """
-    Yield the content of a zstd file or message in pieces.
+    Yield the decompressed content of a zstd file or message in pieces of 1 MiB.
 
     A limit is needed, as not every writer states the size of the content in the frame.
 
@@ -109,8 +111,8 @@ def unpacked(stream: BinaryIO, settings: ReadSettings, what: str) -> Iterator[by
         The compressed data.
     settings : ReadSettings
         The memory limit.
-    what : str
-        Name of the compressed object, for error messages.
+    content_name : str
+        Name of the content in error messages, such as 'a compressed message'.
 
     Raises
     ------
@@ -125,7 +127,7 @@ def unpacked(stream: BinaryIO, settings: ReadSettings, what: str) -> Iterator[by
         ) as content:
             while piece := content.read(1 << 20):
                 size += len(piece)
-                settings.require(size, what)
+                settings.require(size, content_name)
                 yield piece
     except CORRUPT as error:
-        raise RecordingError(f'{what} is damaged: {error}') from error
+        raise RecordingError(f'{content_name} is damaged: {error}') from error

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Copy bags of ROS 1 to ROS 2, and recover damaged bags."""
+"""Copy the messages of a damaged ROS 2 bag, or of a ROS 1 bag, into a new ROS 2 bag."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from pathlib import Path
 from armid_ros.errors import RecordingError
 from armid_ros.recording.bag import Bag
 from armid_ros.recording.source import DEFAULT, ReadSettings, Topic, UNREADABLE
-from armid_ros.recording.writer import whole_bag
+from armid_ros.recording.writer import atomic_bag
 
 
 @dataclass(frozen=True)
 class Copied:
     """
-    Result of copying a bag.
+    Report on a copied bag: the two paths, the copied topics, and the damage of the source.
 
     Attributes
     ----------
@@ -29,7 +29,7 @@ class Copied:
     duration : float
         Time from the first to the last message [s].
     left_out : tuple of str
-        Topics that ROS 2 has no type for, with their types.
+        Topics whose message types ROS 2 does not have, each with its type.
 
     """
 
@@ -42,21 +42,21 @@ class Copied:
 
     @property
     def messages(self) -> int:
-        """Return the number of messages copied."""
+        """Return the total number of copied messages."""
         return sum(topic.count for topic in self.topics)
 
     def describe(self) -> str:
-        """Return the report in a few sentences."""
+        """Return the report as a text of a few sentences."""
         listed = ', '.join(f'{topic.name} ({topic.count})' for topic in self.topics)
         return (
-            f'{self.source}: {self.damage or "the file is whole"}. {self.messages} messages over '
-            f'{self.duration:.3f} s are in {self.bag}: {listed}.'
+            f'{self.source}: {self.damage or "the bag is not damaged"}. {self.messages} messages '
+            f'over {self.duration:.3f} s are in {self.bag}: {listed}.'
         )
 
 
 def copy_bag(path: str | Path, out: str | Path, settings: ReadSettings = DEFAULT) -> Copied:
     """
-    Copy the readable messages of a bag into a complete bag, with index and metadata.yaml.
+    Copy the readable messages of a bag into a new bag with index and metadata.yaml.
 
     Complete chunks are copied if their checksum is correct. If a file ends inside a chunk, the
     messages before the end are copied.
@@ -82,12 +82,12 @@ def copy_bag(path: str | Path, out: str | Path, settings: ReadSettings = DEFAULT
             f'{one.name} ({one.type_name})' for one in topics if one.encoding == UNREADABLE
         )
         if next(bag.messages(), None) is None:
-            unknown = f'ROS 2 has no type of {"; ".join(left_out)}' if left_out else ''
+            unknown = f'ROS 2 does not have the types of {", ".join(left_out)}' if left_out else ''
             raise RecordingError(
-                f'{path}: there is no message to copy; '
-                f'{bag.damage or unknown or "the file is whole"}'
+                f'{path}: the bag has no message to copy; '
+                f'{bag.damage or unknown or "the bag is not damaged"}'
             )
-        with whole_bag(out) as writer:
+        with atomic_bag(out) as writer:
             writer.copy(bag)
     start, end = writer.time_range
     return Copied(bag.path, writer.path, writer.topics, bag.damage, (end - start) * 1e-9, left_out)

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Draw one curve per joint, one below the other."""
+"""Plots of a joint quantity over time, one axes per joint."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ def draw_joints(
     joints: Sequence[str], curves: Mapping[str, tuple[FloatArray, FloatArray]], quantity: str
 ) -> npt.NDArray[np.object_]:
     """
-    Draw the curves of each joint in separate axes.
+    Draw curves over time for each joint, with one axes per joint in a column.
 
     Parameters
     ----------

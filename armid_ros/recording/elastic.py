@@ -15,7 +15,7 @@ from armid_ros.recording.bag import Bag
 from armid_ros.recording.joint_state.encoder import write_joint_states
 from armid_ros.recording.message_types import BYTE_ORDERS
 from armid_ros.recording.source import DEFAULT, IntArray, ReadSettings
-from armid_ros.recording.writer import whole_bag
+from armid_ros.recording.writer import atomic_bag
 from armid_ros.robots import Robot
 import numpy as np
 
@@ -23,16 +23,14 @@ import numpy as np
 #: references of the control loops.
 MOTOR, LINK, REFERENCE = '/joint_states', '/link/joint_states', '/reference/joint_states'
 IMU = 'sensor_msgs/msg/Imu'
-#: Linear acceleration among the 37 numbers of an Imu message: orientation, angular velocity and
-#: linear acceleration, each with a covariance.
+#: Position of the linear acceleration among the 37 numbers of an Imu message: orientation, angular
+#: velocity and linear acceleration, each followed by its covariance.
 _ACCELERATION = slice(25, 28)
 
 
 def write_runs(path: str | Path, runs: Sequence[ElasticRun], robot: Robot) -> None:
     """
-    Write experiments to one bag, one after the other with a pause of 1 s.
-
-    The experiments have readings of accelerometers.
+    Write experiments with accelerometer readings to one bag, with a pause of 1 s between them.
 
     Raises
     ------
@@ -42,7 +40,7 @@ def write_runs(path: str | Path, runs: Sequence[ElasticRun], robot: Robot) -> No
     """
     joints = robot.joints
     pause = 10**9  # [ns]
-    with whole_bag(path) as writer:
+    with atomic_bag(path) as writer:
         writer.write_description(robot.urdf, pause)
         start = pause
         for run in runs:
@@ -74,7 +72,7 @@ def read_accelerations(
     path: str | Path, topic: str, settings: ReadSettings = DEFAULT
 ) -> tuple[IntArray, FloatArray]:
     """
-    Read the accelerometer readings of a topic.
+    Read linear accelerations from the Imu messages of one topic of a bag.
 
     Returns
     -------
@@ -96,33 +94,35 @@ def read_accelerations(
         raise RecordingError(f'{path}: {topic} has no messages')
     order = BYTE_ORDERS.get(messages[0][:2])
     if order is None or len(messages[0]) < 16:
-        raise RecordingError(f'{path}: {topic} is not CDR')
-    length = _length(*struct.unpack_from(order + 'I', messages[0], 12))
-    odd = [k for k, m in enumerate(messages) if len(m) != length]
-    if odd:
         raise RecordingError(
-            f'{path}: {topic}: message {odd[0]} has {len(messages[odd[0]])} bytes, but with the '
-            f'frame name of the first message it would have {length}; record each sensor on its '
-            'own topic'
+            f'{path}: {topic}: the messages are not in CDR; record again with ros2 bag record'
         )
+    length = _length(*struct.unpack_from(order + 'I', messages[0], 12))
+    for k, message in enumerate(messages):
+        if len(message) != length:
+            raise RecordingError(
+                f'{path}: {topic}: message {k} has {len(message)} bytes, but an Imu message with '
+                f'the frame_id of the first message has {length}; record each accelerometer on a '
+                'separate topic'
+            )
     rows = np.frombuffer(b''.join(messages), _fields(length, order))
     stamps = rows['sec'].astype(np.int64) * 10**9 + rows['nanosec']
     return stamps, np.array(rows['numbers'][:, _ACCELERATION], dtype=float)
 
 
 def _length(frame_length: int) -> int:
-    """Return the length of an Imu message in CDR; the frame length counts the final zero."""
+    """Return the size of an Imu message [bytes], given that of its frame_id with final zero."""
     return 4 + -(-(12 + frame_length) // 8) * 8 + 37 * 8
 
 
 def _fields(length: int, order: str) -> np.dtype[np.void]:
-    """Return the stamp of an Imu message, and the numbers at its end."""
+    """Return the numpy record type of an Imu message: its stamp and its 37 numbers."""
     formats = [order + 'i4', order + 'u4', (order + 'f8', (37,))]
     names, offsets = ['sec', 'nanosec', 'numbers'], [4, 8, length - 37 * 8]
     return np.dtype({'names': names, 'formats': formats, 'offsets': offsets, 'itemsize': length})
 
 
 def imu_topic(link: str) -> str:
-    """Return the topic of the accelerometer on a link, with characters that ROS permits."""
+    """Return the topic of the accelerometer on a link, in characters that ROS permits."""
     name = re.sub('[^A-Za-z0-9_]', '_', link)
     return f'/{"_" if name[:1].isdigit() else ""}{name}/imu'

@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Find definitions and hashes of ROS 2 message types, without ROS.
+Definitions and hashes of ROS 2 message types, found without ROS.
 
 Standard types come from the Jazzy store of rosbags. Other types are given as text, or read from
 share/PACKAGE/msg/TYPE.msg below AMENT_PREFIX_PATH and below the prefix of this Python.
@@ -28,9 +28,9 @@ JOINT_STATE = 'sensor_msgs/msg/JointState'
 JOINT_STATE_HASH = 'RIHS01_a13ee3a330e346c9d87b5aa18d24e11690752bd33a0350f11c5882bc9179260e'
 JOINT_TRAJECTORY = 'trajectory_msgs/msg/JointTrajectory'
 STRING = 'std_msgs/msg/String'
-#: Arrays of a JointState.
+#: Fields of a JointState that have one value per joint.
 QUANTITIES = ('position', 'velocity', 'effort')
-#: Byte order of CDR, by its first two bytes.
+#: Byte order of a CDR message, by its first two bytes.
 BYTE_ORDERS = {b'\x00\x00': '>', b'\x00\x01': '<'}
 _BIG, _LITTLE = struct.Struct('>iI').unpack_from, struct.Struct('<iI').unpack_from
 
@@ -38,7 +38,7 @@ _BIG, _LITTLE = struct.Struct('>iI').unpack_from, struct.Struct('<iI').unpack_fr
 @dataclass(frozen=True)
 class MessageType:
     """
-    Message type, with its description in a bag.
+    Name, definition and hash of a message type, as stored in a bag.
 
     Attributes
     ----------
@@ -62,7 +62,7 @@ class MessageType:
 
 def message_type(name: str, definition: str | None = None) -> MessageType:
     """
-    Return a message type with its definition, dependencies and hash.
+    Return a message type with its definition, those of the types it contains, and its hash.
 
     Parameters
     ----------
@@ -87,11 +87,14 @@ def message_type(name: str, definition: str | None = None) -> MessageType:
 
 
 def store_for(described: MessageType) -> Typestore:
-    """Return a type store that decodes messages by the definition in the bag."""
+    """Return a type store that decodes messages of a type by the definition in their bag."""
     if not described.definition:
         store = get_typestore(Stores.ROS2_JAZZY)
         if described.name not in store.fielddefs:
-            raise RecordingError(f'type {described.name}: its definition is missing from the bag')
+            raise RecordingError(
+                f'type {described.name}: the bag does not have the definition of this type; '
+                'record again with ros2 bag record'
+            )
         return store
     store = Typestore()
     if described.encoding == 'ros2idl':
@@ -102,7 +105,7 @@ def store_for(described: MessageType) -> Typestore:
 
 
 def _register(store: Typestore, name: str, definition: str | None) -> None:
-    """Register a type and, recursively, the types it contains."""
+    """Add a message type to a type store, and all types that it contains."""
     # the types of the distribution take 0.1 s to load, and few bags lack a definition
     known = {} if definition is not None else get_typestore(Stores.ROS2_JAZZY).fielddefs
     if name in known:
@@ -112,21 +115,22 @@ def _register(store: Typestore, name: str, definition: str | None) -> None:
         try:
             types = dict(get_types_from_msg(text, name))
         except (TypesysError, ValueError) as error:
-            raise RecordingError(f'type {name}: no valid message definition: {error}') from error
+            problem = f'type {name}: the text is not a message definition: {error}'
+            raise RecordingError(problem) from error
         if name not in types:
-            raise RecordingError(f'type {name}: this is the definition of {", ".join(types)}')
+            raise RecordingError(f'type {name}: the given text defines {", ".join(types)} instead')
     store.register(types)
     for _, fields in types.values():
         for _, description in fields:
-            part: Any = description
-            if part[0] in (Nodetype.ARRAY, Nodetype.SEQUENCE):
-                part = part[1][0]
-            if part[0] == Nodetype.NAME and part[1] not in store.fielddefs:
-                _register(store, part[1], None)
+            field: Any = description
+            if field[0] in (Nodetype.ARRAY, Nodetype.SEQUENCE):
+                field = field[1][0]  # type of the elements
+            if field[0] == Nodetype.NAME and field[1] not in store.fielddefs:
+                _register(store, field[1], None)
 
 
 def _installed(name: str) -> str:
-    """Return the text of an installed .msg file, if there is one."""
+    """Return the text of the .msg file of a type in the sourced ROS workspaces."""
     listed = os.environ.get('AMENT_PREFIX_PATH', '').split(os.pathsep)
     prefixes = [prefix for prefix in (*listed, sys.prefix) if prefix]
     package, _, rest = name.partition('/')
@@ -135,18 +139,18 @@ def _installed(name: str) -> str:
         if path.is_file():
             return path.read_text(encoding='utf-8')
     raise RecordingError(
-        f'type {name} is not known: give its definition, or source the workspace that has '
-        f'{package} (looked below {", ".join(prefixes)})'
+        f'type {name} is not known: give its definition, or source the workspace of {package}; '
+        f'searched in {", ".join(prefixes)}'
     )
 
 
 def header_stamp(data: bytes) -> int:
-    """Return the stamp of a serialised message that begins with a header [ns]; 0 if unset."""
+    """Return the header stamp of a serialised message [ns]; 0 if the sender did not set it."""
     seconds, nanoseconds = (_LITTLE if data[1] & 1 else _BIG)(data, 4)
     return int(seconds) * 10**9 + int(nanoseconds)
 
 
 def string_cdr(text: str) -> bytes:
-    """Serialise a std_msgs/String."""
+    """Return a text serialised as a std_msgs/String message."""
     content = text.encode() + b'\0'
     return b'\x00\x01\x00\x00' + struct.pack('<I', len(content)) + content

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Read metadata.yaml of rosbag2 and quality of service in any version, and write version 9."""
+"""Read metadata.yaml and QoS profiles of any rosbag2 version, and write those of version 9."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from rosbags.rosbag2 import metadata
 import yaml
 
 FILE_NAME = 'metadata.yaml'
-#: Duration without a limit.
+#: Largest duration, which means no limit.
 _NO_LIMIT = QosTime(9223372036, 854775807)
 #: Reliable publisher that keeps no messages for late subscribers. History and depth are unknown,
 #: because the middleware does not report them to a recorder.
@@ -46,14 +46,14 @@ LATCHED = VOLATILE._replace(durability=QosDurability.TRANSIENT_LOCAL)
 @dataclass(frozen=True)
 class BagMetadata:
     """
-    Fields of metadata.yaml that are needed to read a bag.
+    Storage files, compression and message counts that metadata.yaml states for a bag.
 
     Attributes
     ----------
     files : tuple of Path
         The files of the bag, in order.
     compression_mode : {'', 'file', 'message', 'storage'}
-        What rosbag2 compressed: whole files, or single messages; empty if nothing.
+        Objects that rosbag2 compressed: files or single messages; empty without compression.
     counts : mapping of str to int
         Number of messages of each topic, as stated by the writer.
 
@@ -68,14 +68,14 @@ def bag_information(
     topics: Sequence[Topic], file_name: str | None, start_ns: int, end_ns: int
 ) -> dict[str, Any]:
     """
-    Return the inner map of metadata.yaml.
+    Return the content of metadata.yaml below its top-level key, as a dictionary.
 
     Parameters
     ----------
     topics : sequence of Topic
         Topics with their counts.
     file_name : str or None
-        The only file of the bag; None while it is being written.
+        The only file of the bag; None while the file is written.
     start_ns, end_ns : int
         Log time of the first and the last message [ns]; ignored for a bag without messages.
 
@@ -121,8 +121,8 @@ def bag_information(
     }
 
 
-def dump(information: Mapping[str, Any] | Sequence[Mapping[str, Any]]) -> str:
-    """Return a map, or a list of maps, as YAML."""
+def yaml_text(information: Mapping[str, Any] | Sequence[Mapping[str, Any]]) -> str:
+    """Return a dictionary, or a list of dictionaries, as YAML text."""
     # The C dumper takes 1 ms and may be missing; the Python dumper takes 10 ms.
     dumper = getattr(yaml, 'CSafeDumper', yaml.SafeDumper)
     return str(yaml.dump(information, Dumper=dumper, sort_keys=False, allow_unicode=True))
@@ -130,7 +130,7 @@ def dump(information: Mapping[str, Any] | Sequence[Mapping[str, Any]]) -> str:
 
 def read_metadata(bag: Path) -> BagMetadata:
     """
-    Read metadata.yaml of any version.
+    Read metadata.yaml of a bag, written by any version of rosbag2.
 
     Raises
     ------
@@ -145,9 +145,9 @@ def read_metadata(bag: Path) -> BagMetadata:
             information = load_yaml(text)['rosbag2_bagfile_information']
             names = information['relative_file_paths']
             if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
-                raise ValueError('relative_file_paths is no list of names')
+                raise ValueError('relative_file_paths has to be a list of file names')
             if len(set(names)) != len(names):
-                raise ValueError('relative_file_paths names a file twice')
+                raise ValueError('relative_file_paths lists a file twice')
             mode = str(information.get('compression_mode') or '').lower()
             counts: dict[str, int] = {}
             entries = information.get('topics_with_message_count')
@@ -157,8 +157,8 @@ def read_metadata(bag: Path) -> BagMetadata:
                     counts[name] = counts.get(name, 0) + count
     except RecordingError as error:
         raise RecordingError(
-            f'{path}: this is not a valid description of a bag ({str(error).lstrip(": ")}); if '
-            'you move it away, the files of its folder are read without it'
+            f'{path}: the file is not a valid metadata.yaml ({str(error).lstrip(": ")}); move it '
+            'elsewhere to read the bag without it'
         ) from error
     # Up to version 3 the paths began with the name of the directory.
     files = tuple(bag / Path(name).name for name in names)
@@ -166,13 +166,14 @@ def read_metadata(bag: Path) -> BagMetadata:
     if missing:
         present = ', '.join(sorted(entry.name for entry in bag.iterdir()))
         raise RecordingError(
-            f'{path}: names {", ".join(missing)}, which the bag does not have; it has {present}'
+            f'{path}: lists the files {", ".join(missing)}, but the directory of the bag has only '
+            f'{present}'
         )
     return BagMetadata(files, '' if mode == 'none' else mode, counts)
 
 
 def parse_qos(text: str | None) -> tuple[Qos, ...]:
-    """Read profiles from YAML in the notation of any version; empty if the text is not valid."""
+    """Return the QoS profiles in a YAML text of any rosbag2 version; empty if it is not valid."""
     default: dict[str, Any] = dict(metadata.dump_qos_v9([VOLATILE])[0])
     default |= dict.fromkeys(('reliability', 'durability', 'liveliness'), 'unknown')
     try:

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Read the joint measurements of a bag of ROS 2 or ROS 1, or of a table."""
+"""Read joint measurements from a bag of ROS 2 or ROS 1, or from a table."""
 
 from __future__ import annotations
 
@@ -35,9 +35,9 @@ import numpy as np
 if TYPE_CHECKING:
     from armid_ros.recording.tables import TablePlan
 
-#: Callback that shows the plan of a table.
+#: Callback that shows the columns and units chosen for a table.
 Show = Callable[['TablePlan'], None]
-#: Package that reads tables, a plug-in.
+#: Plug-in package that reads tables.
 _TABLES = 'armid_ros.recording.tables'
 
 
@@ -52,7 +52,7 @@ def read_recording(
     settings: ReadSettings = DEFAULT,
 ) -> Recording:
     """
-    Read the measurements of some joints from a bag or a table.
+    Read positions, velocities and torques of some joints from a bag or a table.
 
     Parameters
     ----------
@@ -61,20 +61,20 @@ def read_recording(
         file .mcap, .db3 or (ROS 1) .bag, or a table: CSV, NPZ, MAT, Parquet, or the folder of a
         LeRobot dataset. A bag truncated by a crash is read up to its end.
     joints : sequence of str, optional
-        Joints to read, in this order; by default all of the table or topic. Of other joints, such
-        as a gripper's, only the range of the positions is kept.
+        Joints to read, in this order; by default all joints of the table or topic. Only the range
+        of positions is kept of other joints, such as those of a gripper.
     topic : str, optional
         Topic of sensor_msgs/JointState. The default is the only topic of this type, or the only
-        one that names all joints. Of several such topics the one called 'joint_states' is taken.
-        If no topic names all joints, topics are combined that name each joint once. Without
-        ``joints``, the default is the topic with the most messages.
+        topic that has all joints. If several topics have all joints, 'joint_states' is read. If no
+        topic has all joints, topics are combined that have each joint once. Without ``joints``,
+        the default is the topic with the most messages.
     columns : ColumnSettings, optional
-        Which columns of a table hold which quantity, in which unit. Missing settings are guessed
-        from the file. Names, units, zeros and gears apply to bags too; columns and rate do not.
+        Columns and units of the quantities of a table. Missing settings are guessed from the file.
+        Names, units, zeros and gears apply to bags too; columns and rate do not.
     slides : sequence of bool, optional
         Whether each joint is prismatic. Positions of prismatic joints are never in degrees.
     show : callable, optional
-        Called with the plan of a table before the table is read.
+        Called with the columns and units chosen for a table, before the table is converted.
     settings : ReadSettings
         Whether checksums are compared, and the memory limit.
 
@@ -106,9 +106,22 @@ def read_recording(
         joints = [name_in_file(joint, rules) for joint in joints]
         if not joints or len(set(joints)) != len(joints):
             raise RecordingError(
-                f'{path}: at least one joint has to be named, and each only once; got {joints}'
+                f'{path}: give at least one joint, and each joint once; the given joints are '
+                f'{", ".join(joints) or "none"}'
             )
-    recording = _read_bag(path, joints, topic, settings)
+    with Bag(path, settings) as bag:
+        chosen = choose_topics(bag, joints, topic)
+        names = tuple(named_joints(bag, chosen[0]) if joints is None else joints)
+        decoder = JointStateDecoder(names, sum(one.count for one in chosen))
+        topic_names = ' + '.join(one.name for one in chosen)
+        pieces, size = [], 0
+        for piece in chain.from_iterable(_decoded(bag, one, decoder) for one in chosen):
+            size += piece.nbytes
+            settings.require(size, f'{path}: {topic_names}: the recording')
+            pieces.append(piece)
+        recording = assembled(path, topic_names, names, pieces, decoder, bag.damage)
+        measured = read_temperatures(bag, recording) if settings.temperatures else None
+    recording = replace(recording, temperature=measured) if measured else recording
     if rules:
         recording = replace(
             recording,
@@ -118,27 +131,8 @@ def read_recording(
     return in_si(recording, columns, slides)
 
 
-def _read_bag(
-    path: Path, wanted: Sequence[str] | None, topic: str | None, settings: ReadSettings
-) -> Recording:
-    """Read some joints, by their names in the bag, with the numbers of the bag."""
-    with Bag(path, settings) as bag:
-        chosen = choose_topics(bag, wanted, topic)
-        joints = tuple(named_joints(bag, chosen[0]) if wanted is None else wanted)
-        decoder = JointStateDecoder(joints, sum(one.count for one in chosen))
-        name = ' + '.join(one.name for one in chosen)
-        pieces, size = [], 0
-        for piece in chain.from_iterable(_decoded(bag, one, decoder) for one in chosen):
-            size += piece.nbytes
-            settings.require(size, f'{path}: {name}: the recording')
-            pieces.append(piece)
-        recording = assembled(path, name, joints, pieces, decoder, bag.damage)
-        measured = read_temperatures(bag, recording) if settings.temperatures else None
-    return replace(recording, temperature=measured) if measured else recording
-
-
 def is_table(path: Path) -> bool:
-    """Return whether a path is a table; without the package `tables`, all but bags are tables."""
+    """Return whether a path is a table; without the plug-in `tables`, any file but a bag."""
     if find_spec(_TABLES) is None:
         return path.is_file() and not is_bag_file(path)
     from armid_ros.recording import tables
@@ -154,20 +148,20 @@ def read_tables(
     show: Show | None = None,
 ) -> Recording:
     """
-    Read the measurements of some joints from tables of the same samples.
+    Read joint measurements from one table, or from several tables of the same samples.
 
     Parameters
     ----------
     paths : sequence of Path
         Files with the columns of the same samples.
     columns : ColumnSettings
-        Which columns hold which quantity, in which unit; missing settings are guessed.
+        Columns and units of the quantities; missing settings are guessed.
     joints : sequence of str, optional
-        Joints to read, in this order; by default named by the columns.
+        Joints to read, in this order; by default those in the column names.
     slides : sequence of bool, optional
         Whether each joint is prismatic.
     show : callable, optional
-        Called with the plan before the columns are converted.
+        Called with the chosen columns and units before the columns are converted.
 
     Raises
     ------
@@ -177,16 +171,16 @@ def read_tables(
     """
     if find_spec(_TABLES) is None:
         raise RecordingError(
-            f'{paths[0]}: not a bag; reading a table needs {_TABLES}, which this installation '
-            'does not have'
+            f'{paths[0]}: the file is not a bag, and reading a table needs {_TABLES}, which is '
+            'not installed; reinstall armid_ros'
         )
-    from armid_ros.recording.tables import measured, open_table, plan, side_by_side
+    from armid_ros.recording.tables import converted, open_table, plan, side_by_side
 
     table = side_by_side([open_table(path, episode=columns.episode) for path in paths])
-    settled = plan(table, columns, joints, slides)
+    chosen = plan(table, columns, joints, slides)
     if show is not None:
-        show(settled)
-    return measured(settled)
+        show(chosen)
+    return converted(chosen)
 
 
 def assembled(
@@ -197,13 +191,13 @@ def assembled(
     decoder: JointStateDecoder,
     damage: str,
 ) -> Recording:
-    """Assemble the recording of joints in messages, and free the memory of the messages."""
+    """Return a recording of decoded samples; the list of samples is emptied to free memory."""
     where = f'{path}: {topic}'
     if not decoder.messages:
-        raise RecordingError(f'{where} has no messages')
+        raise RecordingError(f'{where}: the topic has no messages; record again')
     if not decoder.names_seen:
         raise RecordingError(
-            f'{where}: none of the {decoder.messages} messages names a joint; '
+            f'{where}: none of the {decoder.messages} messages has the name of a joint; '
             f'{decoder.first_problem or "the names are empty"}'
         )
     missing = [joint for joint in joints if joint not in decoder.names_seen]
@@ -217,13 +211,13 @@ def assembled(
             hint = f'; if only the names differ, use --rename {rule}{hint}'
         elif found:
             hint = f"; if '{found}' is '{missing[0]}', use --rename {found}:{missing[0]}{hint}"
-        ask = '' if present or rule else ': is it a recording of another robot?'
+        question = '' if present or rule else '; is it a recording of another robot?'
         raise RecordingError(
-            f'{where} does not name {"joint" if len(missing) == 1 else "joints"} {listed}{ask}; '
-            f'its joints are {", ".join(decoder.names_seen)}{hint}'
+            f'{where}: the messages lack {"joint" if len(missing) == 1 else "joints"} {listed}; '
+            f'their joints are {", ".join(decoder.names_seen)}{question}{hint}'
         )
     if damage:
-        damage = f'of a damaged bag {decoder.messages} messages could be read: {damage}'
+        damage = f'the bag is damaged, and {decoder.messages} messages could be read: {damage}'
     with reading(where, RecordingError):
         return assemble(
             where,
@@ -250,18 +244,18 @@ def read_pieces(
     settings: ReadSettings = DEFAULT,
 ) -> Iterator[tuple[Recording, bool]]:
     """
-    Yield the measurements of some joints in pieces, in the order of storage.
+    Yield a recording of some joints in consecutive pieces, to limit the memory.
 
     Parameters
     ----------
     path, joints, topic, settings
         See ``read_recording``.
     samples : int
-        Largest number of new messages per piece. Messages kept from the previous piece come on
-        top.
+        Largest number of new messages per piece, in addition to those kept from the previous
+        piece.
     keep : callable
-        Called with every piece but the last. Messages before the stamp that it returns [ns] are
-        dropped.
+        Called with every piece but the last; returns a stamp [ns]. The next piece begins with the
+        messages after this stamp.
 
     Yields
     ------
@@ -281,8 +275,9 @@ def read_pieces(
         chosen, *others = choose_topics(bag, joints, topic)
         if others:
             raise RecordingError(
-                f'{path}: joints are spread over the topics {chosen.name} and {others[0].name}, '
-                'so the bag cannot be read in pieces: merge the topics with joint_state_merger'
+                f'{path}: the joints are on two topics, {chosen.name} and {others[0].name}, so '
+                'the bag cannot be read in pieces; merge the topics with the node '
+                'joint_state_merger'
             )
         decoder = JointStateDecoder(joints)
         held: list[JointSamples] = []
@@ -309,14 +304,14 @@ def read_pieces(
 
 
 def _decoded(bag: Bag, topic: Topic, decoder: JointStateDecoder) -> Iterator[JointSamples]:
-    """Yield the samples of a topic."""
+    """Yield the decoded joint samples of a topic; errors name the bag."""
     with reading(bag.path, RecordingError):
         for block in joint_state_blocks(bag, topic):
             yield from decoder.decode(block)
 
 
 def choose_topics(bag: Bag, joints: Sequence[str] | None, wanted: str | None) -> tuple[Topic, ...]:
-    """Return the topic to read, or several topics that together name all joints."""
+    """Return the JointState topic to read, or several topics that together have all joints."""
     there = [topic for topic in bag.topics() if holds_joint_state(topic)]
     candidates = [topic for topic in there if topic.type_name == JOINT_STATE] or there
     if wanted is not None or not candidates:
@@ -334,29 +329,30 @@ def choose_topics(bag: Bag, joints: Sequence[str] | None, wanted: str | None) ->
     between = [name for one in parts for name in names[one.name]]
     if not complete and set(joints) <= set(between) and len(between) == len(set(between)):
         return parts
-    listed = '; '.join(f'{name} names {", ".join(n) or "none"}' for name, n in names.items())
-    which = 'several topics name' if complete else 'no topic names'
+    listed = '; '.join(f'{name} has {", ".join(n) or "none"}' for name, n in names.items())
+    number = 'several topics have' if complete else 'no topic has'
     raise RecordingError(
-        f'{bag.path}: {which} all of {", ".join(joints)}; choose a topic to read: {listed}'
+        f'{bag.path}: {number} all joints {", ".join(joints)}; choose a topic to read with '
+        f'--topic: {listed}'
     )
 
 
 def named_joints(bag: Bag, topic: Topic) -> tuple[str, ...]:
-    """Return the joints that the first messages of a topic name."""
+    """Return the joint names in the first thousand messages of a topic."""
     decoder = JointStateDecoder(())
     for block in joint_state_blocks(bag, topic):
         for _ in decoder.decode(block):
             pass
         if decoder.messages >= 1000:
             break
-    return decoder.names_seen
+    return tuple(decoder.names_seen)
 
 
 def topics(path: str | Path, settings: ReadSettings = DEFAULT) -> tuple[Topic, ...]:
     """
-    Return the topics of a bag, with types, definitions, QoS and counts.
+    Return the topics of a bag with message types, definitions, QoS profiles and counts.
 
-    Topics of JointState have the names of their joints, too.
+    A JointState topic also has the names of its joints.
 
     Raises
     ------
@@ -373,7 +369,7 @@ def topics(path: str | Path, settings: ReadSettings = DEFAULT) -> tuple[Topic, .
 
 def read_robot_description(path: str | Path, settings: ReadSettings = DEFAULT) -> str | None:
     """
-    Return the robot description in a bag.
+    Return the URDF in a bag: the last message of its topic '.../robot_description'.
 
     Parameters
     ----------
@@ -385,13 +381,12 @@ def read_robot_description(path: str | Path, settings: ReadSettings = DEFAULT) -
     Returns
     -------
     str or None
-        The last message on a std_msgs/String topic whose name ends in 'robot_description'; None
-        without such a topic.
+        Text of the last std_msgs/String message; None if the bag has no such topic.
 
     Raises
     ------
     RecordingError
-        If the bag cannot be read, or holds different descriptions on several topics.
+        If the bag cannot be read, or has different descriptions on several topics.
 
     """
     with Bag(path, settings) as bag:
@@ -410,7 +405,7 @@ def read_robot_description(path: str | Path, settings: ReadSettings = DEFAULT) -
                     texts[topic.name] = text
     if len(set(texts.values())) > 1:
         raise RecordingError(
-            f'{path}: holds the descriptions of several robots ({", ".join(texts)}); '
-            'save the description of the right arm as a URDF file'
+            f'{path}: the topics {", ".join(texts)} have different robot descriptions; save the '
+            'description of the right arm as a URDF file and give this file'
         )
     return next(iter(texts.values()), None)

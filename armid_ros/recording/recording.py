@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Recorded joint positions, velocities and torques."""
+"""Recorded positions, velocities and torques of joints, and the report on their reading."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ if TYPE_CHECKING:
 
 Clock = Literal['header', 'receive']
 
-#: A time without samples is a gap if it is longer than this number of sampling periods.
+#: Number of sampling periods beyond which a time without samples is a gap.
 GAP_PERIODS = 5.0
 
 
 @dataclass(frozen=True)
 class TimeGap:
     """
-    Time interval without samples.
+    Time interval without samples in a recording.
 
     Attributes
     ----------
@@ -47,7 +47,7 @@ class TimeGap:
 @dataclass(frozen=True)
 class PositionRange:
     """
-    Range of positions of a recorded joint that was not requested.
+    Range of the recorded positions of a joint that was not requested, such as a gripper.
 
     Attributes
     ----------
@@ -66,12 +66,12 @@ class PositionRange:
 @dataclass(frozen=True, eq=False)
 class PartnerMotion:
     """
-    Positions of another machine at the samples of a recording.
+    Positions of another machine, tied to the arm, at the samples of a recording.
 
     Attributes
     ----------
     robot : Robot
-        Its description; its base frame is that of the arm.
+        Description of the other machine; its base frame is that of the arm.
     ties : tuple of Tie
         Ties that may connect the two machines.
     q : ndarray, shape (N, m)
@@ -84,14 +84,14 @@ class PartnerMotion:
     q: FloatArray
 
     def __post_init__(self) -> None:
-        """Freeze the positions."""
+        """Make the positions read-only."""
         freeze(self, 'q')
 
 
 @dataclass(frozen=True)
 class ReadReport:
     """
-    Counts of samples and messages that were dropped or repaired while reading.
+    Counts of messages and samples that were dropped or repaired when a file was read.
 
     Attributes
     ----------
@@ -102,7 +102,7 @@ class ReadReport:
     merged : int
         Samples merged from messages that each hold some of the joints.
     interpolated : int
-        Merged samples with a part that was interpolated in time, because its stamps differ.
+        Merged samples with some joints interpolated in time, because stamps of messages differ.
     incomplete : int
         Samples dropped because some joints were not measured around their time.
     duplicates : int
@@ -152,30 +152,30 @@ class ReadReport:
 
     @property
     def clean(self) -> bool:
-        """Whether every message gave a sample and nothing is missing."""
+        """Whether every message gave one sample, and no quantity is missing."""
         return self == ReadReport(messages=self.messages, samples=self.samples)
 
     @property
     def unharmed(self) -> bool:
-        """Whether no sample was dropped or repaired; missing quantities do not count."""
+        """Whether no sample was dropped or repaired; quantities may be missing."""
         return replace(self, absent=(), unwrapped=()).clean
 
     def describe(self) -> str:
-        """Format the report as one or a few sentences."""
+        """Return the report as a text of a few sentences."""
         whose = f' ({", ".join(self.not_finite)})' if self.not_finite else ''
         sentences = [f'{self.samples} samples from {self.messages} messages']
         counted = (
-            (self.merged, 'put together from messages with a part of the joints each'),
-            (self.interpolated, 'of them interpolated in time'),
-            (self.incomplete, 'dropped where a part of the joints was not measured'),
-            (self.duplicates, 'with a repeated stamp dropped'),
-            (self.out_of_order, 'out of order sorted in'),
-            (self.restarted, 'dropped as the clock jumped back'),
-            (self.nan, f'dropped for values that are not finite{whose}'),
-            (self.malformed, 'malformed dropped'),
-            (self.unstamped, 'without a stamp dropped'),
+            (self.merged, 'merged from messages with some of the joints each'),
+            (self.interpolated, 'of the merged samples interpolated in time'),
+            (self.incomplete, 'dropped because some joints were not measured'),
+            (self.duplicates, 'dropped because of a repeated stamp'),
+            (self.out_of_order, 'out of order and sorted by time'),
+            (self.restarted, 'dropped because the clock jumped back'),
+            (self.nan, f'dropped because of values that are not finite{whose}'),
+            (self.malformed, 'dropped because the message is malformed'),
+            (self.unstamped, 'dropped because of a missing stamp'),
         )
-        sentences += [f'{count} {what}' for count, what in counted if count]
+        sentences += [f'{count} {reason}' for count, reason in counted if count]
         text = ', '.join(sentences) + '.'
         if self.gaps:
             longest = max(self.gaps, key=lambda gap: gap.length)
@@ -184,9 +184,9 @@ class ReadReport:
         if self.absent:
             text += f' Not recorded: {", ".join(self.absent)}.'
         if self.unwrapped:
-            text += f' Jumps by whole turns undone: {", ".join(self.unwrapped)}.'
+            text += f' Jumps by full turns removed: {", ".join(self.unwrapped)}.'
         if self.clock_note:
-            text += f' Time is that of reception: {self.clock_note}.'
+            text += f' The time of reception is used, because {self.clock_note}.'
         if self.damage:
             text += f' {self.damage[0].upper()}{self.damage[1:]}.'
         return text
@@ -255,7 +255,7 @@ class Recording:
     temperature: Temperatures | None = None
 
     def __post_init__(self) -> None:
-        """Freeze the arrays and check their shapes."""
+        """Make the arrays read-only, and check their shapes and the order of times."""
         object.__setattr__(self, 'joints', tuple(self.joints))
         freeze_samples(self.source or 'recording', self, 'q', 'dq', 'tau')
         backwards = np.flatnonzero(np.diff(self.t) <= 0.0)
@@ -263,8 +263,8 @@ class Recording:
             k = int(backwards[0]) + 1
             raise RecordingError(
                 f'{self.source or "recording"}: time does not increase at sample {k} '
-                f'({self.t[k]:.6f} s after {self.t[k - 1]:.6f} s): sort the samples by time and '
-                'leave out those of equal stamps'
+                f'({self.t[k]:.6f} s after {self.t[k - 1]:.6f} s); sort the samples by time and '
+                'remove samples with equal stamps'
             )
 
     def __len__(self) -> int:
@@ -272,7 +272,7 @@ class Recording:
         return len(self.t)
 
     def __repr__(self) -> str:
-        """Return a summary of the recording in two lines."""
+        """Return a summary of two lines: source, duration, rate, quantities and joints."""
         rate = f'{1.0 / self.period:.4g} Hz' if self.period else 'one sample'
         held = [
             name
@@ -291,17 +291,17 @@ class Recording:
 
     @property
     def duration(self) -> float:
-        """Time from the first to the last sample [s]."""
+        """Return the time from the first to the last sample [s]."""
         return float(self.t[-1] - self.t[0]) if len(self.t) else 0.0
 
     @property
     def period(self) -> float:
-        """Median time between samples [s]."""
+        """Return the median time between samples [s]."""
         return float(np.median(np.diff(self.t))) if len(self.t) > 1 else 0.0
 
     def plot(self, quantity: Literal['q', 'dq', 'tau'] = 'tau') -> npt.NDArray[np.object_]:
         """
-        Draw a quantity of each joint over time.
+        Draw one quantity of each joint over time, one axes per joint.
 
         Parameters
         ----------
@@ -320,7 +320,9 @@ class Recording:
         """
         values = getattr(self, quantity)
         if values is None:
-            raise RecordingError(f'{self.source or "recording"}: {quantity} was not recorded')
+            raise RecordingError(
+                f'{self.source or "recording"}: {quantity} was not recorded, and cannot be drawn'
+            )
         labels = {
             'q': 'position [rad or m]',
             'dq': 'velocity [rad/s or m/s]',
@@ -330,7 +332,7 @@ class Recording:
 
     def motion(self, cutoff: float | None = None) -> Motion:
         """
-        Return filtered positions, velocities and accelerations, with the torque as recorded.
+        Return the filtered motion of the longest stretch without a gap, with its torque.
 
         Parameters
         ----------
@@ -340,8 +342,8 @@ class Recording:
         Returns
         -------
         Motion
-            The longest stretch without a gap, at a constant rate. Both ends are cut off, since the
-            filter needs neighbouring samples.
+            Filtered position, velocity and acceleration at a constant rate; the torque is not
+            filtered. Both ends are cut off, since the filter needs neighbouring samples.
 
         Raises
         ------
@@ -355,7 +357,7 @@ class Recording:
         return filtered
 
     def select(self, samples: Samples) -> Recording:
-        """Return a recording of some of the samples, on the same time base."""
+        """Return the recording at selected samples, on the same time base."""
         partner = self.partner
         return replace(
             self,
@@ -371,7 +373,7 @@ def recorded_together(
     recording: Recording, other: Recording, robot: Robot, ties: Sequence[Tie] = ()
 ) -> Recording:
     """
-    Add the motion of another machine, interpolated at the stamps of a recording.
+    Add the positions of another machine to a recording, interpolated at its stamps.
 
     Parameters
     ----------
@@ -387,7 +389,7 @@ def recorded_together(
     Returns
     -------
     Recording
-        Recording of the arm, at the times when both were recorded.
+        Recording of the arm with the other machine as partner, while both were recorded.
 
     Raises
     ------
@@ -402,8 +404,8 @@ def recorded_together(
     inside &= steps[after - 1] <= GAP_PERIODS * other.period
     if np.count_nonzero(inside) < 4:
         raise RecordingError(
-            f'{recording.source}: {recording.topic} and {other.topic} have no time in common; '
-            'record them together'
+            f'{recording.source}: the topics {recording.topic} and {other.topic} were not '
+            'recorded at the same time; record them together'
         )
     q = CubicSpline(other.t, other.q)(t[inside])
     return replace(recording.select(inside), partner=PartnerMotion(robot, tuple(ties), q))
@@ -411,11 +413,11 @@ def recorded_together(
 
 def given_twice(fitted: Sequence[Recording], held_out: Sequence[Recording] = ()) -> str:
     """
-    Return a message on recordings that are given twice; empty if there are none.
+    Return a message that names recordings given more than once; empty if there are none.
 
     A recording given twice would have twice the weight, and a fitted recording cannot be held
-    out. Recordings are equal if positions and torques agree; two simulated runs may have equal
-    positions.
+    out. Recordings are equal if their positions and torques are equal, since two simulated runs
+    may have equal positions.
 
     Parameters
     ----------
@@ -440,11 +442,11 @@ def given_twice(fitted: Sequence[Recording], held_out: Sequence[Recording] = ())
         for b in fitted[:k]
         if same(a, b)
     ]
-    return f'given twice, or in two roles: {", ".join(dict.fromkeys(again))}' if again else ''
+    return f'recordings are given twice: {", ".join(dict.fromkeys(again))}' if again else ''
 
 
 def require_once(fitted: Sequence[Recording], held_out: Sequence[Recording] = ()) -> None:
-    """Raise a RecordingError if recordings are given twice."""
+    """Raise RecordingError if a recording is given more than once."""
     repeated = given_twice(fitted, held_out)
     if repeated:
         raise RecordingError(f'{repeated}; give each recording once')

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Read messages of a ROS 1 bag, converted to ROS 2."""
+"""Read the messages of a ROS 1 bag, converted to ROS 2."""
 
 from __future__ import annotations
 
@@ -32,10 +32,10 @@ from rosbags.typesys.base import TypesysError
 
 
 class Ros1Source(Source):
-    """Source for one .bag file; topics with types unknown to ROS 2 have no messages."""
+    """Reader of one ROS 1 bag file; messages of types that ROS 2 lacks are left out."""
 
     def __init__(self, path: Path, settings: ReadSettings = DEFAULT) -> None:
-        """Open a bag of ROS 1. Only one chunk is in memory at a time; chunks have no checksums."""
+        """Open a ROS 1 bag; one chunk at a time is in memory, and chunks have no checksums."""
         super().__init__(path, settings)
         self._old = get_typestore(Stores.ROS1_NOETIC)
         self._new = get_typestore(Stores.ROS2_JAZZY)
@@ -44,7 +44,7 @@ class Ros1Source(Source):
             self._reader = Reader(path)
             self._reader.open()
         except (ReaderError, OSError) as error:
-            raise RecordingError(f'{path}: cannot be read as a bag of ROS 1: {error}') from error
+            raise RecordingError(f'{path}: the file is not a ROS 1 bag: {error}') from error
         for one in self._reader.connections:
             if one.msgtype not in self._old.fielddefs:
                 with suppress(TypesysError):
@@ -89,11 +89,11 @@ class Ros1Source(Source):
             self._damage.add(f'the bag is damaged: {error}')
 
     def _is_known(self, one: Connection) -> bool:
-        """Return whether ROS 1 and ROS 2 both have the type of a connection."""
+        """Return whether both ROS 1 and ROS 2 have the message type of a connection."""
         return one.msgtype in self._new.fielddefs and one.msgtype in self._old.fielddefs
 
     def _make_converter(self, kind: str) -> Callable[[bytes | memoryview], memoryview]:
-        """Return a function that converts a ROS 1 message to ROS 2."""
+        """Return the function that converts messages of a type from ROS 1 to ROS 2."""
         old, new = self._old, self._new
         if is_same_wireformat(old, new, kind, kind):
             return partial(new.ros1_to_cdr, typename=kind)

@@ -1,10 +1,10 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Combine decoded messages to samples on one time base.
+Combine decoded messages into a recording with one time base.
 
-Messages that name the same joints form a series. The series with the most samples gives the time
-base. The other series are interpolated linearly, except over their gaps.
+Messages with the same joints form a series. The series with the most samples gives the time base.
+The other series are interpolated linearly, except over their gaps.
 
 """
 
@@ -35,24 +35,24 @@ MAX_NOT_FINITE = 0.2
 
 
 def gather(pieces: Sequence[JointSamples]) -> list[JointSamples]:
-    """Concatenate the pieces that name the same joints, in the order of storage."""
+    """Concatenate samples with the same joints, in the order of storage."""
     by_joints: dict[tuple[str, ...], list[JointSamples]] = {}
     for piece in pieces:
         by_joints.setdefault(piece.joints, []).append(piece)
     gathered = []
     for parts in by_joints.values():
-        whole = _concatenated(parts)
-        number = whole.number
+        series = _concatenated(parts)
+        number = series.number
         if number is not None and not (np.diff(number) > 0).all():
-            whole = whole.select(np.argsort(number, kind='stable'))
-        gathered.append(whole)
+            series = series.select(np.argsort(number, kind='stable'))
+        gathered.append(series)
     return gathered
 
 
 def clock_problem(
     stamps: IntArray, position: FloatArray | None, receive: IntArray | None = None
 ) -> str:
-    """Return why stamps are not usable; empty if they are usable."""
+    """Return the reason why time stamps cannot be used, as a clause; empty if they can."""
     first = int(np.argmax(stamps != 0))
     if first and np.count_nonzero(stamps[first:] == 0) <= 0.01 * len(stamps):
         stamps = stamps[first:]  # simulated time is zero until the first /clock
@@ -82,7 +82,7 @@ def clock_problem(
 
 
 def ordered(series: JointSamples, clock: Clock, counts: Counter[str]) -> JointSamples:
-    """Return the samples of the longest stretch between clock restarts, in order of time."""
+    """Return the samples in order of time, of the longest stretch between clock restarts."""
     if clock == 'receive':
         assert series.receive is not None
         series = replace(series, stamps=series.receive)
@@ -106,7 +106,7 @@ def ordered(series: JointSamples, clock: Clock, counts: Counter[str]) -> JointSa
 def merged(
     series: Sequence[JointSamples], joints: Sequence[str], counts: Counter[str]
 ) -> JointSamples:
-    """Merge several series, each of some joints, into samples of all joints at common times."""
+    """Merge series of some joints each into samples of all joints at common times."""
     holders: dict[tuple[int, ...], list[str]] = {}
     for joint in joints:
         key = tuple(i for i, one in enumerate(series) if joint in one.joints)
@@ -141,7 +141,7 @@ def merged(
 
 
 def _concatenated(parts: Sequence[JointSamples]) -> JointSamples:
-    """Concatenate samples of the same joints."""
+    """Concatenate samples of the same joints along time."""
     if len(parts) == 1:
         return parts[0]
     values = tuple(_stacked([part.values[field] for part in parts], parts) for field in range(3))
@@ -158,38 +158,34 @@ def _concatenated(parts: Sequence[JointSamples]) -> JointSamples:
 def _stacked(
     arrays: Sequence[FloatArray | None], parts: Sequence[JointSamples], axis: int = 0
 ) -> FloatArray | None:
-    """Concatenate along time or joints, with NaN for missing quantities."""
+    """Concatenate the arrays of one quantity along time or joints; NaN where it is missing."""
     if all(values is None for values in arrays):
         return None
-    whole = [
+    filled = [
         np.full((len(part), len(part.joints)), np.nan) if values is None else values
         for values, part in zip(arrays, parts, strict=True)
     ]
-    together = None if axis else _adjacent(whole)
-    return np.concatenate(whole, axis=axis) if together is None else together
+    together = None if axis else _adjacent(filled)
+    return np.concatenate(filled, axis=axis) if together is None else together
 
 
 def _adjacent(arrays: Sequence[FloatArray]) -> FloatArray | None:
-    """Return the slice of an array that consists of adjacent views; None if not adjacent."""
-    whole = arrays[0].base
-    if not isinstance(whole, np.ndarray) or whole.ndim != 2:
+    """Return arrays as one view, if they are consecutive rows of one array; else None."""
+    base = arrays[0].base
+    if not isinstance(base, np.ndarray) or base.ndim != 2:
         return None
     first = at = arrays[0].ctypes.data
     for array in arrays:
-        if (
-            array.base is not whole
-            or array.ctypes.data != at
-            or array.shape[1:] != whole.shape[1:]
-        ):
+        if array.base is not base or array.ctypes.data != at or array.shape[1:] != base.shape[1:]:
             return None
         at += array.nbytes
-    row = whole.strides[0]
-    begin = whole.ctypes.data
-    return whole[(first - begin) // row : (at - begin) // row]
+    row = base.strides[0]
+    begin = base.ctypes.data
+    return base[(first - begin) // row : (at - begin) // row]
 
 
 def longest_run(stamps: IntArray) -> slice | None:
-    """Return the longest stretch between clock restarts; None without a restart."""
+    """Return the slice of the longest stretch between clock restarts; None without a restart."""
     if len(stamps) < 3:
         return None
     steps = np.diff(stamps)
@@ -212,7 +208,7 @@ def longest_run(stamps: IntArray) -> slice | None:
 
 
 def _sorted(series: JointSamples, counts: Counter[str]) -> JointSamples:
-    """Sort by time, and keep the first of several samples with equal stamps."""
+    """Return samples sorted by time, the first of several samples with equal stamps."""
     steps = np.diff(series.stamps)
     if (steps > 0).all():
         return series
@@ -229,7 +225,7 @@ def _sorted(series: JointSamples, counts: Counter[str]) -> JointSamples:
 def _resampled(
     series: JointSamples, stamps: IntArray
 ) -> tuple[JointSamples, npt.NDArray[np.bool_], npt.NDArray[np.bool_]]:
-    """Interpolate a series at other stamps; also return masks of valid and of exact values."""
+    """Interpolate samples at other stamps; also return masks of valid and of exact values."""
     if len(series) == len(stamps) and np.array_equal(series.stamps, stamps):
         everywhere = np.ones(len(stamps), np.bool_)
         return series, everywhere, everywhere
@@ -251,7 +247,7 @@ def _resampled(
 def _finite(
     where: str, joints: tuple[str, ...], series: JointSamples, counts: Counter[str]
 ) -> tuple[JointSamples, tuple[str, ...], tuple[str, ...]]:
-    """Return the finite samples, the absent quantities, and the non-finite quantities."""
+    """Return the samples with finite values, and texts on absent and on non-finite quantities."""
     absent: list[str] = []
     quantities: list[FloatArray | None] = []
     for name, values in zip(QUANTITIES, series.values, strict=True):
@@ -266,7 +262,7 @@ def _finite(
             absent.append(name if everyone else f'{name} of {", ".join(missing)}')
         quantities.append(None if missing else values)
     if quantities[0] is None:
-        raise RecordingError(f'{where} has no {absent[0]}')
+        raise RecordingError(f'{where}: the recording has no {absent[0]}')
     bad, not_finite = np.zeros(len(series), np.bool_), []
     most = 1e15  # uninitialised memory can hold any number
     for name, values in zip(QUANTITIES, quantities, strict=True):
@@ -280,7 +276,8 @@ def _finite(
     dropped = int(bad.sum())
     if dropped > MAX_NOT_FINITE * len(series):
         raise RecordingError(
-            f'{where}: {dropped} of {len(series)} samples are not finite ({"; ".join(not_finite)})'
+            f'{where}: {dropped} of {len(series)} samples have values that are not finite '
+            f'({"; ".join(not_finite)}); record again'
         )
     counts['nan'] += dropped
     samples = JointSamples(joints, series.stamps, tuple(quantities))
@@ -289,10 +286,10 @@ def _finite(
 
 def unwrapped(q: FloatArray) -> tuple[FloatArray, list[int]]:
     """
-    Undo jumps by a whole turn.
+    Return positions without the jumps by a full turn of joints that wrap around.
 
     A joint is wrapped if its positions stay within one turn, and if each step above half a turn
-    is about a whole turn. The tolerance depends on the other steps of the joint.
+    is about a full turn. The tolerance depends on the other steps of the joint.
 
     Parameters
     ----------
@@ -302,14 +299,14 @@ def unwrapped(q: FloatArray) -> tuple[FloatArray, list[int]]:
     Returns
     -------
     q : ndarray, shape (N, n)
-        Continuous positions, shifted by whole turns to be near zero; the same object if no joint
+        Continuous positions, shifted by full turns to be near zero; the same object if no joint
         was wrapped.
     joints : list of int
         Indices of the wrapped joints.
 
     """
     turns = (2.0 * np.pi, 360.0)  # a turn in each unit of positions [rad, degrees]
-    off_a_turn = 0.15  # largest deviation of a jump from a whole turn, as a share of the turn
+    off_a_turn = 0.15  # largest deviation of a jump from a full turn, as a share of the turn
     found: list[int] = []
     for joint in range(q.shape[1]):
         if np.ptp(q[:, joint]) < (1.0 - off_a_turn) * turns[0]:
@@ -325,10 +322,10 @@ def unwrapped(q: FloatArray) -> tuple[FloatArray, list[int]]:
                 and within
                 and np.all(off < min(off_a_turn * turn, 3.0 * usual + 1e-3 * turn))
             ):
-                whole = np.unwrap(q[:, joint], period=turn)
-                whole -= turn * np.round(0.5 * (whole.min() + whole.max()) / turn)
+                continuous = np.unwrap(q[:, joint], period=turn)
+                middle = 0.5 * (continuous.min() + continuous.max())
                 q = q.copy() if not found else q
-                q[:, joint] = whole
+                q[:, joint] = continuous - turn * np.round(middle / turn)
                 found.append(joint)
                 break
     return q, found
@@ -342,18 +339,18 @@ def assemble(
     **attributes: Any,
 ) -> Recording:
     """
-    Make a recording from samples that may be late, repeated, split or not finite.
+    Return a recording made of samples that may be late, repeated, split or not finite.
 
     Parameters
     ----------
     where : str
         File and topic or column, for error messages.
     joints : tuple of str
-        In the order of the recording.
+        Joint names, in the order of the recording.
     pieces : list of JointSamples
         Samples in the order of storage. The list is emptied to free its memory.
     counted : mapping of str to value
-        Attributes of the report so far, with the number of messages among them.
+        Attributes of the `ReadReport` so far, including ``messages``.
     **attributes
         Other attributes of the recording.
 
@@ -371,12 +368,14 @@ def assemble(
     for states in gathered if clock == 'receive' else ():
         if states.receive is None:
             raise RecordingError(
-                f'{where}: {note}; name another column of time with --time, or give --rate'
+                f'{where}: {note}; choose another column of time with --time, or give the '
+                'sampling rate with --rate'
             )
         problem = clock_problem(states.receive, states.values[0])
         if problem:
             raise RecordingError(
-                f'{where} has no usable time: {note}, and receive times {problem}'
+                f'{where}: the messages have no usable time: {note}, and the times of reception '
+                f'{problem}; record again'
             )
     series = merged([ordered(states, clock, counts) for states in gathered], joints, counts)
     samples, absent, not_finite = _finite(where, joints, series, counts)
@@ -384,8 +383,8 @@ def assemble(
     if len(stamps) < 2:
         lost = [f'{n} {name.replace("_", " ")}' for name, n in counts.items() if n]
         raise RecordingError(
-            f'{where}: {len(stamps)} samples are left of {counted["messages"]} messages '
-            f'({", ".join(lost) or "the recording is too short"})'
+            f'{where}: {len(stamps)} samples remain of {counted["messages"]} messages, but two '
+            f'are needed ({", ".join(lost) or "the recording is too short"})'
         )
     q, dq, tau = samples.values
     assert q is not None

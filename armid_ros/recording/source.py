@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Interface of all storages: topics, and their messages as raw CDR."""
+"""Interface of the readers of storage files: topics, and their messages as CDR bytes."""
 
 from __future__ import annotations
 
@@ -19,22 +19,22 @@ import numpy.typing as npt
 from rosbags.interfaces import Qos
 
 IntArray = npt.NDArray[np.int64]
-#: Encoding of topics whose messages cannot be read.
+#: Value of `Topic.encoding` if the messages of the topic cannot be read.
 UNREADABLE = 'unreadable'
-#: Number of messages of a block.
+#: Number of messages per block, for storages without chunks.
 BLOCK_MESSAGES = 4096
 
 
 @dataclass(frozen=True)
 class ReadSettings:
     """
-    Settings for reading a bag.
+    Checks and memory limit for reading a bag.
 
     Attributes
     ----------
     check_crc : bool
-        Whether checksums are compared and damaged parts are skipped. Reading takes about a tenth
-        longer.
+        Whether checksums are compared and damaged chunks are skipped. Reading then takes about a
+        tenth longer.
     memory_limit : int
         Memory limit for the messages of one bag, one chunk, or one unpacked file [bytes]; by
         default a quarter of the memory.
@@ -50,18 +50,20 @@ class ReadSettings:
     def __post_init__(self) -> None:
         """Raise RecordingError unless the memory limit is positive."""
         if self.memory_limit <= 0:
-            raise RecordingError(f'memory_limit has to be positive, not {self.memory_limit}')
+            raise RecordingError(
+                f'memory_limit is {self.memory_limit} bytes; give a positive number'
+            )
 
-    def require(self, size: int, what: str) -> None:
+    def require(self, size: int, content_name: str) -> None:
         """
-        Raise a RecordingError if an object exceeds the memory limit.
+        Raise RecordingError if content of a file would exceed the memory limit.
 
         Parameters
         ----------
         size : int
-            Size of the object [bytes].
-        what : str
-            Name of the object, the beginning of the error message.
+            Size of the content in memory [bytes].
+        content_name : str
+            Name of the content, the beginning of the error message.
 
         Raises
         ------
@@ -71,8 +73,8 @@ class ReadSettings:
         """
         if size > self.memory_limit:
             raise RecordingError(
-                f'{what} takes {size_text(size)}, more than the memory_limit of '
-                f'{size_text(self.memory_limit)}; raise the limit if you trust the file'
+                f'{content_name} needs {size_text(size)}, more than the memory limit of '
+                f'{size_text(self.memory_limit)}; raise memory_limit if you trust the file'
             )
 
 
@@ -82,23 +84,23 @@ DEFAULT = ReadSettings()
 @dataclass(frozen=True)
 class Topic:
     """
-    A topic of a bag.
+    Topic of a bag: name, message type, QoS profiles and number of messages.
 
     Attributes
     ----------
     name : str
         Such as '/joint_states'.
     message_type : MessageType
-        Its type, as the bag describes it.
+        Message type, as the bag describes it.
     qos : tuple of rosbags.interfaces.Qos
-        QoS that the publishers offered; empty if unknown.
+        QoS profiles that the publishers offered; empty if unknown.
     count : int
         Number of messages.
     encoding : str
         Serialisation of the messages: 'cdr' in ROS 2, `UNREADABLE` if the source cannot return
         them.
     joints : tuple of str
-        Joints that its first messages name; set by `topics`.
+        Joint names in the first messages of a JointState topic; set by `topics`.
 
     """
 
@@ -111,12 +113,12 @@ class Topic:
 
     @property
     def type_name(self) -> str:
-        """Name of the message type."""
+        """Return the name of the message type, such as 'sensor_msgs/msg/JointState'."""
         return self.message_type.name
 
 
 def listed(topics: Sequence[Topic]) -> str:
-    """Format topics with their types and counts, for error messages."""
+    """Return the names of topics with types and message counts, for error messages."""
     known = (f'{one.name} ({one.type_name}, {one.count} messages)' for one in topics)
     return ', '.join(known) or 'none'
 
@@ -124,7 +126,7 @@ def listed(topics: Sequence[Topic]) -> str:
 @dataclass(frozen=True)
 class MessageBlock:
     """
-    Messages of one topic in one buffer.
+    Serialised messages of one topic in one buffer, with their times.
 
     Attributes
     ----------
@@ -147,23 +149,23 @@ class MessageBlock:
     def joined(
         cls, messages: Sequence[bytes], log_time: IntArray, publish_time: IntArray
     ) -> MessageBlock:
-        """Copy messages into one buffer."""
+        """Return a block of the given messages, copied into one buffer."""
         length = np.array([len(message) for message in messages], np.int64)
         start = np.cumsum(length) - length
         return cls(b''.join(messages), start, length, log_time, publish_time)
 
     def __len__(self) -> int:
-        """Return the number of messages."""
+        """Return the number of messages N."""
         return len(self.start)
 
     def message(self, index: int) -> bytes:
-        """Return the CDR of one message."""
+        """Return the CDR bytes of one message."""
         start = int(self.start[index])
         return self.data[start : start + int(self.length[index])]
 
 
 class RawMessage(NamedTuple):
-    """One recorded message; times in ns."""
+    """One serialised message with its topic and times [ns]."""
 
     topic: str
     log_time_ns: int
@@ -172,40 +174,40 @@ class RawMessage(NamedTuple):
 
 
 class Damage:
-    """List of problems of a file, without repeats."""
+    """List of the problems found in a file, each problem once."""
 
     def __init__(self) -> None:
         self._problems: dict[str, None] = {}
 
     def __str__(self) -> str:
-        """Return the problems as a text; empty without problems."""
+        """Return the first eight problems as a text; empty without problems."""
         shown = list(self._problems)[:8]
         more = len(self._problems) - len(shown)
         return '; '.join([*shown, *([f'and {more} more'] if more else [])])
 
     def add(self, problem: str) -> None:
-        """Add a problem to the list."""
+        """Add a problem to the list, unless the list has it."""
         self._problems[problem] = None
 
 
 class Source(ABC):
-    """Storage of messages: one file, or the files of one bag."""
+    """Reader of the topics and messages of one storage file, or of all files of one bag."""
 
     def __init__(self, path: Path, settings: ReadSettings = DEFAULT) -> None:
         """
-        Open a storage, for reading only.
+        Open a storage file for reading.
 
         Parameters
         ----------
         path : Path
-            Its file.
+            The storage file.
         settings : ReadSettings
-            Which checks are made, and the memory limit.
+            Checks of the file, and the memory limit.
 
         Raises
         ------
         RecordingError
-            If the file cannot be read, or is of another kind.
+            If the file cannot be read, or has another format.
 
         """
         open_regular(path, RecordingError).close()  # opening a FIFO would block
@@ -213,7 +215,7 @@ class Source(ABC):
 
     @property
     def damage(self) -> str:
-        """Return the damage found so far; empty if none was found."""
+        """Return a description of the damage found so far; empty if none was found."""
         return str(self._damage)
 
     @abstractmethod
@@ -222,29 +224,29 @@ class Source(ABC):
 
     @abstractmethod
     def blocks(self, topic: str) -> Iterator[MessageBlock]:
-        """Yield the messages of a topic in the order of storage."""
+        """Yield the messages of a topic in blocks, in the order of storage."""
 
     @abstractmethod
     def messages(self) -> Iterator[RawMessage]:
-        """Yield all messages in the order of their log times."""
+        """Yield the messages of all topics in the order of their log times."""
 
     @abstractmethod
     def close(self) -> None:
-        """Close the files."""
+        """Close the storage files."""
 
 
 def records_at(data: bytes | mmap.mmap, start: IntArray, length: int) -> npt.NDArray[np.void]:
     """
-    Return pieces of a buffer, without a copy if they are evenly spaced.
+    Return equally long pieces of a buffer; without a copy if they are evenly spaced.
 
     Parameters
     ----------
     data : bytes or mmap
         The buffer; the pieces lie within it.
     start : ndarray, shape (N,)
-        Begin of each piece.
+        Position of the first byte of each piece.
     length : int
-        Number of bytes of each.
+        Number of bytes of each piece.
 
     Returns
     -------

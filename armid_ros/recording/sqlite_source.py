@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Read messages of an SQLite file of rosbag2, of any distribution.
+Read the messages of an SQLite storage file of rosbag2, of any ROS 2 distribution.
 
 SQLite has no checksums. The structure of pages and the types of columns are checked. Changed bytes
 inside a message cannot be detected.
@@ -32,16 +32,16 @@ from armid_ros.recording.source import (
 import numpy as np
 
 _JOURNALS = ('-wal', '-journal')
-# SQL condition for valid rows: an integer time and binary data.
+# SQL condition for valid rows of the table of messages: an integer time and binary data.
 _VALID_ROW = "typeof(timestamp) = 'integer' AND timestamp >= 0 AND typeof(data) = 'blob'"
 _ERRORS = (sqlite3.Error, UnicodeDecodeError, OverflowError, MemoryError)
 
 
 class SqliteSource(Source):
-    """Source for one SQLite file."""
+    """Reader of one SQLite storage file of rosbag2."""
 
     def __init__(self, path: Path, settings: ReadSettings = DEFAULT) -> None:
-        """Open a file of rosbag2."""
+        """Open an SQLite storage file of rosbag2, and check it."""
         super().__init__(path, settings)
         # After a crash, SQLite has to replay the journal of the file, but 'immutable' ignores
         # the journal. Without a journal, 'immutable' also works in a read-only folder.
@@ -114,7 +114,7 @@ class SqliteSource(Source):
                 yield RawMessage(_text(name), time, time, data)
 
     def _opened(self) -> dict[str, set[str]]:
-        """Check that the file is a bag of rosbag2, and return the columns of its tables."""
+        """Return the columns of each table of rosbag2; RecordingError if they are missing."""
         database = self._database
         database.text_factory = lambda text: text.decode('utf-8', 'replace')
         database.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, min(self._settings.memory_limit, 2**31 - 1))
@@ -138,15 +138,15 @@ class SqliteSource(Source):
         for table, names in needed:
             if not names <= columns[table]:
                 raise RecordingError(
-                    f'{self._path}: an SQLite file, but not of rosbag2: it has no table {table} '
-                    f'with {", ".join(sorted(names))}'
+                    f'{self._path}: the SQLite file is not of rosbag2: it has no table {table} '
+                    f'with the columns {", ".join(sorted(names))}'
                 )
         if self._settings.check_crc:
             self._check()
         return columns
 
     def _check(self) -> None:
-        """Check pages and rows of the file, and note their damage."""
+        """Check the pages and rows of the database, and add their problems to the damage."""
         (verdict,) = self._database.execute('PRAGMA quick_check(1)').fetchone()
         if verdict != 'ok':
             self._damage.add(f'the database is damaged: {" ".join(_text(verdict).split())}')
@@ -164,7 +164,7 @@ class SqliteSource(Source):
             self._damage.add(f'{lost} rows of messages have no topic; they are left out')
 
     def _fetch(self, query: str, parameters: tuple[str, ...]) -> Iterator[list[tuple[Any, ...]]]:
-        """Yield rows in batches, until damage of the database is met."""
+        """Yield the result rows of a query in batches, up to the first damaged row."""
         rows: list[tuple[Any, ...]] = []
         size = 0
         try:
@@ -181,5 +181,5 @@ class SqliteSource(Source):
 
 
 def _text(value: object) -> str:
-    """Return a value if it is a text; empty otherwise."""
+    """Return a database value if it is a text, else an empty text."""
     return value if isinstance(value, str) else ''

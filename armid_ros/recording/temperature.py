@@ -1,10 +1,10 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Read and write measured temperatures of joints or their motors.
+Read and write measured temperatures of joints or of their motors in bags.
 
-A bag has them in messages of sensor_msgs/Temperature, whose ``frame_id`` or topic names the joint,
-or as an interface of ros2_control in control_msgs/DynamicJointState.
+A bag has temperatures in sensor_msgs/Temperature messages, whose ``frame_id`` or topic has the
+name of the joint, or in control_msgs/DynamicJointState messages of ros2_control.
 
 """
 
@@ -35,12 +35,12 @@ def temperatures(
     where: Sequence[str], times: Sequence[FloatArray], values: Sequence[FloatArray]
 ) -> Temperatures:
     """
-    Join the temperatures of joints, each with times of its own.
+    Combine the temperature readings of joints, each with own times, on one time base.
 
     Parameters
     ----------
     where : sequence of str
-        File, topic or column, and joint of each, for messages.
+        File, topic or column, and joint of the readings, for error messages.
     times : sequence of ndarray, each (K_j,)
         Times [s]; empty for a joint without a sensor.
     values : sequence of ndarray, each (K_j,)
@@ -49,7 +49,7 @@ def temperatures(
     Raises
     ------
     RecordingError
-        If no temperature of a joint is finite, or one is impossible; the message names its place.
+        If no temperature of a joint is finite, or a temperature is impossible.
 
     """
     kept, lowest, highest = [], -40.0, 150.0  # range of a working joint [degC]
@@ -57,15 +57,16 @@ def temperatures(
         there = np.isfinite(value)
         if len(value) and not there.any():
             raise RecordingError(
-                f'{name}: no temperature is finite; leave temperatures out with --temperature none'
+                f'{name}: no temperature is a finite number; ignore temperatures with '
+                '--temperature none'
             )
         t, value = t[there], value[there]
         strange = np.flatnonzero((value < lowest) | (value > highest))
         if len(strange):
             raise RecordingError(
-                f'{name}: the temperature at {t[strange[0]]:.3f} s is {value[strange[0]]:g}, and '
-                f'has to be from {lowest:g} to {highest:g} degC; convert it to degC, or leave '
-                'temperatures out with --temperature none'
+                f'{name}: the temperature at {t[strange[0]]:.3f} s is {value[strange[0]]:g}, but '
+                f'has to be from {lowest:g} to {highest:g} degC; convert it to degC, or ignore '
+                'temperatures with --temperature none'
             )
         _, first = np.unique(np.floor(t / _MIN_INTERVAL), return_index=True)
         kept.append((t[first], value[first]))
@@ -78,25 +79,24 @@ def temperatures(
 
 def read_temperatures(bag: Bag, recording: Recording) -> Temperatures | None:
     """
-    Read the temperatures of the joints of a recording from its bag.
+    Read the temperatures of the joints of a recording from its open bag.
 
     Parameters
     ----------
     bag : Bag
         The open bag.
     recording : Recording
-        The recording, with the time base and the joints.
+        Recording with the joints and the time base.
 
     Returns
     -------
     Temperatures or None
-        None if no message has the temperature of one of the joints.
+        None if the bag has no temperature of these joints.
 
     Raises
     ------
     RecordingError
-        If the temperatures of a joint are not finite or impossible; the message names topic and
-        joint.
+        If the temperatures of a joint are not finite or impossible.
 
     """
     found: dict[str, dict[int, float]] = {joint: {} for joint in recording.joints}
@@ -116,7 +116,7 @@ def read_temperatures(bag: Bag, recording: Recording) -> Temperatures | None:
 
 
 def _readings(bag: Bag, topic: Topic, recording: Recording) -> Iterator[tuple[str, int, float]]:
-    """Yield joint, stamp [ns] and temperature of the messages of a topic, at most ten a second."""
+    """Yield joint, stamp [ns] and temperature [degC] from a topic, at most ten per second."""
     store, last = store_for(topic.message_type), dict[bytes, int]()
     for block in bag.blocks(topic.name):
         for index, received in enumerate(block.log_time.tolist()):
@@ -128,9 +128,9 @@ def _readings(bag: Bag, topic: Topic, recording: Recording) -> Iterator[tuple[st
             last[frame] = received
             try:
                 message: Any = store.deserialize_cdr(cdr, topic.type_name)
-            except Exception as error:  # of any kind, for damaged messages
+            except Exception as error:  # damaged messages cause exceptions of any class
                 raise RecordingError(
-                    f'{bag.path}: {topic.name}: message {index} is damaged: {error}'
+                    f'{bag.path}: {topic.name}: message {index} cannot be decoded: {error}'
                 ) from error
             stamp = message.header.stamp.sec * 10**9 + message.header.stamp.nanosec
             stamp = stamp if stamp and recording.clock == 'header' else received
@@ -139,7 +139,7 @@ def _readings(bag: Bag, topic: Topic, recording: Recording) -> Iterator[tuple[st
 
 
 def _named(message: Any, topic: Topic, joints: Sequence[str]) -> Iterator[tuple[str, float]]:
-    """Yield the joints that a message names, with their temperatures."""
+    """Yield the requested joints in a decoded message, with their temperatures [degC]."""
     if topic.type_name == TEMPERATURE:
         parts = (part.removesuffix('_temperature') for part in topic.name.split('/'))
         names = [name for name in (message.header.frame_id, *parts) if name in joints]
@@ -155,7 +155,7 @@ def _named(message: Any, topic: Topic, joints: Sequence[str]) -> Iterator[tuple[
 def write_temperatures(
     writer: BagWriter, joints: Sequence[str], measured: Temperatures, start_ns: int
 ) -> None:
-    """Write temperatures to a bag, one message per joint and time."""
+    """Write temperatures to a bag as sensor_msgs/Temperature, one message per joint and time."""
     writer.add_topic(TOPIC, TEMPERATURE)
     for t, row in zip(measured.t.tolist(), measured.values.tolist(), strict=True):
         stamp = start_ns + round(1e9 * t)

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Read and write reference motions as trajectory_msgs/JointTrajectory."""
+"""Read and write reference motions as trajectory_msgs/JointTrajectory messages in bags."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from armid_ros.recording.bag import Bag
 from armid_ros.recording.message_types import JOINT_TRAJECTORY, store_for
 from armid_ros.recording.metadata import LATCHED
 from armid_ros.recording.source import DEFAULT, ReadSettings
-from armid_ros.recording.writer import whole_bag
+from armid_ros.recording.writer import atomic_bag
 from armid_ros.robots.reference import Reference
 import numpy as np
 from rosbags.serde import SerdeError
@@ -24,12 +24,13 @@ from rosbags.typesys import get_typestore, Stores
 
 def joint_trajectory_cdr(motion: Motion | Reference) -> bytes:
     """
-    Serialise a motion as one trajectory_msgs/JointTrajectory.
+    Return a motion serialised as one trajectory_msgs/JointTrajectory message.
 
     Parameters
     ----------
     motion : Motion or Reference
-        Motion to serialise. Its times become time_from_start; the stamp 0 means now.
+        Motion to serialise. Its times become time_from_start. The header stamp is 0, so that
+        controllers start at once.
 
     """
     store = get_typestore(Stores.ROS2_JAZZY)
@@ -70,7 +71,7 @@ def write_joint_trajectory(
     robot_description: str | None = None,
 ) -> None:
     """
-    Write a reference motion as a bag with one JointTrajectory message.
+    Write a reference motion to a new bag, as one JointTrajectory message.
 
     Parameters
     ----------
@@ -88,7 +89,7 @@ def write_joint_trajectory(
 
     """
     topic, log_time = '/joint_trajectory', 10**9  # [ns]
-    with whole_bag(path) as writer:
+    with atomic_bag(path) as writer:
         if robot_description is not None:
             writer.write_description(robot_description, log_time)
         writer.add_topic(topic, JOINT_TRAJECTORY, qos=[LATCHED])
@@ -103,7 +104,7 @@ def read_waypoints(
     settings: ReadSettings = DEFAULT,
 ) -> Reference:
     """
-    Read the last JointTrajectory of a bag.
+    Return the reference motion in the last JointTrajectory message of a bag.
 
     Parameters
     ----------
@@ -135,26 +136,30 @@ def read_waypoints(
             cdr = block.message(len(block) - 1)
     where = f'{path}: {chosen.name}'
     if not cdr:
-        raise RecordingError(f'{where} has no messages')
+        raise RecordingError(f'{where}: the topic has no messages')
     with reading(where, RecordingError):
         try:
             message: Any = store_for(chosen.message_type).deserialize_cdr(cdr, JOINT_TRAJECTORY)
         except SerdeError as error:
-            raise RecordingError(f'the trajectory cannot be decoded: {error}') from error
+            problem = f'the JointTrajectory message cannot be decoded: {error}'
+            raise RecordingError(problem) from error
         found = waypoints_of(message)
     missing = [joint for joint in joints if joint not in found.joints]
     if missing:
         raise RecordingError(
-            f'{where} does not name {", ".join(missing)}; its joints are {", ".join(found.joints)}'
+            f'{where}: the trajectory lacks the joints {", ".join(missing)}; its joints are '
+            f'{", ".join(found.joints)}'
         )
     if len(found.t) < 2:
-        raise RecordingError(f'{where}: a trajectory needs two points, but has {len(found.t)}')
+        raise RecordingError(
+            f'{where}: the trajectory needs two points or more, but has {len(found.t)}'
+        )
     return found.of_joints(tuple(joints))
 
 
 def waypoints_of(message: Any) -> Reference:
     """
-    Return the waypoints of a JointTrajectory message decoded by ROS or rosbags.
+    Return the waypoints of a JointTrajectory message that ROS or rosbags decoded.
 
     Raises
     ------
@@ -165,23 +170,23 @@ def waypoints_of(message: Any) -> Reference:
     """
     points, joints = message.points, tuple(message.joint_names)
     if not len(points):
-        raise TrajectoryError('trajectory: it has no points')
+        raise TrajectoryError('the JointTrajectory message has no points')
 
     def quantity(name: str) -> FloatArray | None:
         rows = [getattr(point, name) for point in points]
         if not any(len(row) for row in rows):
             return None
-        odd = next((k for k, row in enumerate(rows) if len(row) != len(joints)), None)
-        if odd is not None:
-            raise TrajectoryError(
-                f'trajectory: point {odd} has {len(rows[odd])} {name}, but there are '
-                f'{len(joints)} joint names'
-            )
+        for number, row in enumerate(rows):
+            if len(row) != len(joints):
+                raise TrajectoryError(
+                    f'point {number} of the trajectory has {len(row)} {name}, but the message has '
+                    f'{len(joints)} joint names'
+                )
         return np.array(rows, np.float64)
 
     t = np.array([p.time_from_start.sec + 1e-9 * p.time_from_start.nanosec for p in points])
     q = quantity('positions')
     if q is None:
-        raise TrajectoryError('trajectory: its points have no positions')
+        raise TrajectoryError('the points of the JointTrajectory message have no positions')
     rates = quantity('velocities'), quantity('accelerations')
     return Reference(joints, t, q, *rates, quantity('effort'))

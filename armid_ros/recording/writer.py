@@ -1,10 +1,10 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Write rosbag2 directories: BAG/BAG_0.mcap and BAG/metadata.yaml, as in Jazzy.
+Write bags of rosbag2: a directory with BAG_0.mcap and metadata.yaml, as in ROS 2 Jazzy.
 
-Messages in a finished chunk survive a crash or a kill of the process. Chunks are therefore closed
-early, by size or by age.
+Messages in a finished chunk survive a crash or a kill of the process. Chunks are therefore
+finished early, at a limit of their size or age.
 
 """
 
@@ -27,10 +27,10 @@ from armid_ros.recording.mcap.writer import Compression, McapWriter, message_rec
 from armid_ros.recording.message_types import message_type, MessageType, STRING, string_cdr
 from armid_ros.recording.metadata import (
     bag_information,
-    dump,
     FILE_NAME,
     LATCHED,
     VOLATILE,
+    yaml_text,
 )
 from armid_ros.recording.source import IntArray, Source, Topic, UNREADABLE
 from armid_ros.version import __version__
@@ -40,24 +40,24 @@ import numpy.typing as npt
 from rosbags.interfaces import Qos
 from rosbags.rosbag2.metadata import dump_qos_v9
 
-# For JointState at 3 kHz (1 MB/s) chunks are closed by age, not by size.
+# Limit of the size of a chunk [bytes]. JointState messages at 3 kHz (1 MB/s) reach the age first.
 DEFAULT_CHUNK_SIZE = 512 * 1024
-# Including the time of writing, a kill loses at most 0.3 s of messages.
+# Limit of the age of a chunk [s]. With the writing, a kill loses at most 0.3 s of messages.
 DEFAULT_CHUNK_AGE = 0.2
 
 
 @contextmanager
-def whole_bag(
+def atomic_bag(
     path: str | Path,
     *,
     compression: Compression = 'zstd',
     chunk_size: int = DEFAULT_CHUNK_SIZE,
 ) -> Iterator[BagWriter]:
     """
-    Write a complete bag; if the writing is interrupted, the bag is removed.
+    Write a bag that is complete or absent: an exception removes the incomplete bag.
 
-    An incomplete result could be mistaken for a complete one; a recorder, in contrast, keeps its
-    incomplete bag.
+    An incomplete result could be mistaken for a complete result. A recorder, in contrast, keeps
+    its incomplete bag.
 
     Parameters
     ----------
@@ -86,17 +86,17 @@ def whole_bag(
 
 
 def require_new(path: Path) -> None:
-    """Raise a RecordingError if the path exists."""
+    """Raise RecordingError if a path of a new bag exists already."""
     if os.path.lexists(path):
-        raise RecordingError(f'{path}: exists already; choose another name, or remove it')
+        raise RecordingError(f'{path}: the bag exists already; choose another name, or remove it')
 
 
 class BagWriter:
     """
-    Writer of a bag; a context manager.
+    Writer of one bag with MCAP storage; a context manager.
 
-    The bag is completed at the end of the context, also after an exception. Messages recorded
-    before the exception are kept.
+    The end of the context completes the bag, also after an exception. Messages recorded before
+    the exception are kept.
 
     """
 
@@ -110,7 +110,7 @@ class BagWriter:
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         """
-        Create the directory and begin the file.
+        Create the directory of the bag and begin its storage file.
 
         Parameters
         ----------
@@ -123,7 +123,7 @@ class BagWriter:
         compression : {'zstd', 'lz4', 'none'}
             Compression of the chunks.
         clock : callable
-            Returns the time that the age of chunks is measured with [s].
+            Returns the time for the age of chunks [s].
 
         Raises
         ------
@@ -136,7 +136,8 @@ class BagWriter:
         try:
             self.path.mkdir(parents=True)
         except OSError as error:
-            raise RecordingError(f'{self.path}: cannot be made: {error.strerror}') from error
+            problem = f'{self.path}: the directory cannot be created: {error.strerror}'
+            raise RecordingError(problem) from error
         self.file = self.path / f'{self.path.resolve().name}_0.mcap'
         self._chunk_size = chunk_size
         self.chunk_age = chunk_age
@@ -153,7 +154,7 @@ class BagWriter:
         self._write_information(None)
 
     def __enter__(self) -> Self:
-        """Return the writer."""
+        """Return the open writer."""
         return self
 
     def __exit__(self, *error: object) -> None:
@@ -162,7 +163,7 @@ class BagWriter:
 
     @property
     def topics(self) -> tuple[Topic, ...]:
-        """Return the topics, with the number of messages in the file."""
+        """Return the topics of the bag, with the number of messages in the file."""
         counts = self._mcap.committed.counts
         return tuple(
             replace(topic, count=counts.get(self._channels[name], 0))
@@ -171,17 +172,17 @@ class BagWriter:
 
     @property
     def size(self) -> int:
-        """Return the number of bytes in the file."""
+        """Return the size of the storage file [bytes]."""
         return self._mcap.committed.position
 
     @property
     def in_place(self) -> bool:
-        """Whether the file was neither deleted nor moved since it was created."""
+        """Whether the storage file was neither deleted nor moved since its creation."""
         return self._mcap.in_place
 
     @property
     def time_range(self) -> tuple[int, int]:
-        """Log times of the first and the last message in the file [ns]."""
+        """Return the log times of the first and the last message in the file [ns]."""
         return self._mcap.committed.time_range
 
     def add_topic(
@@ -195,7 +196,7 @@ class BagWriter:
         encoding: str = 'ros2msg',
     ) -> None:
         """
-        Add a topic; adding it again with the same type has no effect.
+        Add a topic to the bag; adding it again with the same type has no effect.
 
         Parameters
         ----------
@@ -204,7 +205,7 @@ class BagWriter:
         type_name : str
             Such as 'sensor_msgs/msg/JointState'.
         qos : sequence of rosbags.interfaces.Qos
-            QoS that the publishers offer; by default one reliable, volatile publisher.
+            QoS profiles that the publishers offer; by default a reliable, volatile publisher.
         definition : str, optional
             Text of the type's .msg file, with or without its dependencies; needed for types that
             are neither standard nor installed.
@@ -224,8 +225,8 @@ class BagWriter:
         if known is not None:
             if known.type_name != type_name:
                 raise RecordingError(
-                    f'{self.path}: topic {name} has the type {known.type_name} already, '
-                    f'and cannot have {type_name}'
+                    f'{self.path}: the topic {name} was added with type {known.type_name}, so it '
+                    f'cannot have type {type_name}'
                 )
             return
         if definition is not None and type_hash is not None:
@@ -245,7 +246,7 @@ class BagWriter:
             name,
             self._schemas[described],
             {
-                'offered_qos_profiles': dump(dump_qos_v9(list(topic.qos))).strip(),
+                'offered_qos_profiles': yaml_text(dump_qos_v9(list(topic.qos))).strip(),
                 'topic_type_hash': described.type_hash,
             },
         )
@@ -261,7 +262,7 @@ class BagWriter:
         publish_time_ns: int | None = None,
     ) -> None:
         """
-        Write one message.
+        Write one serialised message.
 
         Parameters
         ----------
@@ -293,7 +294,7 @@ class BagWriter:
             self.flush()
 
     def write_description(self, urdf: str, log_time_ns: int) -> None:
-        """Write a robot description (URDF) to /robot_description, latched."""
+        """Write a URDF as a latched message to the topic /robot_description."""
         self.add_topic('/robot_description', STRING, qos=[LATCHED])
         self.write('/robot_description', string_cdr(urdf), log_time_ns)
 
@@ -301,7 +302,7 @@ class BagWriter:
         self, topic: str, messages: npt.NDArray[np.void], log_times_ns: IntArray
     ) -> None:
         """
-        Write many messages of equal length from one array.
+        Write serialised messages of equal length from one array.
 
         Parameters
         ----------
@@ -310,7 +311,7 @@ class BagWriter:
         messages : ndarray of void, shape (N,)
             The messages, serialised.
         log_times_ns : ndarray, shape (N,)
-            Times of reception, written as times of sending too [ns].
+            Times of reception, also written as times of sending [ns].
 
         Raises
         ------
@@ -338,7 +339,7 @@ class BagWriter:
 
     def copy(self, source: Source) -> None:
         """
-        Copy all topics and messages of a source, with unchanged types, QoS and times.
+        Copy all topics and messages of a bag, with unchanged types, QoS profiles and times.
 
         Topics whose messages the source cannot return are skipped.
 
@@ -364,7 +365,7 @@ class BagWriter:
             self.write(message.topic, message.cdr, message.log_time_ns, message.publish_time_ns)
 
     def flush(self) -> None:
-        """Write the messages in memory to the file; call it from a timer."""
+        """Write the messages in memory to the file, as a chunk; a timer calls this method."""
         self._check_open()
         content, offsets = _joined(self._open_records())
         # A chunk without messages need not be written.
@@ -372,7 +373,7 @@ class BagWriter:
             self._mcap.write_chunk(content, offsets)
 
     def close(self) -> None:
-        """Complete the file and write metadata.yaml; no effect on a closed bag."""
+        """Complete the storage file and write metadata.yaml; no effect on a closed bag."""
         if self._closed:
             return
         if not self._mcap.finished:
@@ -383,7 +384,7 @@ class BagWriter:
 
     def save(self) -> str:
         """
-        Complete the bag without the messages in memory, after a write error.
+        Complete the bag after a write error, without the messages in memory.
 
         Returns
         -------
@@ -403,7 +404,7 @@ class BagWriter:
         return ''
 
     def _open_records(self) -> list[bytes]:
-        """Return the records of the next chunk."""
+        """Return the list of records for the next chunk."""
         # flush() does not empty the list, because it may be interrupted after writing. Records
         # have the number of their chunk, and are removed when that chunk is in the file.
         if self._open[0] != self._mcap.committed.chunks:
@@ -411,33 +412,36 @@ class BagWriter:
         return self._open[1]
 
     def _complete(self) -> None:
-        """Write the summary of the file, and metadata.yaml."""
+        """Write the summary of the storage file, and metadata.yaml."""
         self._mcap.finish()
         information = bag_information(self.topics, self.file.name, *self.time_range)
-        text = dump({'rosbag2_bagfile_information': information})
+        text = yaml_text({'rosbag2_bagfile_information': information})
         write_file(self.path / FILE_NAME, text)  # complete or absent after an interruption
 
     def _write_information(self, file_name: str | None) -> None:
-        """Write the metadata record that rosbag2 writes at the beginning and end of the file."""
-        text = dump(bag_information(self.topics, file_name, *self.time_range))
+        """Write the metadata record that rosbag2 has at the start and end of an MCAP file."""
+        text = yaml_text(bag_information(self.topics, file_name, *self.time_range))
         self._mcap.write_metadata('rosbag2', {'serialized_metadata': text})
 
     def _check_open(self) -> None:
         if self._closed:
-            raise RecordingError(f'{self.path}: the bag is closed')
+            raise RecordingError(f'{self.path}: the bag is closed and cannot be written to')
 
     def _channel(self, topic: str) -> int:
-        """Return the channel of a topic; RecordingError if unknown or the bag is closed."""
+        """Return the MCAP channel of a topic; RecordingError if it was not added."""
         channel = self._channels.get(topic)
         if channel is None or self._closed:
             self._check_open()
             known = ', '.join(self._topics) or 'none'
-            raise RecordingError(f"{self.path}: topic '{topic}' was not added; topics are {known}")
+            raise RecordingError(
+                f"{self.path}: the topic '{topic}' was not added to the bag, whose topics are "
+                f'{known}'
+            )
         return channel
 
 
 def _joined(records: list[bytes]) -> tuple[bytes, IntArray]:
-    """Join records, and return the start of each message among them."""
+    """Return records as one byte string, and the position of each message record in it."""
     lengths = np.array([len(record) for record in records], np.int64)
     is_message = np.array([record[0] == Opcode.MESSAGE for record in records], np.bool_)
     return b''.join(records), (np.cumsum(lengths) - lengths)[is_message]

@@ -14,7 +14,7 @@ from armid_ros.positions.loop import CommandedMotion
 from armid_ros.positions.text import limit_hints
 from armid_ros.recording import read_recording
 from armid_ros.recording.joint_state.encoder import write_joint_states
-from armid_ros.recording.writer import whole_bag
+from armid_ros.recording.writer import atomic_bag
 import numpy as np
 import pytest
 from rosbags.typesys import get_types_from_msg, get_typestore, Stores
@@ -55,7 +55,7 @@ def folder(robot, played, tmp_path_factory):
     place = tmp_path_factory.mktemp('positions')
     measured, commanded = played
     (place / 'arm.urdf').write_text(robot.urdf)
-    with whole_bag(place / 'run') as writer:
+    with atomic_bag(place / 'run') as writer:
         for topic, one in (('/joint_states', measured), ('/joint_commands', commanded)):
             stamps = 10**9 + np.rint(1e9 * one.t).astype(np.int64)
             write_joint_states(writer, topic, robot.joints, stamps, one.q, one.dq)
@@ -110,7 +110,7 @@ def test_the_reference_of_a_trajectory_controller_is_read(tmp_path, robot, playe
     store = get_typestore(Stores.ROS2_JAZZY)
     store.register(get_types_from_msg(DEFINITION, STATE))
     types = store.types
-    with whole_bag(tmp_path / 'run') as writer:
+    with atomic_bag(tmp_path / 'run') as writer:
         stamps = 10**9 + np.rint(1e9 * measured.t).astype(np.int64)
         write_joint_states(writer, '/joint_states', robot.joints, stamps, measured.q)
         writer.add_topic('/controller/controller_state', STATE, definition=DEFINITION)

@@ -79,14 +79,14 @@ def test_a_file_that_unpacks_to_more_than_the_limit_is_refused(tmp_path, memory)
 
 def test_a_message_that_unpacks_to_more_than_the_limit_is_refused(memory):
     message = io.BytesIO(zeros(FAR_TOO_MUCH, 'zstd'))
-    with pytest.raises(RecordingError, match='memory_limit of 10 MB'):
+    with pytest.raises(RecordingError, match='memory limit of 10 MB'):
         list(unpacked(message, SMALL, 'a message'))
     assert memory() < 100_000_000
 
 
 def test_a_recording_that_takes_more_than_the_limit_is_refused(make_swing, tmp_path):
     write_recording(tmp_path / 'bag', make_swing(2000), compression='none')
-    with pytest.raises(RecordingError, match=r'memory_limit.*100 kB'):
+    with pytest.raises(RecordingError, match=r'memory limit.*100 kB'):
         read_recording(
             tmp_path / 'bag', joints=JOINTS, settings=ReadSettings(memory_limit=100_000)
         )

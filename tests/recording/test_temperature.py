@@ -76,7 +76,7 @@ def test_a_bag_without_temperatures_has_none(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ('value', 'problem'), [(300.0, '300.*150 degC'), (np.nan, 'no temperature is finite')]
+    ('value', 'problem'), [(300.0, '300.*150 degC'), (np.nan, 'no temperature is a finite')]
 )
 def test_wrong_temperatures_are_refused_with_their_place(tmp_path, value, problem):
     path = bag_with(tmp_path / 'bag', [('/heat', 'elbow', value)])

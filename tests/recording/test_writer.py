@@ -20,7 +20,7 @@ from armid_ros.recording.message_types import (
     string_cdr,
 )
 from armid_ros.recording.metadata import LATCHED, VOLATILE
-from armid_ros.recording.writer import DEFAULT_CHUNK_AGE, whole_bag
+from armid_ros.recording.writer import atomic_bag, DEFAULT_CHUNK_AGE
 from mcap.reader import make_reader
 from mcap.records import Chunk, MessageIndex, Metadata
 from mcap.stream_reader import StreamReader
@@ -337,10 +337,10 @@ def test_the_hash_of_a_type_does_not_depend_on_where_its_definition_is_from():
 @pytest.mark.parametrize('end', [RecordingError('disk full'), KeyboardInterrupt()])
 def test_a_bag_of_which_all_is_known_is_whole_or_absent(tmp_path, end):
     with pytest.raises(type(end)):
-        with whole_bag(tmp_path / 'bag') as writer:
+        with atomic_bag(tmp_path / 'bag') as writer:
             writer.add_topic('/chatter', STRING)
             raise end
     assert not (tmp_path / 'bag').exists()
-    with whole_bag(tmp_path / 'bag') as writer:
+    with atomic_bag(tmp_path / 'bag') as writer:
         writer.add_topic('/chatter', STRING)
     assert (tmp_path / 'bag' / 'metadata.yaml').exists()

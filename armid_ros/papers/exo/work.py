@@ -28,7 +28,7 @@ from armid_ros.papers.exo.report.walk import (
     STIFFNESS_ERROR,
 )
 from armid_ros.recording import recorded_together, Recording, write_joint_states
-from armid_ros.recording.writer import whole_bag
+from armid_ros.recording.writer import atomic_bag
 import numpy as np
 from numpy.random import Generator
 
@@ -47,7 +47,7 @@ def record(
     tau = pair_torques(pair, *motions).tau
     tau = tau + noise[1] * rng.normal(size=tau.shape)
     stamps = 10**9 + np.rint(motions.own.t * 1e9).astype(np.int64)
-    with whole_bag(path) as writer:
+    with atomic_bag(path) as writer:
         for topic, motion, torque in zip(topics, motions, (tau, None), strict=True):
             q = motion.q + np.radians(noise[0]) * rng.normal(size=motion.q.shape)
             write_joint_states(writer, topic, motion.joints, stamps, q, None, torque)

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Yield JointState messages of a topic, including those inside messages of other types."""
+"""Read JointState messages of a topic, also from inside messages of other types."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _JOINT_STATE_FIELD = re.compile(r'^\s*sensor_msgs/(?:msg/)?JointState\s+(\w+)', 
 
 
 def holds_joint_state(topic: Topic) -> bool:
-    """Return whether the messages of a topic are, or contain, a JointState."""
+    """Return whether the message type of a topic is JointState or has a JointState field."""
     return topic.type_name == JOINT_STATE or bool(_inside(topic.message_type))
 
 
@@ -39,13 +39,13 @@ def joint_state_blocks(bag: Bag, topic: Topic) -> Iterator[MessageBlock]:
     where = f'{bag.path}: {topic.name}'
     if topic.encoding != 'cdr':
         raise RecordingError(
-            f"{where} is serialised as '{topic.encoding}', and only CDR of ROS 2 can be read: "
-            'record again with ros2 bag record'
+            f"{where}: the messages are serialised as '{topic.encoding}', but only CDR can be "
+            'read; record again with ros2 bag record'
         )
     if not _standard(topic.message_type):
         raise RecordingError(
-            f'{where}: the bag defines {JOINT_STATE} in another way than ROS 2; record the type '
-            'of sensor_msgs'
+            f'{where}: the definition of {JOINT_STATE} in the bag differs from that of ROS 2; '
+            'record messages of the package sensor_msgs'
         )
     if topic.type_name == JOINT_STATE:
         yield from bag.blocks(topic.name)
@@ -59,13 +59,13 @@ def joint_state_blocks(bag: Bag, topic: Topic) -> Iterator[MessageBlock]:
                 message = store.deserialize_cdr(block.message(at), described.name)
                 state = getattr(message, inside)
                 messages.append(bytes(store.serialize_cdr(state, JOINT_STATE)))
-            except Exception:  # the decoder will count such messages as malformed
+            except Exception:  # the decoder counts such messages as malformed
                 messages.append(bytes(4))
         yield MessageBlock.joined(messages, block.log_time, block.publish_time)
 
 
 def _inside(described: MessageType) -> str:
-    """Return the JointState field of a type, the measured one of several; '' if there is none."""
+    """Return the name of the JointState field of a type, preferably the measured; '' if none."""
     own = described.definition.split('\n===', 1)[0]
     found = _JOINT_STATE_FIELD.findall(own)
     return next((name for name in found if 'measured' in name), found[0] if found else '')
@@ -73,7 +73,7 @@ def _inside(described: MessageType) -> str:
 
 @cache
 def _standard(described: MessageType) -> bool:
-    """Return whether a bag defines JointState as ROS 2 does."""
+    """Return whether the definition of JointState in a bag is that of ROS 2."""
     if not described.definition:
         return True
     return bool(store_for(described).hash_rihs01(JOINT_STATE) == JOINT_STATE_HASH)

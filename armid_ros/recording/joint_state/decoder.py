@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Decode JointState messages, in blocks or one by one."""
+"""Decode serialised JointState messages into arrays, in blocks or one by one."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ import numpy.typing as npt
 @dataclass(frozen=True)
 class JointSamples:
     """
-    Samples of some joints; arrays of shape (N,) and (N, k).
+    Samples of some joints: stamps, positions, velocities and efforts.
 
     Attributes
     ----------
@@ -28,7 +28,7 @@ class JointSamples:
         Names of the k joints, in the requested order.
     stamps : ndarray, shape (N,)
         Time stamps, for messages the header stamps [ns].
-    values : ndarray, shape (3, N, k), as a tuple of three
+    values : tuple of three ndarray, each of shape (N, k)
         Positions, velocities, efforts [rad or m, their rate, N m or N]; None for a quantity that
         no message has, NaN for missing values.
     receive, number : ndarray, shape (N,), or None
@@ -47,7 +47,7 @@ class JointSamples:
         return len(self.stamps)
 
     def select(self, samples: Samples) -> JointSamples:
-        """Return some of the samples."""
+        """Return the data of selected samples."""
         values = tuple(None if v is None else v[samples] for v in self.values)
         receive, number = (
             None if one is None else one[samples] for one in (self.receive, self.number)
@@ -55,7 +55,7 @@ class JointSamples:
         return JointSamples(self.joints, self.stamps[samples], values, receive, number)
 
     def columns(self, joints: Sequence[str]) -> JointSamples:
-        """Return some of the joints."""
+        """Return the data of selected joints, in the given order."""
         if tuple(joints) == self.joints:
             return self
         chosen = [self.joints.index(joint) for joint in joints]
@@ -64,25 +64,25 @@ class JointSamples:
 
     @property
     def nbytes(self) -> int:
-        """Memory of the arrays [bytes]."""
+        """Return the memory of the arrays [bytes]."""
         arrays = (self.stamps, self.receive, self.number, *self.values)
         return sum(array.nbytes for array in arrays if array is not None)
 
 
 class JointStateDecoder:
     """
-    Decoder of the messages of one topic, with a cache of layouts.
+    Decoder of the JointState messages of one topic; it caches message layouts.
 
     Attributes
     ----------
     messages : int
-        Messages decoded or dropped so far.
+        Number of messages decoded or dropped so far.
     malformed : int
         Number of dropped messages: not a JointState, or arrays that do not fit the names.
     first_problem : str
         Error of the first dropped message.
-    names_seen : tuple of str
-        All joint names found so far, in order of appearance.
+    names_seen : dict
+        All joint names found so far, as keys in order of appearance.
     others : mapping of str to (float, float)
         Lowest and highest position of joints that were not requested [rad or m].
 
@@ -90,12 +90,12 @@ class JointStateDecoder:
 
     def __init__(self, joints: Sequence[str], expected: int = 0) -> None:
         """
-        Make a decoder for some joints.
+        Make a decoder of the values of some joints.
 
         Parameters
         ----------
         joints : sequence of str
-            The joints.
+            Joints to decode, in this order.
         expected : int
             Expected number of messages, for which memory is reserved.
 
@@ -104,19 +104,14 @@ class JointStateDecoder:
         self._expected = expected
         self._free: dict[tuple[str, int], FloatArray] = {}
         self._plans: dict[int, list[_Plan]] = {}
-        self._names: dict[str, None] = {}
+        self.names_seen: dict[str, None] = {}
         self.others: dict[str, tuple[float, float]] = {}
         self.messages = 0
         self.malformed = 0
         self.first_problem = ''
 
-    @property
-    def names_seen(self) -> tuple[str, ...]:
-        """Return all joint names found so far, in order of appearance."""
-        return tuple(self._names)
-
     def decode(self, block: MessageBlock) -> Iterator[JointSamples]:
-        """Yield the samples of a block that name a requested joint, grouped by layout."""
+        """Yield the samples of the requested joints in a block, one object per layout."""
         numbers = np.arange(self.messages, self.messages + len(block), dtype=np.int64)
         self.messages += len(block)
         lengths = block.length
@@ -132,11 +127,11 @@ class JointStateDecoder:
     def _decode_equal(
         self, raw: npt.NDArray[np.void], numbers: IntArray, receive: IntArray
     ) -> Iterator[JointSamples]:
-        """Decode messages of equal length."""
+        """Yield the samples of messages of equal length."""
         while len(raw):
             plan = self._plan_for(raw[:1])
             if plan is None:
-                # A message equal to an unreadable message is unreadable too.
+                # Copies of a malformed message are malformed too.
                 other = raw != raw[0]
                 self.malformed += len(raw) - int(other.sum())
                 raw, numbers, receive = raw[other], numbers[other], receive[other]
@@ -152,7 +147,7 @@ class JointStateDecoder:
     def _read(
         self, plan: _Plan, rows: npt.NDArray[np.void], numbers: IntArray, receive: IntArray
     ) -> Iterator[JointSamples]:
-        """Yield the values of requested joints, and update the ranges of other joints."""
+        """Yield samples of requested joints, and update the position ranges of other joints."""
         if plan.others and plan.layout.counts[0] and len(rows):
             positions = rows[QUANTITIES[0]][:, list(plan.others.values())]
             lowest, highest = np.fmin.reduce(positions), np.fmax.reduce(positions)
@@ -169,14 +164,14 @@ class JointStateDecoder:
         stamps += rows['nanosec']
         values: list[FloatArray | None] = []
         for name, count in zip(QUANTITIES, plan.layout.counts, strict=True):
-            place = self._place(name, len(rows), len(plan.joints)) if count else None
-            if place is not None:
-                place[:] = rows[name][:, plan.columns]
-            values.append(place)
+            array = self._reserved(name, len(rows), len(plan.joints)) if count else None
+            if array is not None:
+                array[:] = rows[name][:, plan.columns]
+            values.append(array)
         yield JointSamples(plan.joints, stamps, tuple(values), receive, numbers)
 
-    def _place(self, name: str, count: int, joints: int) -> FloatArray:
-        """Return an array of shape (count, joints), adjacent to the previous one if possible."""
+    def _reserved(self, name: str, count: int, joints: int) -> FloatArray:
+        """Return an array (count, joints) for a quantity, the next rows of the reserved memory."""
         free = self._free.get((name, joints))
         if free is None:
             # counts in damaged files are unreliable, so at most 1 GiB is reserved for a quantity
@@ -187,7 +182,7 @@ class JointStateDecoder:
         return free[:count]
 
     def _plan_for(self, first: npt.NDArray[np.void]) -> _Plan | None:
-        """Return the plan for a message; None if it is malformed."""
+        """Return the plan for the layout of a message; None if the message is malformed."""
         length = first.dtype.itemsize
         known = self._plans.setdefault(length, [])
         for plan in known:
@@ -195,11 +190,23 @@ class JointStateDecoder:
                 return plan
         try:
             layout = JointStateLayout.of(first.tobytes())
-            plan = _Plan.make(layout, length, self._wanted)
+            layout.require_one_value_per_joint()
         except MalformedMessage as problem:
             self.first_problem = self.first_problem or str(problem)
             return None
-        self._names.update(dict.fromkeys(layout.names))
+        names = layout.names
+        self.names_seen.update(dict.fromkeys(names))
+        joints = tuple(name for name in self._wanted if name in names)
+        columns = [names.index(name) for name in joints]
+        begin = columns[0] if columns else 0
+        contiguous = columns == list(range(begin, begin + len(columns)))
+        plan = _Plan(
+            layout,
+            layout.dtype(length),
+            joints,
+            slice(begin, begin + len(columns)) if contiguous else columns,
+            {name: k for k, name in enumerate(names) if name not in joints},
+        )
         known.insert(0, plan)
         del known[32:]  # number of layouts of one length in the cache
         return plan
@@ -207,35 +214,13 @@ class JointStateDecoder:
 
 @dataclass(frozen=True)
 class _Plan:
-    """Columns of requested joints, and of other joints by name, in messages of one layout."""
+    """Columns of the requested joints, and of other joints by name, in messages of one layout."""
 
     layout: JointStateLayout
     dtype: np.dtype[np.void]
     joints: tuple[str, ...]
     columns: slice | list[int]
     others: dict[str, int]
-
-    @classmethod
-    def make(cls, layout: JointStateLayout, length: int, wanted: Sequence[str]) -> _Plan:
-        """Make a plan: find the columns of the requested joints."""
-        if len(set(layout.names)) != len(layout.names):
-            raise MalformedMessage(f'a joint is named twice: {", ".join(layout.names)}')
-        for name, count in zip(QUANTITIES, layout.counts, strict=True):
-            if count not in (0, len(layout.names)):
-                raise MalformedMessage(
-                    f'there are {count} values of {name} for {len(layout.names)} joint names'
-                )
-        joints = tuple(name for name in wanted if name in layout.names)
-        columns = [layout.names.index(name) for name in joints]
-        first = columns[0] if columns else 0
-        contiguous = columns == list(range(first, first + len(columns)))
-        return cls(
-            layout,
-            layout.dtype(length),
-            joints,
-            slice(first, first + len(columns)) if contiguous else columns,
-            {name: k for k, name in enumerate(layout.names) if name not in joints},
-        )
 
 
 #: Values of a quantity that a message does not have.
@@ -244,16 +229,16 @@ _NONE = read_only(np.empty(0))
 
 class JointStateValues(NamedTuple):
     """
-    Values of one JointState message.
+    Stamp, joint names and values of one decoded JointState message.
 
     Attributes
     ----------
     sec, nanosec : int
-        Stamp.
+        Header stamp.
     names : tuple of str
-        Joints; the same object for all messages of one sender.
+        Joint names; the same object for all messages of one sender.
     position, velocity, effort : ndarray
-        Values, as many as the message has: as a rule one per name, or none.
+        Values in the message, usually one per name or none.
 
     """
 
@@ -266,19 +251,19 @@ class JointStateValues(NamedTuple):
 
 
 class JointStateMessages:
-    """Decoder of serialised messages, with a cache of layouts."""
+    """Decoder of single JointState messages as they arrive; it caches message layouts."""
 
     def __init__(self) -> None:
         self._known: list[JointStateLayout] = []
 
     def read(self, data: bytes) -> JointStateValues:
         """
-        Return the values of a message.
+        Return stamp, joint names and values of one serialised JointState message.
 
         Raises
         ------
         MalformedMessage
-            The bytes are no JointState.
+            If the bytes are not a JointState.
 
         """
         for layout in self._known:

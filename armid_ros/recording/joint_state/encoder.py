@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Serialise JointState messages from arrays, and write bags."""
+"""Serialise joint measurements as JointState messages, and write bags of them."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from armid_ros.recording.mcap.writer import Compression
 from armid_ros.recording.message_types import JOINT_STATE, QUANTITIES
 from armid_ros.recording.recording import Recording
 from armid_ros.recording.temperature import write_temperatures
-from armid_ros.recording.writer import BagWriter, DEFAULT_CHUNK_SIZE, whole_bag
+from armid_ros.recording.writer import atomic_bag, BagWriter, DEFAULT_CHUNK_SIZE
 import numpy as np
 import numpy.typing as npt
 
@@ -29,7 +29,7 @@ def joint_state_cdr(
     frame_id: str = '',
 ) -> Iterator[npt.NDArray[np.void]]:
     """
-    Serialise joint measurements, one message per sample.
+    Serialise joint measurements as JointState messages, one message per sample.
 
     Parameters
     ----------
@@ -54,8 +54,8 @@ def joint_state_cdr(
     for name, values in zip(('q', 'dq', 'tau'), fields, strict=True):
         if values is not None and values.shape != (len(stamps), n):
             raise RecordingError(
-                f'{name} has shape {values.shape}, but {len(stamps)} stamps of {n} joints need '
-                f'{(len(stamps), n)}'
+                f'the array {name} has shape {values.shape}, but {len(stamps)} stamps and {n} '
+                f'joints need {(len(stamps), n)}'
             )
     frame = frame_id.encode()
     counts = tuple(0 if values is None else n for values in fields)
@@ -84,7 +84,7 @@ def write_joint_states(
     tau: npt.ArrayLike | None = None,
 ) -> None:
     """
-    Write joint measurements to a topic of a bag, logged at their stamps.
+    Write joint measurements to a topic of a bag, with log times equal to the stamps.
 
     See ``joint_state_cdr`` for the parameters.
 
@@ -126,7 +126,7 @@ def write_recording(
     compression : {'zstd', 'lz4', 'none'}
         Compression of the chunks.
     chunk_size : int
-        Bytes of messages a chunk holds.
+        Size of the messages in a chunk [bytes].
 
     Raises
     ------
@@ -148,9 +148,10 @@ def write_recording(
     stamps = start_ns + np.rint(np.asarray(measured.t) * 1e9).astype(np.int64)
     if len(stamps) and stamps.min() < 0:
         raise RecordingError(
-            f'{path}: the first stamp is {stamps.min() * 1e-9:g} s; ROS time cannot be negative'
+            f'{path}: the first stamp is {stamps.min() * 1e-9:g} s, but ROS time cannot be '
+            'negative; give a larger start_ns'
         )
-    with whole_bag(path, compression=compression, chunk_size=chunk_size) as writer:
+    with atomic_bag(path, compression=compression, chunk_size=chunk_size) as writer:
         if robot_description is not None:
             first = int(stamps[0]) if len(stamps) else start_ns
             writer.write_description(robot_description, first)

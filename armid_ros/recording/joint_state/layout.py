@@ -1,13 +1,14 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Find the fields of a serialised sensor_msgs/JointState.
+Positions of the fields in serialised sensor_msgs/JointState messages.
 
-CDR: four bytes of encapsulation, then fields aligned to their size counted from byte 4; a string
-begins with a 4-byte length that includes the final zero, a sequence with a 4-byte count. Messages
-of one publisher have the same layout. The layout is found once, and thousands of messages are
-then read as one numpy record array. Lengths, counts and names are compared for every message.
-Padding bytes are not compared, because writers leave arbitrary values there.
+A CDR message has four bytes of encapsulation and then fields, aligned to their size from byte 4.
+A string begins with a 4-byte length that includes the final zero, and a sequence begins with a
+4-byte count. Messages of one publisher have the same layout. The layout is found once, and
+thousands of messages are then read as one numpy record array. Lengths, counts and names are
+compared for every message. Padding bytes are not compared, because writers leave arbitrary values
+there.
 
 """
 
@@ -27,20 +28,20 @@ _FRAME_OFFSET = 12
 
 
 class MalformedMessage(ValueError):
-    """The bytes are not a sensor_msgs/JointState."""
+    """Error of bytes that are not a valid sensor_msgs/JointState message."""
 
 
 @dataclass(frozen=True)
 class JointStateLayout:
     """
-    Layout of a JointState message.
+    Layout of a serialised JointState message: byte order, names and number of values.
 
     Attributes
     ----------
     order : {'<', '>'}
         Byte order.
     frame_length : int
-        Bytes of frame_id, its terminating zero counted.
+        Size of frame_id with its final zero [bytes].
     names : tuple of str
         Joint names.
     counts : tuple of int
@@ -56,24 +57,26 @@ class JointStateLayout:
     @classmethod
     def of(cls, cdr: bytes) -> JointStateLayout:
         """
-        Find the layout of one message.
+        Return the layout of one serialised message.
 
         Raises
         ------
         MalformedMessage
-            The bytes are not a JointState.
+            If the bytes are not a JointState.
 
         """
         order = BYTE_ORDERS.get(cdr[:2])
         if order is None:
-            raise MalformedMessage(f'encapsulation {cdr[:2].hex(" ")!r} is not plain CDR')
+            raise MalformedMessage(f'the first bytes {cdr[:2].hex(" ")!r} are not those of CDR')
         counts: list[int] = []
         try:
             (frame_length,) = struct.unpack_from(order + 'I', cdr, _FRAME_OFFSET)
             position = _align(_FRAME_OFFSET + 4 + frame_length, 4)
             (count,) = struct.unpack_from(order + 'I', cdr, position)
             if count > len(cdr):
-                raise MalformedMessage(f'{count} joint names cannot fit into {len(cdr)} bytes')
+                raise MalformedMessage(
+                    f'the message states {count} joint names, but has only {len(cdr)} bytes'
+                )
             position += 4
             names: tuple[str, ...] = ()
             for _ in range(count):
@@ -81,30 +84,40 @@ class JointStateLayout:
                 (length,) = struct.unpack_from(order + 'I', cdr, position)
                 position += 4 + length
                 if not length or position > len(cdr):
-                    raise MalformedMessage('a joint name does not end within the message')
+                    raise MalformedMessage('a joint name is longer than the message')
                 if cdr[position - 1]:
-                    raise MalformedMessage('a joint name does not end with a zero')
+                    raise MalformedMessage('a joint name does not end with a zero byte')
                 names += (cdr[position - length : position - 1].decode(),)
             for field in range(3):
                 layout = cls(order, frame_length, names, (*counts, *[0] * (3 - field)))
                 counts += struct.unpack_from(order + 'I', cdr, layout.places[field][0])
         except (struct.error, UnicodeDecodeError) as error:
-            raise MalformedMessage(f'not a JointState: {error}') from error
+            raise MalformedMessage(f'the message is not a JointState: {error}') from error
         layout = cls(order, frame_length, names, tuple(counts))
         if not 0 <= len(cdr) - layout.end <= layout.spare:
             raise MalformedMessage(
-                f'the message has {len(cdr)} bytes, but this JointState needs {layout.end}'
+                f'the message has {len(cdr)} bytes, but its fields need {layout.end} bytes'
             )
         return layout
 
+    def require_one_value_per_joint(self) -> None:
+        """Raise MalformedMessage if a joint occurs twice, or an array does not fit the names."""
+        if len(set(self.names)) != len(self.names):
+            raise MalformedMessage(f'a joint occurs twice in the names {", ".join(self.names)}')
+        for quantity, count in zip(QUANTITIES, self.counts, strict=True):
+            if count not in (0, len(self.names)):
+                raise MalformedMessage(
+                    f'the message has {count} values of {quantity} for {len(self.names)} joints'
+                )
+
     @property
     def names_offset(self) -> int:
-        """Offset of the number of names."""
+        """Return the position of the number of joint names [bytes]."""
         return _align(_FRAME_OFFSET + 4 + self.frame_length, 4)
 
     @cached_property
     def names_end(self) -> int:
-        """End of the last name."""
+        """Return the position after the last joint name [bytes]."""
         position = self.names_offset + 4
         for name in self.names:
             position = _align(position, 4) + 4 + len(name.encode()) + 1
@@ -112,7 +125,7 @@ class JointStateLayout:
 
     @cached_property
     def places(self) -> tuple[tuple[int, int], ...]:
-        """Offsets of the counts, and of the first values, of positions, velocities and efforts."""
+        """Return the positions of the count and of the first value of each quantity [bytes]."""
         places, position = [], self.names_end
         for count in self.counts:
             at = _align(position, 4)
@@ -124,17 +137,17 @@ class JointStateLayout:
 
     @cached_property
     def end(self) -> int:
-        """End of the last value."""
+        """Return the position after the last value [bytes]."""
         return self.places[-1][1] + 8 * self.counts[-1]
 
     @cached_property
     def spare(self) -> int:
-        """Largest number of padding bytes after the last value."""
+        """Return the largest number of padding bytes after the last value."""
         # Writers add padding to align the next field, also for empty sequences.
         return 7 + 4 * self.counts.count(0)
 
     def dtype(self, length: int) -> np.dtype[np.void]:
-        """Return messages of this layout and a total length as a numpy record."""
+        """Return the numpy record type of messages of this layout and a total length [bytes]."""
         words = (_align(self.names_end, 4) - self.names_offset) // 4
         fields: dict[str, tuple[Any, int]] = {
             'encapsulation': ('>u2', 0),
@@ -158,27 +171,27 @@ class JointStateLayout:
 
     @cached_property
     def record(self) -> np.dtype[np.void]:
-        """Messages of this layout without spare bytes as a numpy record."""
+        """Return the numpy record type of messages without padding at the end."""
         return self.dtype(self.end)
 
     @cached_property
     def stamp(self) -> struct.Struct:
-        """Format of the stamp: seconds and nanoseconds."""
+        """Return the binary format of the header stamp: seconds and nanoseconds."""
         return struct.Struct(self.order + 'iI')
 
     @cached_property
     def number(self) -> np.dtype[np.float64]:
-        """Format of one value in a message."""
+        """Return the numpy type of one value in a message."""
         return np.dtype(self.order + 'f8')
 
     @cached_property
     def values(self) -> tuple[tuple[int, int], ...]:
-        """Number and offset of positions, velocities and efforts."""
+        """Return the number of values and the position of the first value of each quantity."""
         return tuple((n, begin) for n, (_, begin) in zip(self.counts, self.places, strict=True))
 
     @cached_property
     def fixed(self) -> tuple[npt.NDArray[np.void], npt.NDArray[np.void]]:
-        """Bytes that are equal in all messages of this layout, and a mask of their bits, (1,)."""
+        """Return the bytes that all messages of this layout share, and their bit mask, (1,)."""
         expected, mask = np.zeros((2, 1), self.record)
         numbers = {'encapsulation': int(self.order == '<'), 'frame_length': self.frame_length}
         numbers |= {f'n_{name}': n for name, n in zip(QUANTITIES, self.counts, strict=True)}
@@ -199,18 +212,18 @@ class JointStateLayout:
 
     @cached_property
     def _fixed_bits(self) -> tuple[int, int]:
-        """Shared values and mask of `fixed`, as integers: a comparison takes a microsecond."""
+        """Return bytes and mask of `fixed` as integers, which are compared in a microsecond."""
         fixed, mask = (int.from_bytes(record.tobytes(), 'little') for record in self.fixed)
         return fixed, mask
 
     def is_of(self, data: bytes) -> bool:
-        """Return whether one message has this layout. Padding is not compared."""
+        """Return whether one serialised message has this layout; padding is ignored."""
         fixed, mask = self._fixed_bits
-        whole = self.end <= len(data) <= self.end + self.spare
-        return whole and int.from_bytes(data[: self.end], 'little') & mask == fixed
+        complete = self.end <= len(data) <= self.end + self.spare
+        return complete and int.from_bytes(data[: self.end], 'little') & mask == fixed
 
     def fits(self, rows: npt.NDArray[np.void]) -> npt.NDArray[np.bool_]:
-        """Return a mask of the messages, read as records of this layout, that have this layout."""
+        """Return a mask of the records in an array that have this layout."""
         fixed, mask = self.fixed
         expected, bits = fixed['names'][0], mask['names'][0]
         names = rows['names']
@@ -230,5 +243,5 @@ class JointStateLayout:
 
 
 def _align(position: int, size: int) -> int:
-    """Return the next position that is aligned to a size, counted from after the encapsulation."""
+    """Return the next position that is a multiple of a size, counted from byte 4."""
     return ((position - 4 + size - 1) & -size) + 4

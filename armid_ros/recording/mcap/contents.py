@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Decompress chunks of an MCAP file, verify their checksums, and find their messages."""
+"""Decompress the chunks of an MCAP file, compare their checksums, and find their messages."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ import numpy.typing as npt
 
 
 class Contents(NamedTuple):
-    """Contents of some chunks in one buffer: each chunk, with the range of its content."""
+    """Contents of some chunks in one buffer, with the range of each chunk in the buffer."""
 
     data: bytes | mmap.mmap
     parts: list[tuple[Chunk, int, int]]
@@ -33,14 +33,14 @@ def read_chunks(
     found: FileMap, chunks: Iterable[Chunk], settings: ReadSettings
 ) -> Iterator[Contents]:
     """
-    Yield the contents of some chunks of a file in their order, without damaged chunks.
+    Yield the contents of undamaged chunks of an MCAP file, in the given order.
 
-    Damaged chunks are noted in the damage of the file.
+    Damaged chunks are left out, and added to the damage of the file.
 
     Raises
     ------
     RecordingError
-        A chunk takes more memory than the settings allow.
+        If a chunk needs more memory than the settings allow.
 
     """
     # writers add checksums to all chunks or to none
@@ -91,7 +91,7 @@ def _read_ahead(
 def _read_group(
     found: FileMap, group: Sequence[Chunk], settings: ReadSettings
 ) -> tuple[Contents, list[str]]:
-    """Return the contents of undamaged chunks, and the damage of the others."""
+    """Return the contents of the undamaged chunks of a group, and the damage of other chunks."""
     packed = any(chunk.compression for chunk in group)
     contents: list[bytes | memoryview] = []
     parts: list[tuple[Chunk, int, int]] = []
@@ -102,14 +102,14 @@ def _read_group(
             content = _content(found, chunk, settings)
         except CORRUPT as error:
             damage.append(
-                f'the chunk at byte {chunk.begin} is damaged ({error}): messages '
+                f'the chunk at byte {chunk.begin} is damaged ({error}), so messages '
                 f'{found.span(chunk)} are left out'
             )
             continue
-        if not chunk.whole:
+        if not chunk.complete:
             share = 100 * len(content) // max(chunk.size, 1)
             damage.append(
-                f'of the last chunk {len(content)} of {chunk.size} bytes ({share} %) are read'
+                f'{len(content)} of {chunk.size} bytes ({share} %) of the last chunk can be read'
             )
         begin = end if packed else chunk.begin
         end = begin + len(content)
@@ -119,11 +119,13 @@ def _read_group(
 
 
 def _content(found: FileMap, chunk: Chunk, settings: ReadSettings) -> bytes | memoryview:
-    """Return the content of a chunk; raise one of CORRUPT if the chunk is damaged."""
+    """Return the content of a chunk; raise an exception of CORRUPT if the chunk is damaged."""
     stored = memoryview(found.data)[chunk.begin : chunk.end]
     if chunk.compression not in ('', 'zstd', 'lz4'):
-        raise ValueError(f"unknown compression '{chunk.compression}'; zstd and lz4 are supported")
-    if not chunk.whole:
+        raise ValueError(
+            f"its compression '{chunk.compression}' is not supported; zstd and lz4 are supported"
+        )
+    if not chunk.complete:
         most = min(chunk.size, settings.memory_limit)
         if chunk.compression:
             return partly_decompressed(stored, chunk.compression, most)
@@ -131,21 +133,21 @@ def _content(found: FileMap, chunk: Chunk, settings: ReadSettings) -> bytes | me
     if chunk.compression:
         content: bytes | memoryview = decompressed(stored, chunk.compression, chunk.size, settings)
     elif len(stored) != chunk.size:
-        raise ValueError(f'it has {len(stored)} bytes, but the bag states {chunk.size}')
+        raise ValueError(f'the chunk has {len(stored)} bytes, but the bag states {chunk.size}')
     else:
         content = stored
     if settings.check_crc and zlib.crc32(content) != chunk.crc:
-        raise ValueError('its checksum is wrong')
+        raise ValueError('the checksum of the chunk is wrong')
     return content
 
 
 def heads(data: bytes | mmap.mmap, offsets: IntArray) -> npt.NDArray[np.void]:
-    """Return the heads of the messages at given record positions, as `MESSAGE`."""
+    """Return opcode, length, channel and times of messages at given positions (`MESSAGE`)."""
     return records_at(data, offsets, MESSAGE.itemsize).view(MESSAGE)
 
 
 def message_block(data: bytes | mmap.mmap, offsets: IntArray) -> MessageBlock:
-    """Return the messages at given record positions."""
+    """Return the messages at given positions of a buffer as a block."""
     rows = heads(data, offsets)
     return MessageBlock(
         data,
@@ -157,10 +159,10 @@ def message_block(data: bytes | mmap.mmap, offsets: IntArray) -> MessageBlock:
 
 
 def messages_in(found: FileMap, contents: Contents) -> tuple[IntArray, npt.NDArray[np.void]]:
-    """Return starts and heads of the messages of some chunks, from the index if it is correct."""
-    data, parts = contents
+    """Return positions and heads of all messages in some chunks."""
+    data, parts = contents  # a correct index is faster than a walk over the records
     ranges = np.array([(begin, end) for _, begin, end in parts], np.int64)
-    if all(chunk.indexes and chunk.whole for chunk, _, _ in parts):
+    if all(chunk.indexes and chunk.complete for chunk, _, _ in parts):
         # offsets beyond a chunk are set to its end, where no message can begin
         listed = [
             np.minimum(np.frombuffer(found.data, '<u8', 2 * count, at)[1::2], chunk.size).astype(
@@ -173,14 +175,14 @@ def messages_in(found: FileMap, contents: Contents) -> tuple[IntArray, npt.NDArr
         offsets = np.concatenate(listed)
         if not (np.diff(offsets) > 0).all():
             offsets.sort(kind='stable')
-        rows = tiled(data, offsets, ranges)
+        rows = heads_by_index(data, offsets, ranges)
         if rows is not None:
             return offsets, rows
     walked = []
     for chunk, begin, end in parts:
         some, _, position = walk(data, begin, end)
         walked.append(some)
-        if chunk.whole and position != end:
+        if chunk.complete and position != end:
             found.damage.add(
                 f'the chunk at byte {chunk.begin} is damaged: '
                 f'some messages {found.span(chunk)} are lost'
@@ -189,23 +191,23 @@ def messages_in(found: FileMap, contents: Contents) -> tuple[IntArray, npt.NDArr
     return offsets, heads(data, offsets)
 
 
-def tiled(
+def heads_by_index(
     data: bytes | mmap.mmap, offsets: IntArray, ranges: IntArray
 ) -> npt.NDArray[np.void] | None:
     """
-    Return the heads of messages by the indexes of their chunks, if these are complete.
+    Return the heads of messages at the positions in an index; None if the index is wrong.
 
-    The indexes are correct if messages and definitions fill the chunks without gaps: each record
-    begins at the end of the previous one.
+    An index is correct if messages and definitions fill the chunk without gaps: each record
+    begins at the end of the previous record.
 
     Parameters
     ----------
     data : bytes or mmap
-        Buffer with the contents.
+        Buffer with the contents of the chunks.
     offsets : ndarray, shape (N,)
-        Begin of each message by the indexes, in ascending order.
+        Position of each message in the index, in ascending order.
     ranges : ndarray, shape (K, 2)
-        Begin and end of the content of each chunk in the buffer, in ascending order.
+        First and last position of the content of each chunk in the buffer, in ascending order.
 
     Returns
     -------
@@ -241,21 +243,21 @@ def walk(
     content: bytes | mmap.mmap, begin: int = 0, end: int | None = None
 ) -> tuple[IntArray, list[tuple[int, int, int]], int]:
     """
-    Find the records in the content of a chunk, one by one.
+    Find the records in the content of a chunk, by the length of each record.
 
     Parameters
     ----------
     content : bytes or mmap
         Buffer with the content.
     begin, end : int
-        Range of the content in the buffer; the whole buffer by default.
+        Range of the content in the buffer; by default the complete buffer.
 
     Returns
     -------
     offsets : ndarray, shape (N,)
-        Begin of each message.
+        Position of each message record.
     definitions : list of (int, int, int)
-        Opcode, beginning and end of schemas and channels.
+        Opcode, first and last position of each schema and channel record.
     position : int
         End of the last record; less than ``end`` if invalid data follow.
 

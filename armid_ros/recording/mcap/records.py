@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Find the records of an MCAP file without its index.
+Find the chunks, loose messages and definitions of an MCAP file without its index.
 
 An MCAP file is a sequence of records, each with opcode, length and content. Messages are usually
 inside chunks; each chunk is followed by the offsets of its messages. A walk from the start
@@ -48,12 +48,12 @@ _DEFINITIONS = (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.STATISTICS)
 @dataclass(frozen=True)
 class Chunk:
     """
-    Position of a chunk in its file.
+    Position, size, times and checksum of one chunk of an MCAP file.
 
     Attributes
     ----------
     start_time, end_time : int
-        Range of the log times in it [ns].
+        Range of the log times of its messages [ns].
     compression : str
         'zstd', 'lz4' or empty.
     size : int
@@ -61,11 +61,11 @@ class Chunk:
     crc : int
         CRC-32 of the content; 0 if the writer did not compute it.
     begin, end : int
-        Range of the stored content in the file.
-    whole : bool
+        Range of the stored content in the file [bytes].
+    complete : bool
         Whether the chunk is complete; False if the file ends inside the chunk.
     indexes : dict
-        Position and count of the message offsets of each channel.
+        Position and number of the message offsets of each channel.
 
     """
 
@@ -76,27 +76,27 @@ class Chunk:
     crc: int
     begin: int
     end: int
-    whole: bool = True
+    complete: bool = True
     indexes: dict[int, tuple[int, int]] = field(default_factory=dict)
 
 
 @dataclass
 class FileMap:
     """
-    Records that a walk over a file found.
+    Chunks, loose messages and definitions of an MCAP file, with its damage.
 
     Attributes
     ----------
     data : mmap or bytes
         The file.
     chunks : list of Chunk
-        Its chunks, in order.
+        Chunks of the file, in order.
     loose : list of int
-        Begin of each message record outside chunks.
+        Position of each message record outside chunks.
     schemas, channels : dict
-        Definitions outside chunks; in a finished file these are all definitions.
+        Definitions outside chunks, by number; in a finished file these are all definitions.
     statistics : Statistics, optional
-        Statistics of the summary.
+        Statistics in the summary of the file.
     finished : bool
         Whether the file has a footer and a valid summary.
     damage : Damage
@@ -114,7 +114,7 @@ class FileMap:
     damage: Damage = field(default_factory=Damage)
 
     def span(self, chunk: Chunk) -> str:
-        """Format the time range of the messages of a chunk."""
+        """Return the time range of the messages of a chunk as a text, for messages on damage."""
         begin = min((c.start_time for c in self.chunks if c.end_time), default=0)
         start, end = (1e-9 * (time - begin) for time in (chunk.start_time, chunk.end_time))
         return f'from {start:.3f} to {end:.3f} s after the beginning'
@@ -122,7 +122,7 @@ class FileMap:
 
 def map_file(data: bytes | mmap.mmap, path: Path, *, check: bool = True) -> FileMap:
     """
-    Walk over the records of a file.
+    Return the chunks, loose messages, definitions and damage of an MCAP file.
 
     Parameters
     ----------
@@ -140,12 +140,12 @@ def map_file(data: bytes | mmap.mmap, path: Path, *, check: bool = True) -> File
 
     """
     if data[: len(MAGIC)] != MAGIC:
-        raise RecordingError(f'{path}: this is not an MCAP file, or its beginning is damaged')
+        raise RecordingError(f'{path}: the file is not an MCAP file, or its beginning is damaged')
     found = FileMap(data)
     definitions, data_end, footer, position = _walk(found)
     if not found.finished:
         found.damage.add(
-            'the file ends without its index, as after a crash: readable up to byte '
+            'the file ends without its index, as after a crash; it can be read up to byte '
             f'{position} of {len(data)}'
         )
     if check and footer is not None:
@@ -171,7 +171,7 @@ def map_file(data: bytes | mmap.mmap, path: Path, *, check: bool = True) -> File
 
 
 def _walk(found: FileMap) -> tuple[list[tuple[int, int, int]], int | None, int | None, int]:
-    """Note chunks and loose messages; return definitions, data end, footer and position."""
+    """Fill a map with chunks and loose messages; return definitions and last positions."""
     data = found.data
     definitions: list[tuple[int, int, int]] = []
     data_end = footer = None
@@ -184,7 +184,7 @@ def _walk(found: FileMap) -> tuple[list[tuple[int, int, int]], int | None, int |
             break
         if end > size:
             if opcode == Opcode.CHUNK:
-                _add_chunk(found, begin, size, whole=False)
+                _add_chunk(found, begin, size, complete=False)
             break
         if opcode in (Opcode.CHUNK, Opcode.MESSAGE_INDEX, Opcode.MESSAGE):
             _add_data(found, opcode, begin, end)
@@ -200,14 +200,14 @@ def _walk(found: FileMap) -> tuple[list[tuple[int, int, int]], int | None, int |
     behind = size - position - len(MAGIC)
     if found.finished and behind > 0:
         found.damage.add(
-            f'{behind} bytes follow the end of the file, perhaps of an appended file: '
-            f'only what is before byte {position + len(MAGIC)} is read; cut the file there'
+            f'{behind} bytes follow the end of the MCAP file, perhaps of an appended file; '
+            f'only the first {position + len(MAGIC)} bytes are read, so cut the file there'
         )
     return definitions, data_end, footer, position
 
 
 def add_definition(found: FileMap, opcode: int, content: bytes) -> None:
-    """Note a schema, a channel or statistics."""
+    """Add a schema, a channel or statistics to the map of a file."""
     stream = ReadDataStream(BytesIO(content))
     try:
         if opcode == Opcode.SCHEMA:
@@ -224,11 +224,11 @@ def add_definition(found: FileMap, opcode: int, content: bytes) -> None:
         found.damage.add(f'a record of the file is damaged: {error}')
         return
     if not same:
-        found.damage.add('the file has two descriptions of one channel; the first is used')
+        found.damage.add('the file has two definitions of one channel; the first is used')
 
 
-def _add_chunk(found: FileMap, begin: int, end: int, *, whole: bool = True) -> None:
-    """Note a chunk, unless the file ends within its head."""
+def _add_chunk(found: FileMap, begin: int, end: int, *, complete: bool = True) -> None:
+    """Add a chunk to the map of a file, unless the file ends inside the head of the chunk."""
     data = found.data
     if end - begin < _CHUNK_HEADER.size:
         return
@@ -240,19 +240,21 @@ def _add_chunk(found: FileMap, begin: int, end: int, *, whole: bool = True) -> N
     compression = data[position : position + name].decode('ascii', 'replace')
     content = position + name + 8
     (stored,) = struct.unpack_from('<Q', data, content - 8)
-    chunk = Chunk(start_time, end_time, compression, size, crc, content, end, whole=whole)
-    if whole and content + stored != end:
-        found.damage.add(f'the chunk at byte {begin} is damaged: messages {found.span(chunk)}')
+    chunk = Chunk(start_time, end_time, compression, size, crc, content, end, complete=complete)
+    if complete and content + stored != end:
+        found.damage.add(
+            f'the chunk at byte {begin} is damaged, with the messages {found.span(chunk)}'
+        )
         return
     found.chunks.append(chunk)
 
 
 def _add_data(found: FileMap, opcode: int, begin: int, end: int) -> None:
-    """Note a chunk, the index of a channel's messages in the last chunk, or a loose message."""
+    """Add a chunk, the index of the messages of a channel in it, or a loose message to a map."""
     if opcode == Opcode.CHUNK:
         _add_chunk(found, begin, end)
     elif opcode == Opcode.MESSAGE and end - begin < MESSAGE_HEADER:
-        found.damage.add(f'the message at byte {begin} is too short for a message')
+        found.damage.add(f'the message at byte {begin} is shorter than the head of a message')
     elif opcode == Opcode.MESSAGE:
         found.loose.append(begin - RECORD_HEADER)
     elif end - begin >= 6 and found.chunks:

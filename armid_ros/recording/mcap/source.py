@@ -1,10 +1,10 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Read messages of an MCAP file, with or without index, chunks and compression.
+Read the messages of an MCAP file, with or without index, chunks and compression.
 
-Checksums, indexes and counts are compared with the messages. A damaged chunk is skipped as a
-whole, because its undamaged messages cannot be recognised.
+Checksums, indexes and counts are compared with the messages. All messages of a damaged chunk are
+left out, because its undamaged messages cannot be recognised.
 
 """
 
@@ -46,10 +46,10 @@ _Rows = npt.NDArray[np.void]
 
 
 class McapSource(Source):
-    """Source for one MCAP file."""
+    """Reader of one MCAP file."""
 
     def __init__(self, path: Path, settings: ReadSettings = DEFAULT) -> None:
-        """Open an MCAP file."""
+        """Open an MCAP file, and find its chunks."""
         super().__init__(path, settings)
         with open_regular(path, RecordingError) as stream:
             if not stream.seek(0, 2):
@@ -96,7 +96,7 @@ class McapSource(Source):
         chunks = [
             chunk
             for chunk in found.chunks
-            if not (counted and chunk.whole and chunk.indexes)
+            if not (counted and chunk.complete and chunk.indexes)
             or any(channel in chunk.indexes for channel in wanted)
         ]
         count = 0
@@ -134,7 +134,7 @@ class McapSource(Source):
     def _pieces(
         self, chunks: Sequence[Chunk], channels: Sequence[int]
     ) -> Iterator[tuple[int, bytes | mmap.mmap, IntArray]]:
-        """Yield first log time, buffer, and begin of the messages of some channels."""
+        """Yield the first log time, the buffer and the positions of messages of some channels."""
         data, loose = self._found.data, np.array(self._found.loose, np.int64)
         for contents in read_chunks(self._found, chunks, self._settings):
             offsets = self._possible(*messages_in(self._found, contents), channels)
@@ -146,7 +146,7 @@ class McapSource(Source):
             yield first, data, loose[at : at + BLOCK_MESSAGES]
 
     def _survey(self) -> dict[int, int]:
-        """Find all channels, and return the number of messages of each."""
+        """Find all channels of the file, and return the number of messages of each."""
         if self._counts is not None:
             return self._counts
         found, summary = self._found, self._found.statistics
@@ -166,7 +166,7 @@ class McapSource(Source):
         return self._counts
 
     def _possible(self, offsets: IntArray, rows: _Rows, wanted: Sequence[int]) -> IntArray:
-        """Return the messages of some channels whose time is valid."""
+        """Return the positions of messages of some channels, except those with invalid times."""
         channels = rows['channel']
         chosen = np.isin(channels, wanted) if len(wanted) != 1 else channels == wanted[0]
         late = (rows['log_time'] < 0) | (rows['publish_time'] < 0)
@@ -178,13 +178,13 @@ class McapSource(Source):
             chosen &= ~late
         return offsets if chosen.all() else offsets[chosen]
 
-    def _compare_count(self, what: str, channels: Collection[int], count: int) -> None:
-        """Compare the number of messages with the count of the writer."""
+    def _compare_count(self, topic: str, channels: Collection[int], count: int) -> None:
+        """Add damage if the number of read messages differs from the count of the writer."""
         summary = self._found.statistics
         if not (self._found.finished and summary and summary.channel_message_counts):
             return
         expected = sum(summary.channel_message_counts.get(channel, 0) for channel in channels)
         if count != expected:
             self._found.damage.add(
-                f'{count} messages of {what}, but the writer counted {expected}'
+                f'{count} messages of {topic} can be read, but the writer counted {expected}'
             )

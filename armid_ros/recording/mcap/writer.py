@@ -1,11 +1,11 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Write MCAP files, one system call per chunk.
+Write MCAP files chunk by chunk, so that an interruption leaves a readable file.
 
-Unlike the writer of the package mcap, this writer can be interrupted at any point, as by
-KeyboardInterrupt. Each step commits its result in one assignment at its end. The next step first
-truncates the file to the committed size. Thousands of messages can be written at once.
+The writer can be interrupted at any point, as by KeyboardInterrupt, unlike that of the package
+mcap. Each step commits its result in one assignment at its end. The next step first truncates the
+file to the committed size. Each chunk is one system call and can have thousands of messages.
 Specification: https://mcap.dev/spec
 
 """
@@ -58,7 +58,7 @@ _MESSAGE_HEAD = struct.Struct('<BQHIQQ')
 
 
 class Committed(NamedTuple):
-    """Committed state of a file: sizes [bytes], numbers of records, and log times [ns]."""
+    """State of a file after its last finished step: sizes [bytes], numbers and log times [ns]."""
 
     position: int = 0
     chunks: int = 0
@@ -70,18 +70,18 @@ class Committed(NamedTuple):
 
 class McapWriter:
     """
-    An MCAP file of chunks with indexes.
+    Writer of an MCAP file that consists of chunks with indexes.
 
     Attributes
     ----------
     committed : Committed
-        Committed content of the file.
+        State of the file after the last finished step.
 
     """
 
     def __init__(self, path: Path, *, compression: Compression, library: str) -> None:
         """
-        Begin a file.
+        Create the file and write its header.
 
         Raises
         ------
@@ -91,7 +91,7 @@ class McapWriter:
         """
         if compression not in _COMPRESSORS:
             raise RecordingError(
-                f"compression '{compression}' is not known; there are {', '.join(_COMPRESSORS)}"
+                f"the compression '{compression}' is not supported; use {', '.join(_COMPRESSORS)}"
             )
         self._path = path
         self._compression = '' if compression == 'none' else compression
@@ -105,7 +105,7 @@ class McapWriter:
             # The indexes are kept in a temporary file: long recordings have millions of chunks.
             self._index = TemporaryFile(dir=path.parent, buffering=0)
         except OSError as error:
-            raise RecordingError(f'{path}: cannot be written: {error.strerror}') from error
+            raise RecordingError(f'{path}: cannot be created: {error.strerror}') from error
         head = MAGIC + _record(Header('ros2', library))
         self.committed = Committed(self._append(head))
 
@@ -116,7 +116,7 @@ class McapWriter:
 
     @property
     def in_place(self) -> bool:
-        """Whether the file was neither deleted nor moved since it was created."""
+        """Whether the file was neither deleted nor moved since its creation."""
         try:
             there, here = os.stat(self._path), os.fstat(self._stream.fileno())
         except (OSError, ValueError):
@@ -145,14 +145,14 @@ class McapWriter:
 
     def write_chunk(self, content: bytes, offsets: IntArray) -> None:
         """
-        Write a chunk with its message indexes.
+        Write a chunk of records, followed by the indexes of its messages.
 
         Parameters
         ----------
         content : bytes
             Schema, channel and message records.
         offsets : ndarray, shape (N,)
-            Begin of each message record.
+            Position of each message record in the content.
 
         """
         rows = records_at(content, offsets, MESSAGE.itemsize).view(MESSAGE)
@@ -193,7 +193,7 @@ class McapWriter:
             compressed_size=len(stored),
             uncompressed_size=len(content),
         )
-        index_size = self._note(_record(index))
+        index_size = self._append_index(_record(index))
         end_position = self._append(b''.join(parts))
         first, last = done.time_range if done.counts else (start, end)
         self.committed = done._replace(
@@ -205,7 +205,7 @@ class McapWriter:
         )
 
     def write_metadata(self, name: str, values: dict[str, str]) -> None:
-        """Write a metadata record."""
+        """Write a metadata record with a name and values."""
         record = _record(Metadata(name, values))
         del self._metadata[self.committed.metadata :]
         self._metadata.append(MetadataIndex(self.committed.position, len(record), name))
@@ -215,12 +215,12 @@ class McapWriter:
     def finish(self) -> None:
         """Write the summary and close the file; may be repeated after an interruption."""
         if not self._stream.closed:
-            self._append(self._tail())
+            self._append(self._summary())
             self._stream.close()
         self._index.close()
 
-    def _tail(self) -> bytes:
-        """Return the summary and the footer, the records after the last chunk."""
+    def _summary(self) -> bytes:
+        """Return the records after the last chunk: summary and footer."""
         data_end = _record(DataEnd(0))
         begin = self.committed.position + len(data_end)
         counts, (start, end) = self.committed.counts, self.committed.time_range
@@ -261,8 +261,8 @@ class McapWriter:
         self._stream.close()
         self._index.close()
 
-    def _note(self, record: bytes) -> int:
-        """Append the index of a chunk to the index file; return where it ends."""
+    def _append_index(self, record: bytes) -> int:
+        """Append the index of a chunk to the temporary index file; return the new size."""
         position, rest = self.committed.index_size, memoryview(record)
         try:
             while len(rest):
@@ -273,7 +273,7 @@ class McapWriter:
         return position
 
     def _append(self, data: bytes) -> int:
-        """Write data after the committed data; return where they end."""
+        """Write data after the committed data; return the new size of the file [bytes]."""
         position = self.committed.position
         try:
             if self._stream.tell() != position:
@@ -294,7 +294,7 @@ class McapWriter:
 def message_record(
     channel: int, cdr: bytes | memoryview, log_time: int, publish_time: int
 ) -> bytes:
-    """Return a message as a record."""
+    """Return a serialised message as an MCAP message record."""
     head = _MESSAGE_HEAD.pack(
         Opcode.MESSAGE,
         MESSAGE.itemsize - RECORD_HEADER + len(cdr),
@@ -307,11 +307,12 @@ def message_record(
 
 
 def _records(records: Sequence[McapRecord]) -> bytes:
+    """Return several records as bytes."""
     return b''.join(_record(record) for record in records)
 
 
 def _record(record: McapRecord) -> bytes:
-    """Return the bytes of a record."""
+    """Return an MCAP record as bytes."""
     builder: Any = RecordBuilder()
     record.write(builder)
     return bytes(builder.end())

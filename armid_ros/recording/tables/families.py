@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Group columns of a table into quantities, by a pattern ('q{}') or by their names.
+Find the columns of each quantity in a table, by a pattern such as 'q{}' or by their names.
 
 Columns whose names differ only in the name or number of a joint form a family.
 
@@ -23,8 +23,9 @@ import numpy as np
 
 QuantityName = Literal['position', 'velocity', 'effort', 'temperature']
 
-#: Words for a motor current, which a gain converts to a torque.
+#: Words in the names of columns with motor currents.
 CURRENTS = ('current', 'currents', 'curr', 'cur', 'i', 'iq', 'amp', 'amps', 'ampere', 'amperes')
+#: Words in the names of columns with each quantity, and their scores.
 WORDS: dict[QuantityName, dict[str, float]] = {
     'position': dict.fromkeys(('position', 'positions', 'pos', 'q', 'qpos', 'jpos'), 3.0)
     | dict.fromkeys(('angle', 'angles', 'ang', 'theta', 'qm'), 2.5)
@@ -39,12 +40,13 @@ WORDS: dict[QuantityName, dict[str, float]] = {
     # higher, as these words lower the score of other quantities
     'temperature': dict.fromkeys(('temperature', 'temperatures', 'temp', 'temps'), 6.0),
 }
+#: Words in the names of columns with times, and their scores.
 TIMES = dict.fromkeys(('time', 't', 'timestamp', 'timestamps'), 3.0) | dict.fromkeys(
     ('secs', 'seconds', 'elapsed', 'date', 'datetime'), 2.0
 )
-#: Words for the time of measurement, preferred to the time of reception.
+#: The time of measurement is preferred to the time of reception.
 TIMES |= {'stamp': 3.5}
-#: Words next to a quantity in a column name, and the weights that they add to its score.
+#: Words next to a quantity in the name of a column, and the weights that they add to its score.
 _QUALIFIERS = (
     ('meas measured act actual fb feedback observation', 1.0),
     ('filt filtered est estimated se disc mot motor', -0.3),  # processed
@@ -62,29 +64,29 @@ _RANGE = re.compile(r'([\[{])(\d+)\.\.(\d+)[\]}]')
 @dataclass(frozen=True, eq=False)
 class QuantityColumns:
     """
-    Columns and unit of one quantity.
+    Columns of one quantity, one per joint, with their unit.
 
     Attributes
     ----------
     quantity : str
         'position', 'velocity' or 'effort'.
     pattern : str
-        Pattern that selects the columns.
+        Pattern of the column names.
     columns : tuple of TableColumn
         One column per joint; empty if the quantity is missing.
     labels : tuple of str
-        Part of each column name that identifies the joint: its name, a number, or the whole column
-        name.
+        Part of each column name that identifies the joint: its name, a number, or the complete
+        column name.
     rest : mapping of str to TableColumn
         Columns of other joints with the same pattern, by their label.
     missing : tuple of str
-        Joints without a column of numbers; with any, the quantity is missing.
+        Joints without a column of numbers. If there are any, the quantity is missing.
     guessed : bool
         Whether the columns were guessed.
     unit : str
-        Unit in the file; empty before the plan is made.
+        Unit in the file; empty until the unit is found.
     factor : ndarray, shape (n,)
-        To SI.
+        Factor from this unit to SI, for each joint.
 
     """
 
@@ -99,13 +101,13 @@ class QuantityColumns:
     factor: FloatArray = field(default_factory=lambda: np.ones(1))
 
     def joints(self, rename: Rules = ()) -> tuple[str, ...]:
-        """Return the joint names in the column names, or joint_1, joint_2 and so on."""
+        """Return the joint names found in the column names, or joint_1, joint_2 and so on."""
         if all(label.isdigit() for label in self.labels):
             return tuple(f'joint_{k + 1}' for k in range(len(self.labels)))
         return tuple(renamed(label, rename) for label in self.labels)
 
     def values(self) -> FloatArray:
-        """Return the quantity in SI, shape (N, n)."""
+        """Return the values of the quantity in SI units, shape (N, n)."""
         return np.column_stack([c.values for c in self.columns]) * self.factor
 
 
@@ -117,7 +119,7 @@ def choose(
     rename: Rules = (),
 ) -> QuantityColumns:
     """
-    Return the columns that a pattern selects.
+    Return the columns of a quantity that match a pattern given by the user.
 
     Parameters
     ----------
@@ -130,26 +132,26 @@ def choose(
     joints : sequence of str or None
         Joints, if known; columns are matched to them by name, else by number.
     rename : sequence of (str, str)
-        From names in the file to names of the joints.
+        Pairs of joint names, or beginnings of them, in the file and their replacements.
 
     Raises
     ------
     RecordingError
-        If no column fits, or the number of columns differs from that of the joints.
+        If no column matches, or the number of columns differs from that of the joints.
 
     """
     found = _matching(table, pattern)
     if not found:
         raise RecordingError(
-            f"{table.source}: '{pattern}', given for {quantity}, fits no column; its columns are "
-            f'{table.listed()}'
+            f"{table.source}: no column has the name or pattern '{pattern}', given with "
+            f'--{quantity}; the columns are {table.listed()}'
         )
     labels = [label for label, _ in found]
     twice = [column.name for label, column in found if labels.count(label) > 1]
     if twice:
         raise RecordingError(
-            f"{table.source}: for {quantity}, '{pattern}' fits {' and '.join(twice)} for one "
-            'joint; list the columns with commas, or rename them'
+            f"{table.source}: '{pattern}', given with --{quantity}, matches several columns for "
+            f'one joint: {", ".join(twice)}; list the columns with commas, or rename them'
         )
     members = dict(found)
     names = [renamed(label, rename) for label in labels]
@@ -160,13 +162,13 @@ def choose(
     if family is not None:
         return family
     assert joints is not None
-    fit = ', '.join(column.name for column in members.values())
-    lacking = ', '.join(joint for joint in joints if joint not in names)
+    matching = ', '.join(column.name for column in members.values())
+    missing = ', '.join(joint for joint in joints if joint not in names)
     raise RecordingError(
-        f"{table.source}: for {quantity}, '{pattern}' fits {fit}, but none of these columns "
-        f'belongs to {lacking}. Columns are matched to the {len(joints)} joints by name, or by '
-        'number if there is one for each. Name them in the order of the joints, with commas, or '
-        'see --rename and --joints'
+        f"{table.source}: '{pattern}', given with --{quantity}, matches the columns {matching}, "
+        f'but none is a column of {missing}. Columns are matched to the {len(joints)} joints by '
+        'name, or by number if each joint has one. List the columns in the order of the joints, '
+        'with commas, or use --rename or --joints'
     )
 
 
@@ -174,7 +176,7 @@ def guess(
     table: Table, quantity: QuantityName, joints: Sequence[str] | None, rename: Rules = ()
 ) -> QuantityColumns:
     """
-    Return the likeliest columns of a quantity.
+    Return the columns of a quantity that fit best by their names; without columns if none fit.
 
     Parameters
     ----------
@@ -183,20 +185,20 @@ def guess(
     quantity : {'position', 'velocity', 'effort'}
         Quantity to find.
     joints : sequence of str or None
-        Joints, if known; a family must have a column for each.
+        Joints, if known; each needs a column.
     rename : sequence of (str, str)
-        From names in the file to names of the joints.
+        Pairs of joint names, or beginnings of them, in the file and their replacements.
 
     Returns
     -------
     QuantityColumns
-        Without columns if none fit. Its pattern is then that of the columns of the most joints,
-        and empty if no column is that of a joint.
+        If no columns fit, the pattern is that of the columns of the most joints; it is empty if
+        no joint has a column.
 
     """
     groups: dict[str, dict[str, TableColumn]] = {}  # by pattern, then by label of the joint
     for column in table.columns:
-        for pattern, label in _readings(column, joints, rename):
+        for pattern, label in _patterns(column, joints, rename):
             groups.setdefault(pattern, {})[label] = column
     best: tuple[tuple[float, int], QuantityColumns] | None = None
     incomplete = QuantityColumns(quantity, '', missing=tuple(joints or ()))
@@ -204,7 +206,7 @@ def guess(
         score = _score(pattern, quantity)
         family = _family(quantity, pattern, members, joints, rename)
         if family is not None:
-            # constant columns hold no measurements
+            # constant columns are probably not measured
             score -= any(not np.any(np.diff(column.finite)) for column in family.columns)
         if score <= 0.0:
             continue
@@ -218,7 +220,7 @@ def guess(
 
 
 def guess_time(table: Table) -> TableColumn | None:
-    """Return a column with the name of a time; one that increases before one that decreases."""
+    """Return the column of time by its name, preferably one with increasing values."""
     scores = {}
     for column in table.columns:
         words = words_of(column.bare_name)
@@ -238,7 +240,7 @@ def _family(
     joints: Sequence[str] | None,
     rename: Rules,
 ) -> QuantityColumns | None:
-    """Return columns in the order of the joints, by name or by number; None if none fit."""
+    """Return the columns of all joints, found by name or by number; None if a joint has none."""
     labels = list(members)
     numbered = all(label.isdigit() for label in labels)
     if numbered:
@@ -255,13 +257,13 @@ def _family(
 
 
 def _by_number(label: str) -> tuple[int, str]:
-    """Return the sort key of labels of digits, by their number."""
+    """Return the sort key of a label that consists of digits, by its number."""
     digits = label.lstrip('0')
     return len(digits), digits
 
 
 def _matching(table: Table, pattern: str) -> list[tuple[str, TableColumn]]:
-    """Return the columns that match a pattern, by the label of their joint."""
+    """Return the columns that match a pattern, each with the label of its joint."""
     exact = table.column(pattern)
     if exact is not None:
         return [('1', exact)]
@@ -270,9 +272,9 @@ def _matching(table: Table, pattern: str) -> list[tuple[str, TableColumn]]:
         numbers = [str(k) for k in range(int(span[2]), int(span[3]) + 1)]
         middle = '[{}]' if span[1] == '[' else '{}'
         names = [_RANGE.sub(middle.format(number), pattern, count=1) for number in numbers]
-        found = [(number, table.column(n)) for number, n in zip(numbers, names, strict=True)]
-        whole = [(number, column) for number, column in found if column is not None]
-        return whole if len(whole) == len(found) else []
+        columns = [table.column(name) for name in names]
+        there = [column for column in columns if column is not None]
+        return list(zip(numbers, there, strict=True)) if len(there) == len(columns) else []
     if '{}' in pattern:
         before, _, after = pattern.partition('{}')
         expression = re.compile(f'{re.escape(before)}(.+){re.escape(after)}')
@@ -291,16 +293,17 @@ def _matching(table: Table, pattern: str) -> list[tuple[str, TableColumn]]:
         column = table.column(part)
         if column is None:
             raise RecordingError(
-                f"{table.source}: there is no column '{part}'; its columns are {table.listed()}"
+                f"{table.source}: the table has no column '{part}'; its columns are "
+                f'{table.listed()}'
             )
         listed_columns.append((part, column))
     return listed_columns
 
 
-def _readings(
+def _patterns(
     column: TableColumn, joints: Sequence[str] | None, rename: Rules
 ) -> Iterator[tuple[str, str]]:
-    """Yield all ways to split a column name into a pattern and the label of a joint."""
+    """Yield the ways to split a column name into a pattern and the label of a joint."""
     name = column.bare_name
     if column.array and name.endswith(']'):
         element = name[len(column.array) + 1 : -1]
@@ -330,7 +333,7 @@ def _readings(
 
 
 def _score(pattern: str, quantity: QuantityName) -> float:
-    """Return the score of a family for a quantity by its name; zero if it does not fit."""
+    """Return how well the words of a pattern fit a quantity; zero if they do not fit."""
     words = words_of(pattern)
     scores = {
         name: max((table.get(word, 0.0) for word in words), default=0.0)
@@ -343,12 +346,12 @@ def _score(pattern: str, quantity: QuantityName) -> float:
 
 
 def words_of(name: str) -> list[str]:
-    """Return the words of a name in small letters: 'actualQ_{}' gives actual and q."""
+    """Return the words of a column name in lower case: 'actualQ_{}' gives actual and q."""
     apart = re.sub(r'(?<=[a-z])(?=[A-Z])', ' ', name)
     apart = re.sub(r'\d+', ' ', apart)
     return [word.lower() for word in re.split(r'[^A-Za-z0-9]+', apart) if word]
 
 
 def is_quantity(word: str) -> bool:
-    """Return whether a word means position, velocity or effort."""
+    """Return whether a word stands for a position, velocity, effort or temperature."""
     return any(word.lower() in words for words in WORDS.values())

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Read table files: NumPy, MATLAB, HDF5, Parquet, LeRobot datasets; other text by `text`."""
+"""Read table files: NumPy, MATLAB, HDF5, Parquet and LeRobot datasets; `text` reads CSV."""
 
 from __future__ import annotations
 
@@ -40,34 +40,36 @@ _NANOSECONDS = re.compile(r'(.*?)(?:ns|nsecs?|nanosecs?|nanoseconds)', re.IGNORE
 
 
 def is_table(path: Path) -> bool:
-    """Return whether a path is a LeRobot dataset, or has the name of a table."""
+    """Return whether a path is a LeRobot dataset or has the suffix of a table file."""
     return _suffix(path) in _READERS or (path / INFO).is_file()
 
 
 def open_table(path: Path, *, episode: int | None = None) -> Table:
     """
-    Read a table.
+    Read the columns of a table file or of a LeRobot dataset.
 
     Parameters
     ----------
     path : Path
-        CSV (also with semicolons, tabs, blanks; .gz too), NPY, NPZ, MAT, HDF5, Parquet, or the
-        folder of a LeRobot dataset.
+        CSV (also with semicolons, tabs or blanks, and compressed as .gz), NPY, NPZ, MAT, HDF5,
+        Parquet, or the folder of a LeRobot dataset.
     episode : int, optional
         Episode of a LeRobot dataset; the first by default.
 
     Raises
     ------
     RecordingError
-        If the file does not exist, has no reader, or is not a table.
+        If the file does not exist, has another format, or is damaged.
 
     """
     if not path.exists():
-        raise RecordingError(f'{path}: there is no such file')
+        raise RecordingError(f'{path}: there is no file at this path')
     lerobot = (path / INFO).is_file()
     if not lerobot and _suffix(path) not in _READERS:
         known = ', '.join(_READERS)
-        raise RecordingError(f'{path}: this is no table; tables are {known} and LeRobot datasets')
+        raise RecordingError(
+            f'{path}: the file is not a table; tables are {known} and LeRobot datasets'
+        )
     if not lerobot:
         with open_regular(path, RecordingError):  # opening a FIFO would block
             pass
@@ -79,17 +81,19 @@ def open_table(path: Path, *, episode: int | None = None) -> Table:
     except Exception as problem:  # libraries may raise any exception
         reason = ' '.join(str(problem).split())[:500]
         raise RecordingError(
-            f'{path}: cannot be read, it may be damaged: {type(problem).__name__}: {reason}'
+            f'{path}: the table cannot be read, perhaps because it is damaged: '
+            f'{type(problem).__name__}: {reason}'
         ) from problem
 
 
 def _suffix(path: Path) -> str:
+    """Return the suffix of a file in lower case, without that of its compression."""
     return Path(path.stem).suffix.lower() if path.suffix == '.gz' else path.suffix.lower()
 
 
 def _with_names(table: Table) -> Table:
-    """Name columns by the joints in cells; their order may change between rows."""
-    names: dict[str, dict[str, npt.NDArray[np.str_]]] = {}  # by what precedes 'name', and number
+    """Rename numbered columns by the joint names in other columns of the same rows."""
+    names: dict[str, dict[str, npt.NDArray[np.str_]]] = {}  # by the text before 'name', and number
     for name, cells in table.words.items():
         match = _NAME.fullmatch(name)
         if match and len(cells):
@@ -120,7 +124,7 @@ def _with_names(table: Table) -> Table:
 
 
 def _with_dates(table: Table) -> Table:
-    """Read columns of dates as seconds since 1970."""
+    """Convert columns of ISO 8601 dates to seconds since 1970."""
     dates: dict[str, TableColumn] = {}
     for name, cells in table.words.items():
         if len(cells) and cells[0][:4].isdigit():
@@ -132,7 +136,7 @@ def _with_dates(table: Table) -> Table:
 
 
 def _with_stamps(table: Table) -> Table:
-    """Merge seconds and nanoseconds of a stamp into one column."""
+    """Add the columns of seconds and nanoseconds of a stamp to one column [s]."""
     pairs = []
     starts = {
         match[1]: column for column in table.columns if (match := _SECONDS.fullmatch(column.name))
@@ -143,8 +147,8 @@ def _with_stamps(table: Table) -> Table:
             pairs.append((starts[match[1]], column, match[1].strip(' ._/') or 'time'))
     for seconds, nanoseconds, name in pairs:
         finite = nanoseconds.values[np.isfinite(nanoseconds.values)]
-        whole = np.all(finite == np.rint(finite)) and np.all((finite >= 0.0) & (finite < 1e9))
-        if not whole or not np.any(finite):
+        integers = np.all(finite == np.rint(finite)) and np.all((finite >= 0.0) & (finite < 1e9))
+        if not integers or not np.any(finite):
             continue
         stamp = TableColumn(name, seconds.values + 1e-9 * nanoseconds.values, unit='s')
         rest = [one for one in table.columns if one not in (seconds, nanoseconds)]
@@ -153,7 +157,7 @@ def _with_stamps(table: Table) -> Table:
 
 
 def read_numpy(path: Path) -> Table:
-    """Read a .npy or .npz file, compressed by gzip or not."""
+    """Read the arrays of a .npy or .npz file, also compressed by gzip."""
     raw = read_content(path)
     if zipfile.is_zipfile(io.BytesIO(raw)):
         with zipfile.ZipFile(io.BytesIO(raw)) as archive:
@@ -174,34 +178,34 @@ def read_numpy(path: Path) -> Table:
 
 
 def read_matlab(path: Path) -> Table:
-    """Read a .mat file: up to version 7 by scipy, version 7.3 by h5py."""
+    """Read the arrays of a .mat file: up to version 7 by scipy, version 7.3 by h5py."""
     from scipy.io import loadmat, whosmat
 
     raw = read_content(path)
     if b'\x89HDF' in raw[:1024]:  # signature of HDF5, after a user block of 512 bytes
         return read_hdf5(path)
     for name, shape, _ in whosmat(io.BytesIO(raw)):
-        _require_packed(f'{path}: {name[:40]!r}', 8 * math.prod(shape), len(raw))
+        _require_possible(f'{path}: {name[:40]!r}', 8 * math.prod(shape), len(raw))
     content = loadmat(io.BytesIO(raw), simplify_cells=True)
     content = {name: value for name, value in content.items() if not name.startswith('__')}
     arrays = dict(_flattened(content, ''))
     if not arrays:
         raise RecordingError(
-            f'{path}: it has no array; only MATLAB can read tables and timeseries: save their '
-            f'columns as arrays'
+            f'{path}: the file has no array; save the columns of a MATLAB table or timeseries as '
+            'arrays, since only MATLAB can read these objects'
         )
     return table_of_arrays(str(path), arrays, 'MATLAB arrays')
 
 
 def read_hdf5(path: Path) -> Table:
-    """Read an HDF5 file, such as a .mat file of version 7.3."""
+    """Read the arrays of an HDF5 file, such as a .mat file of version 7.3."""
     h5py = imported('h5py', path, 'HDF5, the format of MAT files of version 7.3,')
     arrays: Arrays = {}
 
     def visit(name: str, item: Any) -> None:
         if isinstance(item, h5py.Dataset) and item.dtype.kind in 'fiub' and '#' not in name[:1]:
             stored = item.id.get_storage_size()
-            _require_packed(f'{path}: {name[:40]!r}', item.size * item.dtype.itemsize, stored)
+            _require_possible(f'{path}: {name[:40]!r}', item.size * item.dtype.itemsize, stored)
             arrays[name.replace('/', '.')] = np.asarray(item)
 
     with h5py.File(path, 'r') as file:
@@ -209,17 +213,21 @@ def read_hdf5(path: Path) -> Table:
     return table_of_arrays(str(path), arrays, 'HDF5 arrays')
 
 
-def _require_packed(what: str, size: int, stored: int) -> None:
-    """Raise a RecordingError if the stated size of an array is impossible or over the limit."""
-    # upper bound of the compression ratio of deflate
+def _require_possible(array: str, size: int, stored: int) -> None:
+    """Raise RecordingError if the stated size of an array is impossible or over the limit."""
+    # deflate compresses by 1:1032 at most
     if size > 1100 * stored:
-        raise RecordingError(f'{what} states {size} bytes, but the file has {stored}')
-    DEFAULT.require(size, what)
+        raise RecordingError(
+            f'{array}: the file states {size} bytes for this array, but stores only {stored} '
+            'bytes; the file is damaged'
+        )
+    DEFAULT.require(size, array)
 
 
 def _flattened(
     content: Mapping[str, Any], prefix: str
 ) -> Iterator[tuple[str, npt.NDArray[np.generic]]]:
+    """Yield the numeric arrays of nested MATLAB structures, with names such as 'log.arm.q'."""
     for name, value in content.items():
         if isinstance(value, Mapping):
             yield from _flattened(value, f'{prefix}{name}.')
@@ -228,21 +236,21 @@ def _flattened(
 
 
 def read_parquet(path: Path) -> Table:
-    """Read a Parquet file; a column of lists becomes one column per element."""
+    """Read the columns of a Parquet file; a column of lists becomes a column per element."""
     arrays, words = _columns(path)
     return replace(table_of_arrays(str(path), arrays, 'Parquet'), words=words)
 
 
 def read_lerobot(path: Path, episode: int | None = None) -> Table:
     """
-    Read one episode of a LeRobot dataset.
+    Read one episode of a LeRobot dataset as a table.
 
     Parameters
     ----------
     path : Path
-        The folder with meta/info.json.
+        Folder of the dataset, which has meta/info.json.
     episode : int, optional
-        Its number; the first by default.
+        Number of the episode; 0 by default.
 
     """
     with reading(path / INFO, RecordingError):
@@ -250,13 +258,13 @@ def read_lerobot(path: Path, episode: int | None = None) -> Table:
         names: dict[str, list[str]] = {}
         for key, feature in info['features'].items():
             called = feature.get('names')
-            if isinstance(called, Mapping):  # datasets nest the names of elements differently
+            if isinstance(called, Mapping):  # some datasets have the names inside a mapping
                 called = next(iter(called.values()), None)
             names[key] = [str(name) for name in called] if isinstance(called, list) else []
         total = int(info.get('total_episodes', 1))
         rate = finite(info['fps'], 'fps') if 'fps' in info else None
         if rate is not None and rate <= 0.0:
-            raise RecordingError(f'fps is {rate:g}, and has to be positive')
+            raise RecordingError(f'fps (samples per second) is {rate:g}, but has to be positive')
     chosen = episode or 0
     files = sorted((path / 'data').glob('**/*.parquet'))
     own = [file for file in files if file.name == f'episode_{chosen:06d}.parquet']
@@ -274,11 +282,13 @@ def read_lerobot(path: Path, episode: int | None = None) -> Table:
             table = table_of_arrays(str(path), arrays, 'LeRobot dataset', names)
             notes = (f'episode {chosen} of 0 to {total - 1}',)
             return replace(table, rate_hz=rate, notes=notes)
-    raise RecordingError(f'{path}: there is no episode {chosen}; episodes are 0 to {total - 1}')
+    raise RecordingError(
+        f'{path}: the dataset has no episode {chosen}; its episodes are 0 to {total - 1}'
+    )
 
 
 def _columns(path: Path) -> tuple[Arrays, dict[str, Sequence[str]]]:
-    """Return the columns of numbers, (N,) or (N, k) for lists, and the cells of text columns."""
+    """Return the numeric columns of a Parquet file, (N,) or (N, k), and its text columns."""
     parquet = imported('pyarrow.parquet', path, 'Parquet')
     types = imported('pyarrow', path, 'Parquet').types
     stated = parquet.read_metadata(path)
@@ -304,7 +314,8 @@ def _columns(path: Path) -> tuple[Arrays, dict[str, Sequence[str]]]:
                 lists = np.array(column.to_pylist())
             except ValueError:
                 raise RecordingError(
-                    f'{path}: column {name}: its lists differ in length, or some are missing'
+                    f'{path}: column {name}: the lists differ in length, or lists are missing; '
+                    'write lists of equal length'
                 ) from None
             if lists.dtype.kind == 'U':
                 words |= {f'{name}[{k}]': one.tolist() for k, one in enumerate(lists.T)}

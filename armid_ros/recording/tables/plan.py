@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Choose column and unit of each quantity of a table, and convert the table accordingly."""
+"""Choose the column and unit of each quantity in a table, and convert the table to a recording."""
 
 from __future__ import annotations
 
@@ -39,12 +39,12 @@ _ANGLE_UNITS = ('deg', 'deg/s', 'rpm', 'mrad')
 @dataclass(frozen=True)
 class TablePlan:
     """
-    Columns and units of all quantities of a table.
+    Columns and units of all quantities in a table, as chosen by the user or guessed.
 
     Attributes
     ----------
     table : Table
-        The file.
+        The table.
     joints : tuple of str
         Joint names, in the order of the columns.
     time : TableColumn or None
@@ -54,7 +54,7 @@ class TablePlan:
     rate_hz : float or None
         Samples per second, if there is no column of time.
     sources : tuple of QuantityColumns
-        Position first.
+        Columns of each quantity, positions first.
     settings : ColumnSettings
         Settings of the user.
     notes : tuple of str
@@ -86,18 +86,18 @@ class TablePlan:
 
     @property
     def absent(self) -> tuple[str, ...]:
-        """Return texts on missing quantities, such as 'effort of wrist'."""
+        """Return the missing quantities, such as 'effort' or 'effort of wrist'."""
         return tuple(
             f'{one.quantity} of {", ".join(one.missing)}' if one.pattern else one.quantity
             for one in self.missing
         )
 
     def lines(self) -> list[str]:
-        """Format the plan as lines."""
+        """Return the plan as lines of text, one line per quantity."""
         table = self.table
         lines = [f'{table.source}: {table.described}, {len(table)} rows of {len(table.columns)}']
         if self.time is None:
-            lines.append(f'  time      none; {self.rate_hz:g} samples a second')
+            lines.append(f'  time      none; {self.rate_hz:g} samples per second')
         else:
             guessed = ' (guessed)' if self.time_guessed else ''
             lines.append(f'  time      {self.time.name}, in {self.time_unit}{guessed}')
@@ -128,16 +128,16 @@ def plan(
     slides: Sequence[bool] | None = None,
 ) -> TablePlan:
     """
-    Make the plan of a table.
+    Choose the columns and units of the quantities in a table.
 
     Parameters
     ----------
     table : Table
-        The file.
+        The table.
     settings : ColumnSettings
-        Settings of the user; missing ones are guessed.
+        Settings of the user; missing settings are guessed.
     joints : sequence of str, optional
-        Joints of the robot, in order; by default named by the columns.
+        Joints of the robot, in order; by default those in the column names.
     slides : sequence of bool, optional
         Whether each joint is prismatic; by default none is.
 
@@ -151,14 +151,14 @@ def plan(
     if not position.columns:
         if position.pattern:
             raise RecordingError(
-                f"{table.source}: positions '{position.pattern}' have no numeric column for "
-                f'{", ".join(position.missing)}; name their columns with --position or --rename, '
-                f'or leave joints out with --joints. Its columns are {table.listed()}'
+                f"{table.source}: the columns '{position.pattern}' of positions lack the joints "
+                f'{", ".join(position.missing)}; give the columns with --position or --rename, or '
+                f'other joints with --joints. The columns are {table.listed()}'
             )
         of_joints = f' of {", ".join(joints)}' if joints else ''
         raise RecordingError(
-            f'{table.source}: no columns seem to be positions{of_joints}; name them, as in '
-            f"--position 'q{{}}' or --position a,b,c. Its columns are {table.listed()}"
+            f'{table.source}: no columns seem to be positions{of_joints}; give them, such as '
+            f"--position 'q{{}}' or --position a,b,c. The columns are {table.listed()}"
         )
     names = tuple(joints) if joints else position.joints(settings.rename)
     sliding = np.zeros(len(names), np.bool_) if slides is None else np.asarray(slides, np.bool_)
@@ -219,7 +219,7 @@ def _scaled(
     joints: Sequence[str],
     slides: npt.NDArray[np.bool_],
 ) -> QuantityColumns:
-    """Apply unit settings of the user; degrees apply to revolute joints only."""
+    """Return columns with the user's unit settings applied; degrees are for revolute joints."""
     if source.quantity == 'temperature':
         return source
     if source.quantity == 'effort':
@@ -246,13 +246,14 @@ def _scaled(
 
 
 def _text(values: FloatArray) -> str:
+    """Return the different values of an array as a text."""
     return ', '.join(dict.fromkeys(f'{value:.6g}' for value in values))
 
 
 def _position_notes(
     position: QuantityColumns, settings: ColumnSettings, slides: npt.NDArray[np.bool_]
 ) -> Iterator[str]:
-    """Return notes on positions that are too large for rad or m."""
+    """Yield notes for the user on positions that are too large for rad or m."""
     if position.unit != 'rad' or settings.gear or settings.position_scale:
         return
     reach = np.fmax.reduce(np.abs(position.values()))
@@ -266,15 +267,15 @@ def _position_notes(
 
 
 def _time(table: Table, settings: ColumnSettings) -> tuple[TableColumn | None, str, float | None]:
-    """Return the column of time and its unit, or None and the rate."""
+    """Return the column of time and its unit, or None and the sampling rate [Hz]."""
     given = settings.time
     column: TableColumn | None = None
     if given is not None and given.lower() != 'none':
         column = table.column(given)
         if column is None:
             raise RecordingError(
-                f"{table.source}: there is no column '{given}' of time; its columns are "
-                f'{table.listed()}'
+                f"{table.source}: the table has no column '{given}', given with --time; its "
+                f'columns are {table.listed()}'
             )
     elif settings.rate_hz is None and given is None:
         column = guess_time(table)
@@ -284,47 +285,49 @@ def _time(table: Table, settings: ColumnSettings) -> tuple[TableColumn | None, s
     rate = settings.rate_hz or table.rate_hz
     if rate is None:
         raise RecordingError(
-            f'{table.source}: it has no column of time; name one with --time, or give the samples '
-            f'per second with --rate. Its columns are {table.listed()}'
+            f'{table.source}: no column seems to be the time; give a column with --time, or the '
+            f'samples per second with --rate. The columns are {table.listed()}'
         )
     return None, 's', rate
 
 
 def _time_unit(table: Table, column: TableColumn, given: str | None) -> str:
-    """Return the unit of a column of time, from settings, its name, or its steps."""
+    """Return the unit of a column of time: as given, from its name, or from its steps."""
     where = f'{table.source}: column {column.name}'
     steps = np.diff(column.finite)
     if len(steps) and np.mean(steps < 0.0) > 0.5:  # sorting would reverse the motion
         raise RecordingError(
-            f'{where} runs backwards, from {column.values[0]:.6g} to {column.values[-1]:.6g}. '
-            'Reverse the rows if the last row was measured first, or leave the column out with '
-            '--time none --rate HZ if they are in order'
+            f'{where}: time decreases, from {column.values[0]:.6g} to {column.values[-1]:.6g}. '
+            'Reverse the rows if the last row was measured first. If the rows are in order, '
+            'ignore the column with --time none --rate HZ'
         )
     if given or column.unit in TIME_UNITS:
         return given or column.unit
     steps = steps[steps > 0.0]
     if not len(steps):
-        raise RecordingError(f'{where} does not increase')
+        raise RecordingError(
+            f'{where}: time does not increase; give the samples per second with --rate'
+        )
     step = float(np.median(steps))
     # sampling periods of 20 us to 0.5 s
     fitting = [unit for unit, scale in TIME_UNITS.items() if 2e-5 <= step * scale <= 0.5]
     count = step == 1.0 and np.all(steps == np.rint(steps))  # noqa: RUF069 - 1, 2, 3
     if count or not fitting:
         raise RecordingError(
-            f'{where} goes in steps of {step:g}; give its unit with --time-unit s or ms, or the '
-            'samples per second with --rate'
+            f'{where}: the unit of a time with steps of {step:g} is not known; give it with '
+            '--time-unit s or ms, or give the samples per second with --rate'
         )
     return fitting[0]
 
 
-def measured(plan: TablePlan) -> Recording:
+def converted(plan: TablePlan) -> Recording:
     """
-    Convert a table to a recording.
+    Return the recording in a table, by the columns and units of a plan.
 
     Raises
     ------
     RecordingError
-        If time does not increase, or too many rows have a value that is not a number.
+        If time does not increase, or more than a fifth of the rows lack a number.
 
     """
     table = plan.table
@@ -332,8 +335,8 @@ def measured(plan: TablePlan) -> Recording:
     stamped = np.isfinite(t)
     if np.mean(~stamped) > MAX_NOT_FINITE:
         raise RecordingError(
-            f'{table.source}: {np.sum(~stamped)} of {len(table)} rows have a time that is not a '
-            'number'
+            f'{table.source}: {np.sum(~stamped)} of {len(table)} rows have no number as time; '
+            'give another column with --time'
         )
     read = {source.quantity: source.values()[stamped] for source in plan.sources}
     samples = JointSamples(
@@ -343,7 +346,7 @@ def measured(plan: TablePlan) -> Recording:
     )
     others: list[PositionRange] = []
     position, settings = plan.sources[0], plan.settings
-    # joints that were not requested, with known unit
+    # joints that were not requested, if the unit is known
     if not (settings.gear or settings.zero) and len(set(position.factor)) == 1:
         for label, column in position.rest.items():
             values = column.finite * position.factor[0]
@@ -375,7 +378,7 @@ def measured(plan: TablePlan) -> Recording:
 def _temperatures(
     plan: TablePlan, recording: Recording, t: FloatArray, start: int
 ) -> Temperatures | None:
-    """Return the temperatures of a table with times t after a stamp; None without columns."""
+    """Return the temperatures in a table, on the time base of a recording; None without any."""
     for source in plan.sources:
         if source.quantity == 'temperature':
             own = t + 1e-9 * (start - recording.start_ns)
@@ -388,7 +391,7 @@ def _temperatures(
 
 
 def _times(plan: TablePlan) -> tuple[FloatArray, int]:
-    """Return times [s] since a stamp, and this stamp [ns]; the stamp is 1 s if unknown."""
+    """Return the time of each row [s] after a stamp, and this stamp [ns], 1 s if it is unknown."""
     if plan.time is None:
         assert plan.rate_hz is not None
         return np.arange(len(plan.table)) / plan.rate_hz, 10**9
@@ -400,7 +403,10 @@ def _times(plan: TablePlan) -> tuple[FloatArray, int]:
         values[: stamped[0]] = np.nan  # simulated time is zero before the first /clock
     there = values[np.isfinite(values)]
     if not len(there):
-        raise RecordingError(f'{plan.table.source}: column {plan.time.name} has no time in it')
+        raise RecordingError(
+            f'{plan.table.source}: column {plan.time.name} has no valid time; give another column '
+            'with --time'
+        )
     origin = float(there[0])
     epoch = origin * scale > 1e8  # later times count from 1970
     # Differences first: nanoseconds since 1970 do not fit into a float.

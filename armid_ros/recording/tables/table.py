@@ -47,9 +47,9 @@ class TableColumn:
     Attributes
     ----------
     name : str
-        As in the file; an element of an array is 'q[0]', or '[0]' where the array has no name.
+        Name in the file; an element of an array is 'q[0]', or '[0]' if the array has no name.
     values : ndarray, shape (N,)
-        Values; NaN for cells without a number or with a too large one.
+        Values; NaN for cells without a number or with an impossibly large number.
     array : str
         Name of the array that contains the column; empty for a single column.
     unit : str
@@ -63,7 +63,7 @@ class TableColumn:
     unit: str = ''
 
     def __post_init__(self) -> None:
-        """Freeze the values, and read a missing unit from the name."""
+        """Make the values read-only, and take a missing unit from the name."""
         with np.errstate(invalid='ignore'):  # ignore warnings for signalling NaN
             values = np.where(np.abs(self.values) <= LARGEST, self.values, np.nan)
         object.__setattr__(self, 'values', read_only(values))
@@ -78,36 +78,36 @@ class TableColumn:
 
     @property
     def bare_name(self) -> str:
-        """Return the name without a final unit in brackets."""
+        """Return the name without a unit in brackets at its end."""
         return self.name if self.array else _BRACKETS.sub('', self.name)
 
     @property
     def finite(self) -> FloatArray:
-        """Return the values of the column that are finite."""
+        """Return the finite values of the column."""
         return self.values[np.isfinite(self.values)]
 
 
 @dataclass(frozen=True, eq=False)
 class Table:
     """
-    Columns of one file.
+    Columns of one file, with notes from reading the file.
 
     Attributes
     ----------
     source : str
-        The file.
+        Path of the file.
     columns : tuple of TableColumn
         Columns with numbers.
     described : str
-        Kind of the file, for the user.
+        Format of the file, such as 'text with commas'.
     first_line : int or None
-        Line of the first row, in a text file.
+        Line number of the first row in a text file; None for other formats.
     rate_hz : float or None
         Samples per second, if the file states a rate instead of times.
     notes, damage : tuple of str
-        Notes from reading the file: on its content, and on its damage.
+        Notes on the content and on the damage of the file.
     words : mapping of str to sequence of str
-        Columns of words, and empty columns.
+        Columns with texts, and empty columns.
 
     """
 
@@ -121,16 +121,16 @@ class Table:
     words: Mapping[str, Sequence[str]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        """Separate columns without numbers; raise a RecordingError for invalid tables."""
+        """Separate columns without numbers; raise RecordingError if lengths differ."""
         there = tuple(one for one in self.columns if len(one.finite))
         empty = {one.name: () for one in self.columns if one not in there}
         object.__setattr__(self, 'columns', there)
         object.__setattr__(self, 'words', {**empty, **self.words})
         if not there:
-            raise RecordingError(f'{self.source}: it has no column of numbers')
+            raise RecordingError(f'{self.source}: the table has no column of numbers')
         if len({len(column.values) for column in there}) > 1:
             counts = ', '.join(f'{c.name} {len(c.values)}' for c in there)
-            raise RecordingError(f'{self.source}: columns differ in length: {counts}')
+            raise RecordingError(f'{self.source}: columns have different lengths: {counts}')
 
     def __len__(self) -> int:
         """Return the number of rows."""
@@ -138,12 +138,12 @@ class Table:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names of the columns."""
+        """Return the names of the columns."""
         return tuple(column.name for column in self.columns)
 
     def column(self, name: str) -> TableColumn | None:
         """
-        Return a column by its name, with or without unit; None if not found.
+        Return the column with a name, given with or without unit; None if there is none.
 
         Raises
         ------
@@ -157,18 +157,18 @@ class Table:
             if not np.array_equal(other.values, named[0].values, equal_nan=True):
                 row = int(np.argmax(other.values != named[0].values))
                 raise RecordingError(
-                    f"{self.source}: {len(named)} columns are called '{name}', with different "
+                    f"{self.source}: {len(named)} columns have the name '{name}' and different "
                     f'values, first in {self.where(row)}: {named[0].values[row]:g} and '
                     f'{other.values[row]:g}; give them different names'
                 )
         return named[0] if named else None
 
     def where(self, row: int) -> str:
-        """Format the position of a row, for messages."""
+        """Return the position of a row as a text, 'row 3' or 'line 5', for error messages."""
         return f'row {row}' if self.first_line is None else f'line {self.first_line + row}'
 
     def listed(self) -> str:
-        """Format the names of the columns, with short forms of arrays, for messages."""
+        """Return the names of the columns as a text, with arrays shortened, for error messages."""
         arrays = Counter(column.array for column in self.columns)
         shown = dict.fromkeys(
             f'{c.array.removeprefix("[]")}[0..{arrays[c.array] - 1}]' if c.array else c.name
@@ -188,14 +188,14 @@ class Table:
 
 
 def _at_most(names: Sequence[str]) -> str:
-    """Format the first names of a list, and the number of further names."""
+    """Return the first forty names as a text, with the number of further names."""
     most = 40
     more = f' and {len(names) - most} more' if len(names) > most else ''
     return ', '.join(names[:most]) + more
 
 
 def _normal_unit(text: str) -> str:
-    """Return the standard spelling of a unit: 'deg', 'rad/s', 'N m', 'ms'."""
+    """Return the standard spelling of a unit, such as 'deg', 'rad/s', 'N m' or 'ms'."""
     text = text.strip().strip('[]()').replace('°', 'deg').replace('\u00b5', 'u')
     return _UNITS.get(text.lower(), text)
 
@@ -207,16 +207,16 @@ def table_of_arrays(
     labels: Mapping[str, Sequence[str]] = MappingProxyType({}),
 ) -> Table:
     """
-    Make a table of named arrays; the most common axis length is the number of samples.
+    Return a table of named arrays; the most common axis length is the number of samples.
 
     Parameters
     ----------
     source : str
-        The file.
+        Path of the file.
     arrays : mapping of str to ndarray
         Numeric arrays; scalars and arrays of other lengths are skipped.
     described : str
-        Kind of the file.
+        Format of the file, for the user.
     labels : mapping of str to sequence of str
         Names of the elements of an array; by default their numbers.
 
@@ -228,7 +228,7 @@ def table_of_arrays(
     }
     counts = Counter(size for values in usable.values() for size in set(values.shape) if size > 1)
     if not counts:
-        raise RecordingError(f'{source}: it has no array of numbers')
+        raise RecordingError(f'{source}: the file has no array of numbers')
     length = max(counts, key=lambda size: (counts[size] if size > 50 else 0, size))
     columns: list[TableColumn] = []
     for name, values in usable.items():
@@ -251,9 +251,9 @@ def table_of_arrays(
 
 def side_by_side(tables: Sequence[Table]) -> Table:
     """
-    Join the columns of tables of the same samples.
+    Join the columns of several tables of the same samples in one table.
 
-    Names that occur in several files get the file name as a prefix: 'currents:Joint_1'.
+    Column names that occur in several files get the file name as a prefix: 'currents:Joint_1'.
 
     Raises
     ------
@@ -266,7 +266,7 @@ def side_by_side(tables: Sequence[Table]) -> Table:
     if len({len(table) for table in tables}) > 1:
         counted = ', '.join(f'{table.source} has {len(table)} rows' for table in tables)
         raise RecordingError(
-            f'{counted}; files that are read side by side need the same number of samples'
+            f'{counted}; files that are read together need the same number of rows'
         )
     shared = Counter(name for table in tables for name in dict.fromkeys(table.names))
     columns: list[TableColumn] = []
@@ -289,12 +289,12 @@ def side_by_side(tables: Sequence[Table]) -> Table:
 
 def read_content(path: Path) -> bytes:
     """
-    Return the content of a file.
+    Return the bytes of a file, decompressed if its suffix is .gz.
 
     Raises
     ------
     RecordingError
-        If the path is not a regular file, the content is too large, or a .gz file is not gzip.
+        If the path is not a regular file, the content is too large, or a .gz file is damaged.
 
     """
     limit = DEFAULT.memory_limit
@@ -306,17 +306,17 @@ def read_content(path: Path) -> bytes:
             with gzip.GzipFile(fileobj=stream) as packed:
                 content = packed.read(limit + 1)
         except (OSError, EOFError, zlib.error) as error:
-            raise RecordingError(f'{path}: cannot be unpacked: {error}') from error
+            raise RecordingError(f'{path}: the file cannot be decompressed: {error}') from error
     DEFAULT.require(len(content), f'{path}: the decompressed content')
     return content
 
 
 def imported(library: str, path: Path, format_name: str) -> Any:
-    """Import a library; RecordingError with the remedy if it is not installed."""
+    """Import a library that reads a format; RecordingError if it is not installed."""
     try:
         return import_module(library)
     except ImportError:
         raise RecordingError(
-            f'{path}: {format_name} is read by {library.split(".")[0]}, which is not installed: '
-            "pip install 'armid_ros[convert]'"
+            f'{path}: {format_name} needs the package {library.split(".")[0]}, which is not '
+            "installed; install it with pip install 'armid_ros[convert]'"
         ) from None

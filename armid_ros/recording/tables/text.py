@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Read tables from text: values separated by commas, semicolons, tabs or blanks."""
+"""Read tables in text files: values separated by commas, semicolons, tabs or blanks."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ _DECIMAL_COMMA = re.compile(r'[-+]?\d+,\d+([eE][-+]?\d+)?')
 
 def read_text(path: Path) -> Table:
     """
-    Read a text file, compressed or not.
+    Read a table in a text file, compressed by gzip or not.
 
     Raises
     ------
     RecordingError
-        If a cell is not a number. The message names line and column.
+        If a cell is not a number; the message names line and column.
 
     """
     lines = _lines(path)
@@ -39,8 +39,8 @@ def read_text(path: Path) -> Table:
     given = _split(header, separator) if header else [''] * width
     if len(given) != width:
         raise RecordingError(
-            f'{path}: {len(given)} names ({", ".join(given[:6])} ...), but {width} '
-            f'values in line {first + 1}'
+            f'{path}: the header has {len(given)} names ({", ".join(given[:6])} ...), but line '
+            f'{first + 1} has {width} values'
         )
     names = [name or f'[{k}]' for k, name in enumerate(given)]
     values, words, notes, damage = _numbers(path, lines[first:], separator, names, first + 1)
@@ -60,10 +60,10 @@ def read_text(path: Path) -> Table:
 
 
 def _lines(path: Path) -> list[str]:
-    """Return the lines of a text in UTF-8, UTF-16 or Latin-1."""
+    """Return the lines of a text file in UTF-8, UTF-16 or Latin-1."""
     raw = read_content(path)
     if not raw.strip():
-        raise RecordingError(f'{path}: the file is empty; record again, or name another file')
+        raise RecordingError(f'{path}: the file is empty; record again, or give another file')
     wide = raw.startswith((b'\xff\xfe', b'\xfe\xff'))
     try:
         text = raw.decode('utf-16' if wide else 'utf-8-sig')
@@ -71,14 +71,14 @@ def _lines(path: Path) -> list[str]:
         text = raw.decode('latin-1')
     if '\0' in text:
         raise RecordingError(
-            f'{path}: is a binary file, not text; give it the ending of its format '
-            '(.npz, .mat, .parquet, .mcap), or save it as CSV in UTF-8'
+            f'{path}: the file is binary, not text; give it the suffix of its format (.npz, .mat, '
+            '.parquet, .mcap), or save it as CSV in UTF-8'
         )
     return text.rstrip().splitlines()
 
 
 def _heading(path: Path, lines: list[str]) -> tuple[int, str, str]:
-    """Return the first row, the line of names, and the line of units; empty if missing."""
+    """Return the index of the first row, the line of names and that of units, if there are any."""
     words: list[str] = []
     comment = ''
     for number, line in enumerate(lines):
@@ -94,13 +94,13 @@ def _heading(path: Path, lines: list[str]) -> tuple[int, str, str]:
         elif bare:
             words.append(line)
     raise RecordingError(
-        f'{path}: no line of numbers in {len(lines)} lines; a table has one row per line, with '
-        'commas, semicolons, tabs or blanks between values'
+        f'{path}: none of the {len(lines)} lines has numbers; a table needs one row per line, '
+        'with commas, semicolons, tabs or blanks between values'
     )
 
 
 def _has_numbers(line: str) -> bool:
-    """Return whether most cells of a line are numbers."""
+    """Return whether more than half of the cells in a line are numbers."""
     cells = [cell for cell in _split(line, _separator([line])) if cell.lower() not in _EMPTY]
     count = 0
     for cell in cells:
@@ -111,25 +111,26 @@ def _has_numbers(line: str) -> bool:
 
 
 def _same_width(header: str, row: str) -> bool:
-    """Return whether two lines have the same number of cells."""
+    """Return whether a header and a row have the same number of cells."""
     separator = _separator([row])
     return bool(header) and len(_split(header, separator)) == len(_split(row, separator))
 
 
 def _separator(lines: list[str]) -> str:
-    """Return the separator of values: the first character that occurs in every line."""
+    """Return the separator of cells: the first candidate that occurs in every line."""
     there = [line for line in lines if line.strip()]
     return next((s for s in _SEPARATORS if all(s in line for line in there)), ' ')
 
 
 def _split(line: str, separator: str) -> list[str]:
+    """Return the cells of a line; a cell in quotes may contain the separator."""
     if separator == ' ':
         return line.split()
     return [cell.strip() for row in csv.reader([line], delimiter=separator) for cell in row]
 
 
 def _number(cell: str, separator: str) -> float:
-    """Convert a cell to a number, NaN if empty; raise a ValueError for text."""
+    """Return the number in a cell, NaN if it is empty; raise ValueError for text."""
     if cell.lower() in _EMPTY:
         return np.nan
     if separator != ',' and _DECIMAL_COMMA.fullmatch(cell):
@@ -165,7 +166,7 @@ def _numbers(
                 values = values[:k]
                 break
             raise RecordingError(
-                f'{path}: {where} has {len(cells)} values, the others {len(names)}'
+                f'{path}: {where} has {len(cells)} values, but other lines have {len(names)}'
             )
         for j, cell in enumerate(cells):
             try:
@@ -178,7 +179,7 @@ def _numbers(
     if wrong:
         j, k, cell = wrong[0]
         raise RecordingError(
-            f"{path}: line {first_line + k}, column {names[j]}: '{cell}' is no number"
+            f"{path}: line {first_line + k}, column {names[j]}: '{cell}' is not a number"
         )
     words: dict[str, Sequence[str]] = {
         names[j]: [of.get(k, '') for k in range(len(values))] for j, of in texts.items()

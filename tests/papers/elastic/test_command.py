@@ -51,8 +51,8 @@ def test_experiments_without_steps_leave_out_the_tuning(runs, truth, tmp_path) -
     'arguments, error, message',
     [
         ([], RecordingError, 'no bag'),
-        (['missing'], RecordingError, 'no such bag'),
-        (['x', '--robot', 'humanoid_arm'], RecordingError, 'no such bag'),
+        (['missing'], RecordingError, 'no bag or file'),
+        (['x', '--robot', 'humanoid_arm'], RecordingError, 'no bag or file'),
         (['--demo', '--robot', 'humanoid_arm'], RobotError, 'joint by joint'),
         (['x', '--model', 'model.yaml'], RobotError, '--model'),
         (['x', '--gear', '50'], RobotError, '--gear'),
