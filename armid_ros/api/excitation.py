@@ -28,7 +28,7 @@ from armid_ros.excitation import (
 )
 from armid_ros.excitation.problem import torque_noise
 from armid_ros.excitation.scene import UNFIT
-from armid_ros.files import json_text, settled, write_file
+from armid_ros.files import final_path, json_text, write_file
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.recording import write_joint_trajectory
 from armid_ros.recording.curves import draw_joints
@@ -243,7 +243,7 @@ class ExcitationResult(Shown):
         try:
             write_file(page, self.page(origin))
         except Exception as error:  # the written trajectory is valid despite any error
-            sys.stderr.write(f'{settled(page)}: not written: {type(error).__name__}: {error}\n')
+            sys.stderr.write(f'{final_path(page)}: not written: {type(error).__name__}: {error}\n')
         return document
 
     def summary(self) -> Summary:

@@ -29,7 +29,7 @@ from armid_ros.estimate import Estimate, parameter_table, ParameterName
 from armid_ros.files import (
     finite,
     is_file,
-    parsed_yaml,
+    load_yaml,
     read_text,
     reading,
     write_file,
@@ -296,7 +296,7 @@ def checked_model(text: str) -> dict[str, Any]:
         If the document is invalid; the message names the line, and the parameter with its joint.
 
     """
-    document = parsed_yaml(text, ModelError)
+    document = load_yaml(text)
     if not isinstance(document, dict) or document.get('schema') != SCHEMA:
         raise ModelError(f"this is not an arm model: its 'schema' has to be {SCHEMA}")
     strange = [key for key in document if key not in _KEYS]

@@ -3,15 +3,15 @@
 """
 Reading of untrusted files, and atomic writing of results.
 
-Readers of text use `read_text` (no FIFO, no device, a bounded size), `load_yaml` (bounded
-depth and expansion) and `reading`, which converts errors of a parser into an error of the
-package with the path. Writers of results use `write_file`, inside the `result_folder` of the
-command. A result of several files is written into a `staged` folder until it is complete.
+To read text, use `read_text` (no FIFO, no device, a bounded size), `load_yaml` (bounded depth and
+expansion) and `reading`, which converts errors of a parser into an error of the package with the
+path. To write results, use `write_file` inside the `result_folder` of the command. A result of
+several files is written to a `staged` folder until it is complete.
 
 """
 
-from armid_ros.files.documents import finite, load_yaml, parsed_yaml, reading, yaml_line
-from armid_ros.files.output import json_text, result_folder, settled, write_file
+from armid_ros.files.documents import finite, load_yaml, reading, yaml_line
+from armid_ros.files.output import final_path, json_text, result_folder, write_file
 from armid_ros.files.regular import (
     default_memory_limit,
     is_file,
@@ -26,7 +26,6 @@ __all__ = [
     'open_regular',
     'read_text',
     'load_yaml',
-    'parsed_yaml',
     'yaml_line',
     'reading',
     'finite',
@@ -35,7 +34,7 @@ __all__ = [
     'result_folder',
     'Staged',
     'staged',
-    'settled',
+    'final_path',
     'default_memory_limit',
     'size_text',
 ]

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Names with any characters, as cells of a CSV table and in lists of an option."""
+"""Names with any characters in the cells of a CSV table and in lists of command options."""
 
 from __future__ import annotations
 
@@ -13,9 +13,10 @@ _GUARDED = ('=', '+', '-', '@', '#', '\t', '\r', "'")
 
 def csv_text(rows: Iterable[Sequence[str]]) -> str:
     """
-    Return rows as CSV; the first cell of each row is a name.
+    Return rows of a table as CSV text; the first cell of each row is a name.
 
-    A name that begins like a formula gets an apostrophe as prefix; quotes are added if needed.
+    A name that begins like a formula of a spreadsheet gets an apostrophe as prefix. Quotes are
+    added if needed.
 
     """
     lines = []
@@ -28,7 +29,7 @@ def csv_text(rows: Iterable[Sequence[str]]) -> str:
 
 
 def parted(text: str, separator: str = ',') -> list[str]:
-    """Split a text at a separator, except within double quotes; the quotes are kept."""
+    """Split a text at a separator, but not inside double quotes, which stay in the text."""
     parts, last = [], 0
     for match in re.finditer(rf'"[^"]*"|{re.escape(separator)}', text):
         if match[0] == separator:
@@ -38,5 +39,5 @@ def parted(text: str, separator: str = ',') -> list[str]:
 
 
 def listed(text: str, separator: str = ',') -> tuple[str, ...]:
-    """Return the names of a list; a name with the separator is in double quotes."""
+    """Return the names in a text with separators; names in double quotes may contain them."""
     return tuple(part.replace('"', '') for part in parted(text, separator))

@@ -1,9 +1,9 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Documents in YAML and JSON with untrusted content.
+Parsing of YAML and JSON documents with untrusted content.
 
-Documents that are deeper or larger than those of this package are rejected before they are parsed.
+Documents that are deeper or larger than those of this package are rejected before they are built.
 Errors of a parser become one error of this package with the name of the file.
 
 """
@@ -21,7 +21,7 @@ from typing import Any
 from armid_ros.errors import ArmidError
 import yaml
 
-#: Largest allowed number in a document. Quantities are smaller; products of three are finite.
+#: Largest allowed number in a document; the product of three such numbers is still finite.
 LARGEST = 1e100
 
 # The C parser, if installed, is ten times as fast.
@@ -31,7 +31,7 @@ for _unit, _factor in (('!degrees', math.pi / 180.0), ('!radians', 1.0)):
     _Loader.add_constructor(
         _unit, lambda loader, node, factor=_factor: factor * float(loader.construct_scalar(node))
     )
-#: Exceptions while a document with unexpected content is read.
+#: Exceptions that unexpected content of a document can cause.
 _UNEXPECTED = (
     ArithmeticError,
     AssertionError,
@@ -51,7 +51,7 @@ _UNEXPECTED = (
 @contextmanager
 def reading(path: str | Path, error: type[ArmidError]) -> Iterator[None]:
     """
-    Convert errors of a parser into one error that names the file.
+    Convert all errors inside the block into one error that names the file.
 
     Parameters
     ----------
@@ -63,7 +63,7 @@ def reading(path: str | Path, error: type[ArmidError]) -> Iterator[None]:
     Raises
     ------
     ArmidError
-        For any error by the content; the message begins with the path.
+        For any error caused by the content; the message begins with the path.
 
     """
     try:
@@ -76,30 +76,22 @@ def reading(path: str | Path, error: type[ArmidError]) -> Iterator[None]:
         raise error(f'{path}: {_one_line(problem)}') from problem
 
 
-def finite(value: Any, what: str) -> float:
-    """Return a number of a document; ValueError unless finite and within LARGEST."""
+def finite(value: Any, quantity: str) -> float:
+    """Convert a value in a document to a float; ValueError unless finite and at most LARGEST."""
     try:
         number = float(value)
     except (TypeError, ValueError, OverflowError):
         number = math.nan
     if not math.isfinite(number):
-        raise ValueError(f'{what} has to be a finite number, not {str(value)[:40]!r}')
+        raise ValueError(f'{quantity} has to be a finite number, not {str(value)[:40]!r}')
     if abs(number) > LARGEST:
-        raise ValueError(f'{what} is {number:g}, which is beyond {LARGEST:g}')
+        raise ValueError(f'{quantity} is {number:g}, but has to be at most {LARGEST:g}')
     return number
-
-
-def parsed_yaml(text: str, error: type[ArmidError]) -> Any:
-    """Parse YAML as `load_yaml`; raise an `ArmidError` if the text is invalid."""
-    try:
-        return load_yaml(text)
-    except (yaml.YAMLError, ValueError) as fault:
-        raise error(f'not YAML: {" ".join(str(fault).split())}') from fault
 
 
 def load_yaml(text: str) -> Any:
     """
-    Parse YAML to plain types.
+    Parse a YAML text to dictionaries, lists, texts and numbers, with limits of depth and size.
 
     Raises
     ------
@@ -115,14 +107,18 @@ def load_yaml(text: str) -> Any:
     for event in yaml.parse(text, Loader=_Loader):
         if isinstance(event, yaml.AliasEvent):
             if event.anchor not in sizes:
-                raise ValueError(f"line {_line(event)}: the alias '{event.anchor}' has no anchor")
+                raise ValueError(
+                    f"line {_line(event)}: the alias '*{event.anchor}' has no anchor "
+                    f"'&{event.anchor}' before it"
+                )
             total += sizes[event.anchor]
         elif isinstance(event, (yaml.SequenceStartEvent, yaml.MappingStartEvent)):
             total += 1
             open_nodes.append((event.anchor, total))
             if len(open_nodes) > most_levels:
                 raise ValueError(
-                    f'line {_line(event)}: the text is nested more than {most_levels} levels deep'
+                    f'line {_line(event)}: the document is nested more than {most_levels} levels '
+                    'deep'
                 )
         elif isinstance(event, (yaml.SequenceEndEvent, yaml.MappingEndEvent)):
             anchor, begin = open_nodes.pop()
@@ -132,21 +128,23 @@ def load_yaml(text: str) -> Any:
             sizes[event.anchor] = 1
         if total > most_nodes:
             raise ValueError(
-                f'line {_line(event)}: the text has more than {most_nodes} nodes, aliases expanded'
+                f'line {_line(event)}: the document has more than {most_nodes} nodes with aliases '
+                'expanded'
             )
     return yaml.load(text, Loader=_Loader)
 
 
 def yaml_line(text: str, place: Sequence[str | int]) -> int:
     """
-    Return the line of an entry in a text in YAML, from 1.
+    Return the line number, from 1, of an entry in a YAML text.
 
     Parameters
     ----------
     text : str
         Text that `load_yaml` can parse.
     place : sequence of str or int
-        Keys and positions that lead to the entry; if it does not exist, the last existing one.
+        Keys and indices that lead to the entry; if they lead to nothing, the line is that of the
+        last existing entry.
 
     """
     node: Any = yaml.compose(text, Loader=_Loader)
@@ -166,17 +164,20 @@ def yaml_line(text: str, place: Sequence[str | int]) -> int:
 
 
 def _line(event: yaml.Event) -> int:
+    """Return the line number of a parser event, from 1; 0 if unknown."""
     return 0 if event.start_mark is None else int(event.start_mark.line) + 1
 
 
 def _one_line(problem: BaseException) -> str:
-    """Format the error of a parser in one line."""
+    """Return the message of a parser's error in one line."""
     if isinstance(problem, RecursionError):
-        return 'nested too deep'
+        return 'the document is nested too deep'
     if isinstance(problem, MemoryError):
-        return 'too large for the memory'
+        return 'the document is too large for the memory'
     if isinstance(problem, KeyError) and problem.args:
-        return f'no {problem.args[0]}'
+        return f"the key '{problem.args[0]}' is missing"
     text = ' '.join(str(problem).split())
-    name = '' if isinstance(problem, (ValueError, yaml.YAMLError)) else type(problem).__name__
+    if isinstance(problem, yaml.YAMLError):
+        return f'not YAML: {text}'
+    name = '' if isinstance(problem, ValueError) else type(problem).__name__
     return ': '.join(filter(None, (name, text))) or type(problem).__name__

@@ -1,14 +1,14 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Results as files: each is complete or absent, and replaces no result of another run by accident.
+Writing of results: each file is complete or absent, and other results are not overwritten.
 
 A file is written under a temporary name and then renamed, so a symbolic link in the folder is
 replaced, not followed. The folder is locked while a command works on it; the system releases
 the lock when the process ends.
 
-Results of this package may be replaced. Results have a mark: the schema of a document, the
-generator of a page, and the schema in a comment or variable of a layout. Files without a mark are
+Earlier results of this package may be replaced. They have a mark: the schema of a document, the
+generator of a page, or the schema in a comment or variable of a layout. Files without a mark are
 results if a document or a page is in the same folder.
 
 """
@@ -32,10 +32,10 @@ from armid_ros.files.documents import load_yaml, reading
 from armid_ros.files.regular import open_regular, read_text
 from armid_ros.version import GENERATOR
 
-#: Model file that may be in a folder without a document, and results that may replace it.
+#: Model file, which may be alone in a folder, and the results that may replace it.
 _MODEL = 'model.yaml'
 _SCHEMAS_WITH_MODEL = ('armid/identification/1', 'armid/diagnosis/1')
-#: Files and folders of each kind of result, by schema; the JSON document comes first.
+#: Files and folders of each result, by schema; the JSON document comes first.
 _WRITES = {
     'armid/identification/1': (
         'identification.json',
@@ -83,13 +83,13 @@ _WRITES = {
         'watch',
     ),
 }
-#: Documents whose schema identifies the results in a folder; a command writes its document last.
+#: JSON documents whose schema identifies the results in a folder; a command writes them last.
 DOCUMENTS = tuple(
     dict.fromkeys(first for first, *_ in _WRITES.values() if first.endswith('.json'))
 )
-#: Folder in which a run writes until its result is complete.
+#: Name of the folder to which a run writes until its result is complete.
 STAGING = '.armid-part'
-#: Pattern of message types in metadata.yaml, and message types of a bag with a planned motion.
+#: Message types in metadata.yaml, and the message types of a bag with a planned motion.
 _MESSAGE_TYPE = re.compile(r'^ *type: *(\S+)', re.MULTILINE)
 _PLAN_TYPES = {'trajectory_msgs/msg/JointTrajectory', 'std_msgs/msg/String'}
 _MARK = re.compile(re.escape(GENERATOR).encode() + rb'|schema"?: *"?armid/[a-z_]+/[0-9]')
@@ -106,7 +106,7 @@ def write_file(path: str | Path, content: str | bytes) -> None:
     path : str or Path
         The file; an existing one is replaced, and a symbolic link is not followed.
     content : str or bytes
-        Whole content; text is written in UTF-8.
+        Content of the file; text is written in UTF-8.
 
     Raises
     ------
@@ -126,11 +126,12 @@ def write_file(path: str | Path, content: str | bytes) -> None:
     except OSError as error:
         with suppress(OSError):
             temporary.unlink(missing_ok=True)
-        raise OutputError(f'{settled(path)}: cannot be written: {error.strerror}') from error
+        problem = f'{final_path(path)}: the file cannot be written: {error.strerror}'
+        raise OutputError(problem) from error
 
 
 def json_text(document: Any, indent: int | None = None) -> str:
-    """Return a document as JSON; numbers that are not finite become null."""
+    """Return a document as JSON text; numbers that are not finite become null."""
     return json.dumps(_representable(document), indent=indent, allow_nan=False)
 
 
@@ -144,12 +145,12 @@ def result_folder(
     force: bool = False,
 ) -> Iterator[Path]:
     """
-    Make and lock a folder for the results of one command.
+    Create a folder for the results of one command, and lock it during the block.
 
     Parameters
     ----------
     path : Path
-        The folder; created if it does not exist.
+        Folder of the results; it is created if it does not exist.
     schema : str
         Schema of the results, such as 'armid/identification/1'.
     robot : str
@@ -157,13 +158,13 @@ def result_folder(
     also : collection of str
         Names of further files that the command writes.
     force : bool
-        Whether to replace results of another kind or robot, and files of other programs.
+        Whether to replace results of another command or robot, and files of other programs.
 
     Raises
     ------
     OutputError
-        If the folder cannot be written to, another run works on it, or it has results of another
-        kind or robot, or files that the command did not write.
+        If the folder cannot be written to, another run writes to it, or it has results of another
+        command or robot, or files that the command did not write.
 
     """
     made = [one for one in (path, *path.parents) if not os.path.lexists(one)]
@@ -186,27 +187,31 @@ def result_folder(
 @contextmanager
 def locked(path: Path) -> Iterator[None]:
     """
-    Make a folder if it does not exist, and lock it against other runs.
+    Create a folder if it does not exist, and lock it against other runs during the block.
 
     Raises
     ------
     OutputError
-        If the folder cannot be made or opened, or another run holds its lock.
+        If the folder cannot be created or opened, or another run has locked it.
 
     """
     try:
         path.mkdir(parents=True, exist_ok=True)
         descriptor = os.open(path, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
     except (FileExistsError, NotADirectoryError) as error:
-        raise OutputError(f'{path}: is a file, or below one; --out is a folder') from error
+        raise OutputError(
+            f'{path}: the path is a file, or inside a file; give a folder with --out'
+        ) from error
     except OSError as error:
-        raise OutputError(f'{path}: cannot be made or opened: {error.strerror}') from error
+        problem = f'{path}: the folder cannot be created or opened: {error.strerror}'
+        raise OutputError(problem) from error
     try:
         fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError as error:
         os.close(descriptor)
         raise OutputError(
-            f'{path}: another run is writing into it; wait for its end or name another folder'
+            f'{path}: another run writes to this folder; wait until it ends, or give another '
+            'folder'
         ) from error
     except OSError:  # the file system has no locks
         pass
@@ -217,7 +222,7 @@ def locked(path: Path) -> Iterator[None]:
 
 
 def _refuse_other_results(path: Path, schema: str, robot: str) -> None:
-    """Refuse a folder with a document, or only a model, of another kind or robot."""
+    """Raise OutputError if a folder has results of another command or of another robot."""
     there = [name for name in DOCUMENTS if os.path.lexists(path / name)]
     if not there and schema in _SCHEMAS_WITH_MODEL and os.path.lexists(path / _MODEL):
         there = [_MODEL]
@@ -230,22 +235,28 @@ def _refuse_other_results(path: Path, schema: str, robot: str) -> None:
         except OutputError:
             kind, other = f'{name}, which cannot be read', ''
         fits = kind.startswith('armid/model/') if name == _MODEL else kind == schema
-        hint = 'name another folder, or write over it with --force'
+        hint = 'give another folder, or overwrite the results with --force'
         if not fits:
-            raise OutputError(f'{path}: holds {_in_words(kind)}, not {_in_words(schema)}; {hint}')
+            raise OutputError(
+                f'{path}: the folder has {_in_words(kind)}, not {_in_words(schema)}; {hint}'
+            )
         # '-' is the description in the bag, which may be any robot
         same = '-' in (robot, other) or Path(robot).absolute() == Path(other).absolute()
         if robot and other and not same:
-            raise OutputError(f'{path}: holds {kind} of {other}, not of {robot}; {hint}')
+            raise OutputError(
+                f'{path}: the folder has {_in_words(kind)} of the robot {other}, not of {robot}; '
+                f'{hint}'
+            )
 
 
 def _in_words(schema: str) -> str:
-    """Return the name of the kind of result of a schema such as 'armid/comparison/1'."""
+    """Return the results of a schema in words: 'results of comparison'."""
     parts = schema.split('/')
-    return f'results of kind {parts[1]}' if len(parts) == 3 else schema
+    return f'results of {parts[1]}' if len(parts) == 3 else schema
 
 
 def _representable(value: Any) -> Any:
+    """Return a nested document with None in place of numbers that are not finite."""
     if isinstance(value, float):
         return value if math.isfinite(value) else None
     if isinstance(value, dict):
@@ -255,45 +266,45 @@ def _representable(value: Any) -> Any:
     return value
 
 
-def settled(path: Path) -> Path:
-    """Return the final path of a staged file; other paths unchanged."""
+def final_path(path: Path) -> Path:
+    """Return the path of a file after its staging folder is committed; other paths unchanged."""
     return Path(*(part for part in path.parts if part != STAGING))
 
 
 def hash_files(paths: Iterable[str | Path]) -> tuple[tuple[str, int, str], ...]:
-    """Hash files, and all files in folders such as bags; skip other paths."""
+    """Return path, size and SHA-256 of files, and of all files inside folders such as bags."""
     found = []
     for path in map(Path, paths):
         inside = sorted(path.rglob('*')) if path.is_dir() else [path]
         for file in filter(Path.is_file, inside):
             with file.open('rb') as stream:
                 digest = hashlib.file_digest(stream, 'sha256').hexdigest()
-            found.append((str(settled(file)), file.stat().st_size, digest))
+            found.append((str(final_path(file)), file.stat().st_size, digest))
     return tuple(found)
 
 
 def written_by(schema: str, also: Collection[str] = ()) -> tuple[str, ...]:
-    """Return names and patterns, such as '*.png', of the files of a kind of result."""
+    """Return the names and patterns, such as '*.png', of the files in a result with a schema."""
     return (*_WRITES.get(schema, ()), *also)
 
 
 def refuse_foreign(folder: Path, schema: str, also: Collection[str] = ()) -> None:
     """
-    Refuse a folder with files that a command did not write.
+    Raise OutputError if a folder has files that the command did not write.
 
     Parameters
     ----------
     folder : Path
         The folder of the results.
     schema : str
-        Schema of the results; nothing is refused for an unknown schema.
+        Schema of the results; for an unknown schema, no files are refused.
     also : collection of str
         Names of further files that the command writes, or patterns such as '*.png'.
 
     Raises
     ------
     OutputError
-        If there is such a file; the message names the folder and the file.
+        If the folder has such a file; the message names folder and file.
 
     """
     if schema not in _WRITES:
@@ -303,19 +314,19 @@ def refuse_foreign(folder: Path, schema: str, also: Collection[str] = ()) -> Non
     for name in names:
         if not any(fnmatch(name.removeprefix('.').removesuffix('.part'), one) for one in writes):
             raise OutputError(
-                f'{folder}: contains {name}, which this command does not write; choose another '
+                f'{folder}: contains {name}, which this command does not write; give another '
                 'folder, or add --force to keep that file and write there'
             )
     for name in _foreign(folder, names):
         raise OutputError(
-            f'{folder}: holds {name}, which armid did not write; name another folder, or '
-            'write over it with --force'
+            f'{folder}: contains {name}, which armid did not write; give another folder, or '
+            'overwrite the file with --force'
         )
 
 
 def refuse_replacing(folder: Path, names: Collection[str]) -> None:
     """
-    Raise an error instead of replacing files that this package did not write.
+    Raise OutputError if files to be replaced were not written by this package.
 
     Parameters
     ----------
@@ -327,23 +338,24 @@ def refuse_replacing(folder: Path, names: Collection[str]) -> None:
     Raises
     ------
     OutputError
-        If there is such a file; the message names the folder and the file.
+        If the folder has such a file; the message names folder and file.
 
     """
     for name in _foreign(folder, [name for name in names if (folder / name).exists()]):
         raise OutputError(
-            f'{folder}: holds {name}, which armid did not write; name another folder'
+            f'{folder}: contains {name}, which armid did not write; give another folder'
         )
 
 
 def _foreign(folder: Path, names: Sequence[str]) -> Iterator[str]:
-    """Return foreign files; files that cannot have a mark count only if no others exist."""
+    """Return an iterator of the files that armid did not write, by the marks in the files."""
+    # files that cannot have a mark count only if no other files exist
     known = [name for name in names if name.endswith(_MARKED_SUFFIXES)]
     return (name for name in known or names if not is_own(folder / name))
 
 
 def is_plan(path: Path) -> bool:
-    """Return whether a folder is a bag with a trajectory and no measurements."""
+    """Return whether a folder is a bag with a planned trajectory and no measurements."""
     try:
         text = read_text(path / 'metadata.yaml', OutputError)
     except OutputError:
@@ -353,7 +365,7 @@ def is_plan(path: Path) -> bool:
 
 
 def is_own(path: Path) -> bool:
-    """Return whether a document, page or trajectory is a result of this package."""
+    """Return whether this package wrote a document, a page, a layout or a planned trajectory."""
     if path.is_dir():
         return is_plan(path)
     if not path.name.endswith(_MARKED_SUFFIXES):

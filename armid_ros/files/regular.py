@@ -1,10 +1,9 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Opening of regular files without waiting, and limits of their size.
+Reading of regular files without waiting, and limits of their size.
 
-Opening a FIFO waits for a writer, and reading a device may never end, so both are refused at
-once.
+Opening a FIFO waits for a writer, and reading a device may never end. Both are refused at once.
 
 """
 
@@ -41,7 +40,7 @@ def is_file(path: str | Path) -> bool:
 
 def open_regular(path: str | Path, error: type[ArmidError]) -> BinaryIO:
     """
-    Open a file for reading.
+    Open a regular file for reading; refuse folders, FIFOs, devices and sockets.
 
     Parameters
     ----------
@@ -59,18 +58,18 @@ def open_regular(path: str | Path, error: type[ArmidError]) -> BinaryIO:
     try:
         descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
     except (OSError, ValueError) as problem:
-        raise error(f'{path}: cannot be read: {problem_text(problem)}') from problem
+        raise error(f'{path}: the file cannot be read: {problem_text(problem)}') from problem
     mode = os.fstat(descriptor).st_mode
     if not stat.S_ISREG(mode):
         os.close(descriptor)
-        kind = next((name for is_kind, name in _KINDS if is_kind(mode)), 'something else')
-        raise error(f'{path}: cannot be read: {kind}, not a file')
+        kind = next((name for is_kind, name in _KINDS if is_kind(mode)), 'a special file')
+        raise error(f'{path}: the path cannot be read, as it is {kind}, not a file')
     return os.fdopen(descriptor, 'rb')
 
 
 def read_text(path: str | Path, error: type[ArmidError]) -> str:
     """
-    Return the content of a text file.
+    Return the content of a text file of limited size.
 
     Parameters
     ----------
@@ -89,22 +88,22 @@ def read_text(path: str | Path, error: type[ArmidError]) -> str:
         try:
             content = stream.read(TEXT_LIMIT + 1)
         except OSError as problem:
-            raise error(f'{path}: cannot be read: {problem_text(problem)}') from problem
+            raise error(f'{path}: the file cannot be read: {problem_text(problem)}') from problem
     if len(content) > TEXT_LIMIT:
-        raise error(f'{path}: larger than {TEXT_LIMIT >> 20} MiB, the limit of a text file')
+        raise error(f'{path}: the file exceeds {TEXT_LIMIT >> 20} MiB, the limit of text files')
     try:
         return content.decode('utf-8-sig')
     except UnicodeDecodeError as problem:
-        raise error(f'{path}: cannot be read as text: {problem}') from problem
+        raise error(f'{path}: the file is not UTF-8 text: {problem}') from problem
 
 
 def problem_text(problem: OSError | ValueError) -> str:
-    """Return the reason of a system error, without the path."""
+    """Return the reason of a system error as a text without the path."""
     return (problem.strerror if isinstance(problem, OSError) else None) or str(problem)
 
 
 def default_memory_limit() -> int:
-    """Return the memory limit of one input: a quarter of the memory [bytes]."""
+    """Return the default memory limit for one input: a quarter of the memory [bytes]."""
     bounds = [os.sysconf('SC_PAGE_SIZE') * os.sysconf('SC_PHYS_PAGES')]
     limit = resource.getrlimit(resource.RLIMIT_AS)[0]
     if limit != resource.RLIM_INFINITY:
@@ -117,7 +116,7 @@ def default_memory_limit() -> int:
 
 
 def size_text(size: int) -> str:
-    """Return a number of bytes as text with a unit, such as '1.5 MB'."""
+    """Return a number of bytes as a text with a unit, such as '1.5 MB'."""
     for unit, scale in (('GB', 10**9), ('MB', 10**6), ('kB', 10**3)):
         if size >= scale:
             return f'{size / scale:.3g} {unit}'

@@ -1,10 +1,10 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Atomic replacement of a result that has several files.
+Atomic replacement of a result that consists of several files.
 
-A run writes into a staging folder inside the folder of its results, so both are on the same file
-system. Once all files are written, the whole folder is exchanged. If a run fails, or is
+A run writes to a staging folder inside the folder of its results, so both are on the same file
+system. Once all files are written, the folder is exchanged in one step. If a run fails, or is
 interrupted or killed, the earlier result is unchanged.
 
 """
@@ -28,18 +28,18 @@ from armid_ros.files.output import DOCUMENTS, locked, STAGING
 @dataclass(frozen=True)
 class Staged:
     """
-    A result that is written to a staging folder, and moved to its place at the end.
+    Result in a staging folder, which is moved to its place when it is complete.
 
     Attributes
     ----------
     out : Path
         Folder of the results.
     folder : Path
-        Staging folder, in which files are written until `keep`.
+        Staging folder for the files of the new result, until `keep`.
     replaced : tuple of str
         Names or patterns of earlier files, which are deleted if the new result lacks them.
     spared : tuple of Path
-        Files that are not deleted, as the new result refers to them.
+        Files that are not deleted, because the new result refers to them.
 
     """
 
@@ -52,17 +52,17 @@ class Staged:
 
     @property
     def alone(self) -> bool:
-        """Whether the folder of the results contains only the staging folder."""
+        """Whether the folder of the results contains nothing but the staging folder."""
         return all(path.name == STAGING for path in self.out.iterdir())
 
     def keep(self) -> None:
         """
-        Commit the staged result with one rename of the folder.
+        Replace the earlier result by the files in the staging folder, in one step if possible.
 
-        Other files of the folder are linked into the new folder, which then replaces the old
-        one. If an exchange is impossible (current folder, mount point, file system without hard
+        Other files of the folder are linked into a new folder, which then replaces the old
+        folder. If that is impossible (current folder, mount point, file system without hard
         links), the files are moved one by one. The document is then removed first and moved last,
-        so a run killed in between leaves no document.
+        so a run that is killed in between leaves no document.
 
         Raises
         ------
@@ -90,10 +90,11 @@ class Staged:
                 else:
                     source.replace(target)
         except OSError as error:
-            raise OutputError(f'{self.out}: cannot be written: {error.strerror}') from error
+            problem = f'{self.out}: the results cannot be written: {error.strerror}'
+            raise OutputError(problem) from error
 
     def _exchanged(self, names: Collection[str]) -> bool:
-        """Replace the folder by one with the result and other files; False if impossible."""
+        """Replace the folder by a new folder with result and other files; False if impossible."""
         out = self.out.resolve()
         old, own = out.stat(), self.folder.stat()
         if Path.cwd().is_relative_to(out) or (old.st_uid, old.st_gid) != (own.st_uid, own.st_gid):
@@ -122,7 +123,7 @@ class Staged:
         return True
 
     def _earlier_files(self) -> list[Path]:
-        """Return the files of an earlier result that the new one lacks."""
+        """Return the files of the earlier result that the new result lacks."""
         spared = {path.resolve() for path in self.spared}
         return [
             path
@@ -139,17 +140,17 @@ def staged(
     out: Path, replaced: Collection[str] = (), spared: Collection[Path] = ()
 ) -> Iterator[Staged]:
     """
-    Create a staging folder; it is deleted at the end.
+    Create a staging folder for a result; the end of the block deletes it.
 
     Parameters
     ----------
     out, replaced, spared
-        Attributes of `Staged`; the folder `out` is made if it does not exist.
+        Attributes of `Staged`; the folder `out` is created if it does not exist.
 
     Raises
     ------
     OutputError
-        If the folder cannot be made or written to.
+        If the folder cannot be created or written to.
 
     """
     folder = out / STAGING
@@ -158,7 +159,8 @@ def staged(
         _remove(folder)  # remains of a killed run
         folder.mkdir()
     except OSError as error:
-        raise OutputError(f'{out}: cannot be made or written to: {error.strerror}') from error
+        problem = f'{out}: the folder cannot be created or written to: {error.strerror}'
+        raise OutputError(problem) from error
     with ExitStack() as locks:
         try:
             yield Staged(out, folder, tuple(replaced), tuple(spared), _locks=locks)
@@ -168,7 +170,7 @@ def staged(
 
 
 def _exchange(first: Path, second: Path) -> None:
-    """Exchange two folders in one step; OSError if kernel or file system cannot do so."""
+    """Exchange the names of two folders in one step; OSError if the system cannot."""
     at_fdcwd, rename_exchange = -100, 2  # constants of the system call renameat2(2)
     rename = getattr(ctypes.CDLL(None, use_errno=True), 'renameat2', None)
     if rename is None:
@@ -179,7 +181,7 @@ def _exchange(first: Path, second: Path) -> None:
 
 
 def _remove(path: Path) -> None:
-    """Remove a folder, file or symbolic link; the target of a link stays."""
+    """Remove a folder, a file or a symbolic link; the target of a link is kept."""
     if path.is_dir() and not path.is_symlink():
         shutil.rmtree(path)
     else:

@@ -152,7 +152,7 @@ def test_what_a_service_saves_replaces_only_what_it_wrote(tmp_path, files, refus
     if not refused:
         refuse_replacing(tmp_path, ('estimate.yaml', 'model.yaml', 'robot.urdf'))
         return
-    with pytest.raises(OutputError, match=f'holds {refused}'):
+    with pytest.raises(OutputError, match=f'contains {refused}'):
         refuse_replacing(tmp_path, ('estimate.yaml', 'model.yaml', 'robot.urdf'))
 
 

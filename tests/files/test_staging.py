@@ -9,7 +9,7 @@ import subprocess
 import sys
 
 from armid_ros.errors import OutputError
-from armid_ros.files import settled, staged, write_file
+from armid_ros.files import final_path, staged, write_file
 from armid_ros.files.output import locked, STAGING
 import pytest
 
@@ -151,7 +151,7 @@ def test_what_a_killed_run_left_is_no_obstacle_and_no_way_out(out, tmp_path_fact
 
 def test_errors_name_the_place_of_a_file_and_not_where_it_is_made(out):
     with staged(out) as result:
-        assert settled(result.folder / 'model.yaml') == out / 'model.yaml'
+        assert final_path(result.folder / 'model.yaml') == out / 'model.yaml'
         with pytest.raises(OutputError) as refused:
             write_file(result.folder / 'none' / 'model.yaml', '')
     assert str(refused.value).startswith(f'{out / "none" / "model.yaml"}: ')

@@ -49,7 +49,7 @@ def demo(gravity: str, rate: float, hide: str, out: Path, seed: int, as_json: bo
     from armid_ros.cli import options
     from armid_ros.cli.demo import steps
     from armid_ros.excitation import design, DesignSettings, save_excitation
-    from armid_ros.files import json_text, settled, write_file
+    from armid_ros.files import final_path, json_text, write_file
     from armid_ros.identification import write_document
     from armid_ros.identification.assess.agreement import Agreement
     from armid_ros.identification.online.identifier import OnlineIdentifier
@@ -90,7 +90,7 @@ def demo(gravity: str, rate: float, hide: str, out: Path, seed: int, as_json: bo
 
         end = run_lockstep(plant, excitation, bag, identifier, rate=rate, on_progress=watch)
         tick(0.0, 'identifying offline')
-        recording = replace(read_recording(bag, joints=robot.joints), source=str(settled(bag)))
+        recording = replace(read_recording(bag, joints=robot.joints), source=str(final_path(bag)))
         found = identify(nominal, recording, physical=False, rng=rng, progress=tick)
     offline = Agreement.of(found.estimate, found.core.base.values(truth.theta))
     online = Agreement.of(identifier.estimate(), target)

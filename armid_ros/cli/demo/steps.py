@@ -14,7 +14,7 @@ from armid_ros.cli.terminal import progress
 from armid_ros.effects import Effect, make_effect, parse_effect
 from armid_ros.errors import ModelError
 from armid_ros.excitation import ClearanceModel, Excitation, Limits, random_feasible
-from armid_ros.files import load_yaml, read_text, settled
+from armid_ros.files import final_path, load_yaml, read_text
 from armid_ros.nodes.lockstep import run_lockstep
 from armid_ros.recording import read_recording, Recording
 from armid_ros.report.notation import digits, pretty
@@ -124,7 +124,7 @@ def diagnose_hidden(
                 on_progress=lambda now: tick(now.t / now.duration),
             )
         recording = read_recording(out / name, joints=known.robot.joints)
-        recordings.append(replace(recording, source=str(settled(out / name))))
+        recordings.append(replace(recording, source=str(final_path(out / name))))
     with progress('diagnosing') as tick:
         found = diagnose(
             known,

@@ -78,7 +78,7 @@ def exo(
     from armid_ros.cli.options import provenance
     from armid_ros.cli.terminal import progress
     from armid_ros.errors import ModelError
-    from armid_ros.files import settled
+    from armid_ros.files import final_path
     from armid_ros.papers.exo import work
     from armid_ros.papers.exo.plant.gait import read_gait
     from armid_ros.papers.exo.plant.leg_pair import exercise, leg_pair
@@ -102,7 +102,7 @@ def exo(
             motions = exercise(pair, motion, np.arange(0.0, duration, 1e-3), gait)
             noise, rng = (angle_noise, torque_noise), np.random.default_rng(seed)
             work.record(path, names, pair, motions, noise, rng)
-        settings, source = options.read_settings(), str(settled(path))
+        settings, source = options.read_settings(), str(final_path(path))
         both = [
             read_recording(path, joints=one.joints, topic=topic, settings=settings)
             for one, topic in zip((pair.robot, pair.other), names, strict=True)
