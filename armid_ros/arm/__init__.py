@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The arm model (rigid body plus effects), and its file model.yaml."""
+"""Arm models, which are a rigid body plus effects, and their file model.yaml."""
 
 from armid_ros.arm.arm_model import ArmModel
 from armid_ros.arm.misfit import Misfit

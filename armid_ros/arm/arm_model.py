@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""An arm: a rigid body plus a list of effects with their values."""
+"""The arm model: a rigid body plus a list of effects with their parameter values."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ class ArmModel:
     """
     A rigid body plus effects: tau = Y pi + sum over effects of tau_e(motion; theta_e).
 
-    Motions are as recorded by sensors; the model includes the errors of these sensors.
+    Motions are sensor readings, and the model includes the errors of these sensors.
 
     Attributes
     ----------
@@ -78,14 +78,14 @@ class ArmModel:
     quasi_static: bool = False
 
     def __post_init__(self) -> None:
-        """Fill in zeros for missing values, check the number of values, and freeze them."""
+        """Use zeros for missing values, check the number of values, and make them read-only."""
         sizes = [len(effect.parameters(self.robot)) for effect in self.effects]
         values = self.values or tuple(np.zeros(size) for size in sizes)
         object.__setattr__(self, 'values', tuple(read_only(v) for v in values))
         if [v.shape for v in self.values] != [(size,) for size in sizes]:
             raise ModelError(
                 f'{self.robot.name}: the effects {", ".join(e.name for e in self.effects)} need '
-                f'{sizes} values, but the arrays of values have shapes '
+                f'arrays of {sizes} values, but the given arrays have shapes '
                 f'{[v.shape for v in self.values]}'
             )
 
@@ -99,16 +99,16 @@ class ArmModel:
         joints: Sequence[str] | None = None,
     ) -> ArmModel:
         """
-        Make an arm model from a robot description and effects.
+        Make an arm model from a robot description and a list of effects.
 
         Parameters
         ----------
         robot : Robot, str or Path
-            A robot, a shipped name, or the path of a URDF or xacro.
+            A robot, the name of a shipped robot, or the path of a URDF or xacro.
         effects : str or sequence of str or Effect
             Effects, or their names in the catalogue; one string may list several names with
-            commas. A text may have joints, 'payload@wrist'. A text of one effect may have values,
-            'viscous_friction:viscous_coefficient=0.1'.
+            commas. A name may have joints, 'payload@wrist'. The name of a single effect may have
+            values, 'viscous_friction:viscous_coefficient=0.1'.
         gravity : str or sequence of float
             'earth', 'moon', or a vector in the base frame [m/s^2]; not used for a Robot.
         joints : sequence of str, optional
@@ -127,7 +127,7 @@ class ArmModel:
             effects = [effects] if ':' in effects else [e for e in parted(effects) if e.strip()]
         for k, effect in enumerate(effects):
             if effect in effects[:k]:
-                raise ModelError(f"the effect '{effect}' is given twice")
+                raise ModelError(f"the effect '{effect}' is given twice; give each effect once")
             if isinstance(effect, Effect):
                 arm = arm.with_effect(effect)
             else:
@@ -135,7 +135,7 @@ class ArmModel:
         return arm
 
     def __repr__(self) -> str:
-        """Return robot, joints and effects in a few lines."""
+        """Return robot, gravity, moving mass and effects as a few lines of text."""
         gravity = ', '.join(f'{value:g}' for value in self.robot.gravity)
         lines = [
             f'ArmModel of {self.robot.name}: {self.robot.n_joints} joints '
@@ -148,7 +148,7 @@ class ArmModel:
         return '\n'.join(lines)
 
     def with_effect(self, effect: Effect, values: npt.ArrayLike | None = None) -> ArmModel:
-        """Return the arm with one more effect; its parameters are zero by default."""
+        """Return the arm with a further effect, whose parameters are zero by default."""
         if values is None:
             values = np.zeros(len(effect.parameters(self.robot)))
         array = np.asarray(values, dtype=float)
@@ -156,7 +156,7 @@ class ArmModel:
 
     @property
     def parameters(self) -> tuple[ParameterName, ...]:
-        """Return the standard parameters: 10 n rigid ones, then those of the effects, P in all."""
+        """Return the names of the P standard parameters: rigid body first, then effects."""
         names = list(rigid_parameter_names(self.robot))
         for effect in self.effects:
             names.extend(effect.parameters(self.robot))
@@ -164,11 +164,11 @@ class ArmModel:
 
     @property
     def theta(self) -> FloatArray:
-        """Values of the standard parameters, shape (P,)."""
+        """Return the values of the standard parameters, shape (P,)."""
         return np.concatenate([self.robot.rigid_parameters, *self.values])
 
     def with_theta(self, theta: npt.ArrayLike) -> ArmModel:
-        """Return the arm with other standard parameters, shape (P,)."""
+        """Return the arm with other values of the standard parameters, shape (P,)."""
         theta = np.asarray(theta, dtype=float)
         size = len(self.robot.rigid_parameters)
         cuts = np.cumsum([size, *(len(v) for v in self.values)])
@@ -176,22 +176,23 @@ class ArmModel:
         return replace(self, robot=self.robot.with_inertias(parts[0]), values=tuple(parts[1:]))
 
     def values_of(self, effect: Effect) -> FloatArray:
-        """Return the values of an effect, shape (P_e,); zeros if the arm does not have it."""
+        """Return the parameter values of an effect (P_e,); zeros if the arm lacks the effect."""
         for own, values in zip(self.effects, self.values, strict=True):
             if own == effect:
                 return values
         return np.zeros(len(effect.parameters(self.robot)))
 
     def action(self) -> Action:
-        """Return the merged action of robot and effects on plant and sensors."""
+        """Return the merged action of all effects on robot, joint torques and sensors."""
         return self._acting
 
     def __getstate__(self) -> dict[str, Any]:
-        """Return the fields only: cached properties contain functions that cannot be pickled."""
+        """Return the fields for pickling, without cached functions, which cannot be pickled."""
         return {part.name: getattr(self, part.name) for part in fields(self)}
 
     @cached_property
     def _acting(self) -> Action:
+        """Return the merged action of all effects, computed once."""
         robot = self.robot
         pairs = list(zip(self.effects, self.values, strict=True))
         for effect, values in pairs:
@@ -203,18 +204,18 @@ class ArmModel:
 
     @property
     def body(self) -> Robot:
-        """Return the rigid body with effects, such as a payload or a changed gravity."""
+        """Return the robot with the effects that change it, such as a payload or gravity."""
         assert self._acting.robot is not None
         return self._acting.robot
 
     def along(self, motion: Motion) -> ArmModel:
-        """Return the arm with effects that use further recorded signals, such as temperatures."""
+        """Return the arm with effects that use other signals of a motion, such as temperatures."""
         effects = tuple(effect.along(motion) for effect in self.effects)
         known = all(new is old for new, old in zip(effects, self.effects, strict=True))
         return self if known else replace(self, effects=effects)
 
     def link_motion(self, motion: Motion) -> Motion:
-        """Return the true motion of the links for a recorded motion."""
+        """Return the true motion of the links, given the motion that sensors recorded."""
         displacement = self._acting.displacement
         if displacement is None:
             return motion
@@ -228,15 +229,15 @@ class ArmModel:
         return LinkFrames.of(self.robot, self.link_motion(motion).q)
 
     def load(self, motion: Motion) -> FloatArray:
-        """Return the torque of the rigid body along a motion of the links, (N, n) [N m]."""
-        return inverse_dynamics(self.body, self.felt(motion))
+        """Return the rigid-body torque along a motion of the links, shape (N, n) [N m]."""
+        return inverse_dynamics(self.body, self.rigid_body_motion(motion))
 
     def body_columns(self, motion: Motion) -> FloatArray:
-        """Return the regressor of the load along a recorded motion, shape (N, n, 10 n)."""
-        return regressor(self.body, self.felt(self.link_motion(motion)))
+        """Return the rigid-body regressor along a recorded motion, shape (N, n, 10 n)."""
+        return regressor(self.body, self.rigid_body_motion(self.link_motion(motion)))
 
     def gravity_columns(self, motion: Motion) -> FloatArray:
-        """Differentiate the load along a recorded motion by gravity, shape (N, n, 3)."""
+        """Differentiate the rigid-body torque by the gravity vector, shape (N, n, 3)."""
         return gravity_sensitivity(self.body, self.link_motion(motion).q)
 
     def smoothed(self, motion: Motion) -> Motion:
@@ -244,16 +245,16 @@ class ArmModel:
         return smoothed(motion)
 
     def load_derivatives(self, motion: Motion) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Differentiate the load by position, velocity, acceleration, each (N, n, n)."""
-        return inverse_dynamics_derivatives(self.body, self.felt(motion))
+        """Differentiate the rigid-body torque by q, dq and ddq, each (N, n, n)."""
+        return inverse_dynamics_derivatives(self.body, self.rigid_body_motion(motion))
 
     def link_torque_derivatives(self, motion: Motion) -> tuple[FloatArray, FloatArray] | None:
-        """Differentiate torques on the link side by q and dq, each (N, n, n); None without any."""
+        """Differentiate effects' link-side torques by q and dq, (N, n, n); None without any."""
         law = self.along(motion).action().link_torque
         return None if law is None else law_derivatives(law, self.link_motion(motion))
 
     def joint_torque(self, motion: Motion) -> FloatArray:
-        """Return the true torque along a recorded motion, shape (N, n) [N m or N]."""
+        """Return the true joint torque along a recorded motion, shape (N, n) [N m or N]."""
         link = self.link_motion(motion)
         load = self.load(link)
         return load + self.along(motion).action().effort(motion, link, load)
@@ -262,7 +263,7 @@ class ArmModel:
         self, motion: Motion | npt.ArrayLike, dq: npt.ArrayLike = 0.0, ddq: npt.ArrayLike = 0.0
     ) -> FloatArray:
         """
-        Predict the torque readings along a recorded motion, with all effects.
+        Predict the torque readings of the actuators along a recorded motion.
 
         Parameters
         ----------
@@ -287,8 +288,8 @@ class ArmModel:
             past = [effect.name for effect in self.effects if not effect.instantaneous]
             if past:
                 raise ModelError(
-                    f'positions without times are not enough for {", ".join(past)}: give an '
-                    'ar.Motion'
+                    f'the effects {", ".join(past)} depend on earlier samples; give an ar.Motion, '
+                    'which has times, instead of positions'
                 )
             states = Motion.of_states(self.robot.joints, motion, dq, ddq)
             return self.torque(states).reshape(np.shape(motion))
@@ -297,25 +298,25 @@ class ArmModel:
         return tau if reading is None else reading(motion, tau)
 
     def rigid_columns(self, motion: Motion) -> FloatArray:
-        """Return the sensitivities to the rigid parameters, shape (N, n, 10 n)."""
+        """Differentiate the torque readings by the rigid-body parameters, (N, n, 10 n)."""
         columns = self.body_columns(motion)
         return self._as_read(motion, self.with_load_friction(motion, columns))
 
     def columns_of(self, effect: Effect, motion: Motion) -> FloatArray:
         """
-        Return the sensitivities of the torque readings to the parameters of an effect.
+        Differentiate the torque readings by the parameters of one effect.
 
         Parameters
         ----------
         effect : Effect
             Effect of the arm, or a candidate effect.
         motion : Motion
-            Recorded motion; a whole unbroken stretch unless the effect is instantaneous.
+            Recorded motion; a complete stretch without gaps unless the effect is instantaneous.
 
         Returns
         -------
         ndarray, shape (N, n, P_e)
-            Derivative of ``torque`` at the present values of the arm.
+            Derivative of ``torque`` at the present parameter values of the arm.
 
         """
         columns = effect.checked_columns(motion, self)
@@ -324,24 +325,24 @@ class ArmModel:
         return self._as_read(motion, columns, effect)
 
     def effect_columns(self, motion: Motion) -> FloatArray:
-        """Return the sensitivities of the effects, shape (N, n, P - 10 n)."""
+        """Differentiate the torque readings by the parameters of all effects, (N, n, P - 10 n)."""
         blocks = [self.columns_of(effect, motion) for effect in self.effects]
         empty = np.empty((len(motion), motion.n_joints, 0))
         return np.concatenate([empty, *blocks], axis=2)
 
     def columns(self, motion: Motion) -> FloatArray:
         """
-        Return the sensitivities to all ``parameters``, shape (N, n, P).
+        Differentiate the torque readings by all ``parameters``, shape (N, n, P).
 
-        They are the derivative of ``torque``. Effects that depend on the load of a joint use the
-        load at the present values.
+        The result is the derivative of ``torque``. Effects that depend on the load of a joint use
+        the load at the present parameter values.
 
         """
         return np.concatenate([self.rigid_columns(motion), self.effect_columns(motion)], axis=2)
 
     def torque_change(self, motion: Motion, change: Displacement) -> FloatArray:
         """
-        Differentiate the true torque by changes of the links' motion.
+        Return the change of the true joint torque due to a change of the links' motion.
 
         Parameters
         ----------
@@ -367,7 +368,7 @@ class ArmModel:
         return columns
 
     def torque_before(self, effect: Effect, motion: Motion) -> FloatArray:
-        """Return the torque on which a sensor effect acts, shape (N, n) [N m]."""
+        """Return the torque that a sensor effect converts to a reading, shape (N, n) [N m]."""
         tau = self.joint_torque(motion)
         for own, values in self._readings:
             if own == effect:
@@ -376,7 +377,7 @@ class ArmModel:
         return tau
 
     def neighbours(self, period: float) -> int:
-        """Return how many samples on either side affect a reading, for a sampling period [s]."""
+        """Return the number of samples, before and after each, that affect a torque reading."""
         action = self._acting
         if action.displacement is None and action.reading_memory == 0.0:  # noqa: RUF069 - of laws, never computed
             return 0
@@ -385,13 +386,14 @@ class ArmModel:
 
     @cached_property
     def _readings(self) -> list[tuple[TorqueReading, FloatArray]]:
+        """Return the sensor effects of the torque, with their parameter values."""
         pairs = zip(self.effects, self.values, strict=True)
         return [(e, values) for e, values in pairs if isinstance(e, TorqueReading)]
 
     def _as_read(
         self, motion: Motion, columns: FloatArray, after: Effect | None = None
     ) -> FloatArray:
-        """Apply all sensor effects, or only those after a given effect, to columns of torque."""
+        """Convert derivatives of the true torque to derivatives of the torque readings."""
         readings = self._readings
         if isinstance(after, TorqueReading):
             known = [own for own, _ in readings]
@@ -408,7 +410,7 @@ class ArmModel:
         return columns
 
     def with_load_friction(self, motion: Motion, columns: FloatArray) -> FloatArray:
-        """Add the change of load-dependent friction to changes of the load torque, (N, n, P)."""
+        """Add the change of load-dependent friction to changes of the load, (N, n, P)."""
         friction = self._acting.dry_friction
         if friction is None or friction.load_share is None:
             return columns
@@ -417,15 +419,15 @@ class ArmModel:
         gain = friction.load_share * np.sign(load @ along) * np.sign(motion.dq @ along)
         return np.asarray(columns + along @ (gain[:, :, np.newaxis] * (along.T @ columns)))
 
-    def felt(self, motion: Motion) -> Motion:
-        """Return the motion that the rigid body feels; if quasi-static, with the links at rest."""
+    def rigid_body_motion(self, motion: Motion) -> Motion:
+        """Return the motion for rigid-body torques: without velocities if quasi-static."""
         return motion.at_rest() if self.quasi_static else motion
 
     def base_parameters(
         self, rng: np.random.Generator, free: npt.NDArray[np.intp] | None = None
     ) -> BaseParameters:
         """
-        Find the combinations of standard parameters that a suitable motion identifies.
+        Find the combinations of parameters that a suitable motion can identify.
 
         Parameters
         ----------

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Export of an identified arm as URDF and MJCF, and a check of the torque in MuJoCo."""
+"""Export of an identified arm as URDF or MJCF, and a check of the file in MuJoCo."""
 
 from __future__ import annotations
 
@@ -22,19 +22,19 @@ import numpy as np
 @dataclass(frozen=True)
 class Exported:
     """
-    An exported description of an arm.
+    Exported robot description, and the parts of the arm that its format cannot contain.
 
     Attributes
     ----------
     text : str
-        Content of the file.
+        Content of the URDF or MJCF file.
     without_place : tuple of str
         Parameters of effects that the format cannot contain, one per line; a comment in the file
         lists them too.
     left_out : tuple of str
-        Parts of the description that the file lacks.
+        Parts of the original description that the file lacks.
     values : mapping of str to mapping of str to float
-        'damping' [N m s/rad], 'friction' [N m] and 'armature' [kg m^2] of the file, by joint.
+        'damping' [N m s/rad], 'friction' [N m] and 'armature' [kg m^2] in the file, by joint.
 
     """
 
@@ -48,7 +48,7 @@ def arm_urdf(arm: ArmModel) -> Exported:
     """
     Return the URDF of the arm with identified inertial parameters and friction.
 
-    A payload is part of the link that carries it. Text expanded from xacro stays expanded.
+    A payload becomes part of the link that carries it. A URDF from xacro stays expanded.
 
     Raises
     ------
@@ -70,7 +70,7 @@ def arm_urdf(arm: ArmModel) -> Exported:
 
 def arm_mjcf(arm: ArmModel) -> Exported:
     """
-    Return a MuJoCo model of the arm with its shapes.
+    Return a MuJoCo model of the arm with identified inertial parameters and friction.
 
     Raises
     ------
@@ -88,10 +88,11 @@ def place_values(
     arm: ArmModel, attribute: Callable[[Effect], str]
 ) -> tuple[dict[str, dict[str, float]], tuple[str, ...]]:
     """
-    Return the effects' values by attribute of the file format, and a line for each that has none.
+    Return effect values by attribute of a file format, and a line for each other value.
 
-    The attribute is where the format has an effect, and is empty if it has none. Effects that
-    change the rigid body are part of it, and appear in neither.
+    The function ``attribute`` returns the attribute of the format for an effect, or an empty text.
+    Effects that change the rigid body are part of its inertial parameters, and appear in neither
+    result.
 
     """
     found: dict[str, dict[str, float]] = {}
@@ -112,6 +113,7 @@ def place_values(
 
 
 def _remarks(form: str, missing: tuple[str, ...]) -> tuple[str, ...]:
+    """Return the lines of a comment on parameters that a file format cannot contain."""
     if not missing:
         return ()
     return (f'identified by armid_ros; {form} has no place for', *missing)
@@ -119,7 +121,7 @@ def _remarks(form: str, missing: tuple[str, ...]) -> tuple[str, ...]:
 
 def torque_check(exported: Exported, arm: ArmModel) -> dict[str, Any]:
     """
-    Compare the torque of an exported file in MuJoCo with that of the arm, in random states.
+    Compare the torques of an exported file in MuJoCo with those of the arm, in random states.
 
     Parameters
     ----------
@@ -132,8 +134,8 @@ def torque_check(exported: Exported, arm: ArmModel) -> dict[str, Any]:
     -------
     dict
         'program', 'states', the largest 'difference' [N m or N] and its 'share' of the largest
-        torque, and 'shapes' with the reason if MuJoCo cannot load the shapes of an MJCF; or
-        'not_checked' with the reason. Dry friction has its value in motion.
+        torque, and 'shapes' with the reason if MuJoCo cannot load the shapes of an MJCF. If
+        nothing was compared, 'not_checked' with the reason. Dry friction has its value in motion.
 
     """
     try:
@@ -176,7 +178,7 @@ def torque_check(exported: Exported, arm: ArmModel) -> dict[str, Any]:
 
 
 def _inverse(mujoco: Any, model: Any, motion: Motion, held: dict[str, float]) -> FloatArray:
-    """Return torques of MuJoCo's inverse dynamics, shape (N, n), without contacts and limits."""
+    """Return joint torques by MuJoCo's inverse dynamics, without contacts and limits, (N, n)."""
     model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONSTRAINT
     data = mujoco.MjData(model)
     kind = mujoco.mjtObj.mjOBJ_JOINT

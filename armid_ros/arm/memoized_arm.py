@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""An arm with caches, for searches that evaluate the same motions many times."""
+"""An arm model with caches, for searches that evaluate the same motions many times."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _Result = TypeVar('_Result')
 
 @dataclass
 class _Regressor:
-    """Regressor of a recorded motion, and its rows under one filter."""
+    """Rigid-body regressor of a recorded motion, and its filtered rows."""
 
     motion: Motion
     columns: FloatArray
@@ -29,7 +29,7 @@ class _Regressor:
 @dataclass(frozen=True, repr=False)
 class _Memoized(ArmModel):
     """
-    Arm with cached torques and regressors.
+    Arm model that caches its torques and regressors for each motion.
 
     Regressors depend on motion and gravity, not on inertial parameters, so copies share them.
 
@@ -39,17 +39,21 @@ class _Memoized(ArmModel):
 
     @cached_property
     def _known(self) -> dict[tuple[str, int], tuple[Motion, Any]]:
+        """Return the cached results, by name of the quantity and identity of the motion."""
         return {}
 
-    def _once(self, what: str, motion: Motion, compute: Callable[[Motion], _Result]) -> _Result:
-        key = what, id(motion)
+    def _once(
+        self, quantity: str, motion: Motion, compute: Callable[[Motion], _Result]
+    ) -> _Result:
+        """Return a quantity along a motion, computed at the first call."""
+        key = quantity, id(motion)
         if key not in self._known:
             self._known[key] = motion, compute(motion)
         result: _Result = self._known[key][1]
         return result
 
     def link_motion(self, motion: Motion) -> Motion:
-        """Return the true motion of the links for a recorded motion."""
+        """Return the true motion of the links, given the motion that sensors recorded."""
         if self.action().displacement is None:
             return motion
         return self._once('link', motion, super().link_motion)
@@ -59,7 +63,7 @@ class _Memoized(ArmModel):
         return self._once('frames', motion, super().link_frames)
 
     def regressor(self, motion: Motion) -> _Regressor | None:
-        """Return the cached regressor; None for another link motion, or if memory is exhausted."""
+        """Return the cached regressor; None if effects move the links or memory is full."""
         if self.action().displacement is not None:
             return None
         key = self._key(motion)
@@ -68,27 +72,30 @@ class _Memoized(ArmModel):
             # memory of the cached regressors [bytes]; further regressors are not kept
             if used + 10 * motion.q.nbytes * motion.n_joints > 1_000_000_000:
                 return None
-            self.regressors[key] = _Regressor(motion, regressor(self.body, self.felt(motion)))
+            self.regressors[key] = _Regressor(
+                motion, regressor(self.body, self.rigid_body_motion(motion))
+            )
         return self.regressors[key]
 
     def _key(self, motion: Motion) -> tuple[object, ...]:
+        """Return a key of all that a regressor depends on: motion, gravity and quasi-static."""
         places = (array.ctypes.data for array in (motion.q, motion.dq, motion.ddq))
         return *places, len(motion), tuple(self.body.gravity.tolist()), self.quasi_static
 
     def load(self, motion: Motion) -> FloatArray:
-        """Return the torque of the rigid body along a motion of the links, (N, n) [N m]."""
+        """Return the rigid-body torque along a motion of the links, shape (N, n) [N m]."""
         known = self.regressors.get(self._key(motion))
         if known is not None:
             return known.columns @ self.body.rigid_parameters
         return np.array(self._once('load', motion, super().load))
 
     def body_columns(self, motion: Motion) -> FloatArray:
-        """Return the regressor of the load along a recorded motion, shape (N, n, 10 n)."""
+        """Return the rigid-body regressor along a recorded motion, shape (N, n, 10 n)."""
         known = self.regressor(motion)
         return self._once('body', motion, super().body_columns) if known is None else known.columns
 
     def gravity_columns(self, motion: Motion) -> FloatArray:
-        """Differentiate the load along a recorded motion by gravity, shape (N, n, 3)."""
+        """Differentiate the rigid-body torque by the gravity vector, shape (N, n, 3)."""
         return self._once('gravity', motion, super().gravity_columns)
 
     def smoothed(self, motion: Motion) -> Motion:
@@ -96,34 +103,34 @@ class _Memoized(ArmModel):
         return self._once('smooth', motion, super().smoothed)
 
     def load_derivatives(self, motion: Motion) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Differentiate the load by position, velocity, acceleration, each (N, n, n)."""
+        """Differentiate the rigid-body torque by q, dq and ddq, each (N, n, n)."""
         return self._once('derivatives', motion, super().load_derivatives)
 
     def link_torque_derivatives(self, motion: Motion) -> tuple[FloatArray, FloatArray] | None:
-        """Differentiate torques on the link side by q and dq, each (N, n, n); None without any."""
+        """Differentiate effects' link-side torques by q and dq, (N, n, n); None without any."""
         return self._once('holding', motion, super().link_torque_derivatives)
 
     def joint_torque(self, motion: Motion) -> FloatArray:
-        """Return the true torques of a recorded motion, shape (N, n) [N m]."""
+        """Return the true joint torque along a recorded motion, shape (N, n) [N m or N]."""
         return np.array(self._once('torque', motion, super().joint_torque))
 
 
 def memoized_arm(arm: ArmModel) -> ArmModel:
-    """Return the arm with caches of torques and regressors."""
+    """Return the arm model with caches of torques and regressors."""
     if isinstance(arm, _Memoized):
         return arm
     return _Memoized(arm.robot, arm.effects, arm.values, arm.quasi_static)
 
 
 def plain_arm(arm: ArmModel) -> ArmModel:
-    """Return the arm without caches."""
+    """Return the arm model without caches."""
     return ArmModel(arm.robot, arm.effects, arm.values, arm.quasi_static)
 
 
 def rigid_rows(
     arm: ArmModel, motion: Motion, reduce: Callable[[FloatArray], FloatArray]
 ) -> FloatArray:
-    """Return the filtered sensitivities to the rigid parameters, (M, n, 10 n)."""
+    """Return filtered derivatives of torque readings by rigid-body parameters, (M, n, 10 n)."""
     columns = arm.rigid_columns(motion)
     known = arm.regressor(motion) if isinstance(arm, _Memoized) else None
     if known is None or known.columns is not columns:

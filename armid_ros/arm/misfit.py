@@ -1,13 +1,13 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-The misfit of a model: its residual in the recordings of its identification, in model.yaml.
+The misfit of a model: its residual on the recordings of its identification.
 
 The residual of a real arm exceeds the noise, so a diagnosis measures changes in units of the
 misfit. The block ``misfit`` of model.yaml has ``unit``, ``data`` (held-out or training), ``rms``
 of the residual by joint, and ``relative_error_percent`` of the torque. A misfit grows with the
 torque, so ``torque_rms`` has the torque of these recordings. A misfit includes noise, so
-``filters`` has the filters of its rows.
+``filters`` has the filters of the data.
 
 """
 
@@ -28,7 +28,7 @@ _DATA = ('held-out', 'training')
 
 class RowFilters(NamedTuple):
     """
-    Filters of the rows: sampling rate and cut-off [Hz], and decimation.
+    Filters of the identification data: sampling rate and cut-off [Hz], and decimation.
 
     The fields are those of `armid_ros.identification.rows.signals.Conditioning`.
 
@@ -42,12 +42,12 @@ class RowFilters(NamedTuple):
 @dataclass(frozen=True)
 class Misfit:
     """
-    Residual of a model at its identification.
+    Residual of a model on the recordings of its identification, by joint.
 
     Attributes
     ----------
     data : str
-        'held-out', or 'training' where nothing was held out.
+        'held-out', or 'training' if no recording was held out.
     rms : mapping of str to float
         Root mean square residual of each joint [N m].
     relative_error_percent : float
@@ -55,10 +55,10 @@ class Misfit:
     torque_rms : mapping of str to float, or None
         Root mean square torque of each joint [N m]; None if unknown.
     information : ndarray, shape (P, P), or None
-        Inverse covariance of the parameters by the recordings of the identification; None if
-        unknown. model.yaml does not have it.
+        Inverse covariance of the parameters, from the recordings of the identification; None if
+        unknown. It is not in model.yaml.
     unusable : bool
-        Whether the grade of the identification was unusable; model.yaml does not have it.
+        Whether the grade of the identification was unusable; this is not in model.yaml.
     filters : RowFilters or None
         Filters of the data of the misfit; None if unknown.
 
@@ -73,7 +73,7 @@ class Misfit:
     filters: RowFilters | None = None
 
     def document(self) -> dict[str, Any]:
-        """Return the block ``misfit`` of model.yaml."""
+        """Return the block ``misfit`` of model.yaml as a dictionary."""
         block = {
             'unit': 'N m',
             'data': self.data,
@@ -88,15 +88,15 @@ class Misfit:
 
     def of(self, robot: Robot, torque_rms: FloatArray | None = None) -> FloatArray:
         """
-        Return the root mean square residual of the joints of a robot, shape (n,) [N m].
+        Return the root mean square residual of each joint of a robot, shape (n,) [N m].
 
         Parameters
         ----------
         robot : Robot
             The arm.
         torque_rms : ndarray, shape (n,), optional
-            Root mean square torque of other recordings [N m]; the residual is scaled up where
-            this torque is larger.
+            Root mean square torque of other recordings [N m]; the residual is scaled up by this
+            torque if it is larger than in the identification.
 
         Raises
         ------
@@ -107,21 +107,23 @@ class Misfit:
         missing = [joint for joint in robot.joints if joint not in self.rms]
         if missing:
             raise ModelError(
-                f"the misfit has no joint '{missing[0]}'; its joints are {', '.join(self.rms)}"
+                f"the misfit of the model has no joint '{missing[0]}'; its joints are "
+                f'{", ".join(self.rms)}'
             )
-        left = np.array([self.rms[joint] for joint in robot.joints])
+        residual = np.array([self.rms[joint] for joint in robot.joints])
         if torque_rms is None or self.torque_rms is None:
-            return left
-        return left * louder(torque_rms, np.array([self.torque_rms[j] for j in robot.joints]))
+            return residual
+        before = np.array([self.torque_rms[joint] for joint in robot.joints])
+        return residual * growth(torque_rms, before)
 
 
-def louder(now: FloatArray, before: FloatArray) -> FloatArray:
-    """Return the rms torque now over that of the identification, at least 1, shape (n,)."""
+def growth(now: FloatArray, before: FloatArray) -> FloatArray:
+    """Return the ratio of present to earlier rms values, but at least 1, shape (n,)."""
     return np.asarray(np.maximum(now / np.maximum(before, 1e-12), 1.0))
 
 
 def misfit_of_block(block: Any) -> Misfit:
-    """Parse the block ``misfit`` of a model.yaml."""
+    """Return the misfit in the block ``misfit`` of a model.yaml."""
     try:
         rms, torque = _torques(block['rms']), block.get('torque_rms')
         loud = None if torque is None else _torques(torque)
@@ -134,23 +136,25 @@ def misfit_of_block(block: Any) -> Misfit:
             }
             for name, value in found.items():
                 if value <= 0.0:
-                    raise ModelError(f'misfit: {name} is {value:g}, but has to be above zero')
+                    raise ModelError(f'misfit: {name} is {value:g}, but has to be positive')
             filters = RowFilters(found['rate_hz'], found['cutoff_hz'], round(found['decimation']))
     except (AttributeError, KeyError, TypeError) as fault:
-        raise ModelError(f'misfit: {type(fault).__name__} {fault}') from fault
+        problem = f'misfit: the block is not valid: {type(fault).__name__} {fault}'
+        raise ModelError(problem) from fault
     if data not in _DATA:
-        raise ModelError(f"misfit: data is '{data}', but has to be {' or '.join(_DATA)}")
+        raise ModelError(f"misfit: 'data' is '{data}', but has to be {' or '.join(_DATA)}")
     if loud is not None and not loud.keys() >= rms.keys():
-        raise ModelError('misfit: torque_rms has no value for some joints of rms')
+        raise ModelError("misfit: 'torque_rms' has to have all joints of 'rms'")
     relative = finite(error, 'relative_error_percent of the misfit')
     return Misfit(data, rms, relative, loud, filters=filters)
 
 
 def _torques(block: Any) -> dict[str, float]:
+    """Return the torques of joints in a block of model.yaml; ModelError if one is negative."""
     torques = {
         str(joint): finite(value, f"misfit of joint '{joint}'") for joint, value in block.items()
     }
     negative = [joint for joint, value in torques.items() if value < 0.0]
     if negative:
-        raise ModelError(f"misfit of joint '{negative[0]}' is negative")
+        raise ModelError(f"misfit: the value of joint '{negative[0]}' is negative")
     return torques

@@ -1,11 +1,11 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-model.yaml: an arm model as a file for people and simulators.
+model.yaml: the file of an arm model, for people and simulators.
 
 Schema armid/model/1: ``robot`` (shipped name or path of the description), ``gravity`` [m/s^2],
 ``rigid_parameters`` and ``effects``, each a list of parameters with name, joint, value, std, unit.
-A std of null means that the data did not determine the parameter by itself. An effect with
+A std of null means that the data did not determine the parameter individually. An effect with
 nonlinear parameters also has ``shapes``. An effect that ties the arm to another machine also has
 ``partner`` and ``ties``: points of both machines, in the frames of their joints [m]. An identified
 model also has ``misfit``; see `Misfit`.
@@ -53,14 +53,14 @@ def model_text(
     arm: ArmModel, robot: str, estimate: Estimate | None = None, misfit: Misfit | None = None
 ) -> str:
     """
-    Return the content of model.yaml.
+    Return the content of model.yaml for an arm model.
 
     Parameters
     ----------
     arm : ArmModel
         The model.
     robot : str
-        Shipped name or path of the description.
+        Name of a shipped robot, or path of the description.
     estimate : Estimate, optional
         Estimate with the standard deviations; only parameters that were estimated individually,
         not in a group, have a standard deviation.
@@ -68,7 +68,7 @@ def model_text(
         Misfit of the model.
 
     """
-    arm = in_words(arm)
+    arm = _with_catalogue_effects(arm)
     known: dict[tuple[str, str], float] = {}
     if estimate is not None:
         for name, std in zip(estimate.parameters, estimate.std, strict=True):
@@ -107,7 +107,7 @@ def save_model(
     misfit: Misfit | None = None,
 ) -> None:
     """
-    Write model.yaml.
+    Write an arm model to model.yaml.
 
     Parameters
     ----------
@@ -116,7 +116,7 @@ def save_model(
     arm : ArmModel
         The model.
     robot : str
-        Shipped name or path of the description; a relative path starts at the folder of the file.
+        Name of a shipped robot, or path of the description, relative to the folder of the file.
     estimate : Estimate, optional
         Estimate with the standard deviations.
     misfit : Misfit, optional
@@ -141,20 +141,20 @@ def save_model(
 
 def load_model(path: str | Path, robot: Robot | ArmModel | str | Path | None = None) -> ArmModel:
     """
-    Read model.yaml.
+    Read an arm model from model.yaml.
 
     Parameters
     ----------
     path : str or Path
         The file.
     robot : robot, model, name or path, optional
-        Description to use instead of the one in the file; its inertial parameters and gravity
-        are replaced by those of the file.
+        Description to use instead of that in the file; its inertial parameters and gravity are
+        replaced by those in the file.
 
     Returns
     -------
     ArmModel
-        The robot with the masses and effects of the file.
+        The robot with the inertial parameters, gravity and effects in the file.
 
     Raises
     ------
@@ -174,7 +174,7 @@ def load_model(path: str | Path, robot: Robot | ArmModel | str | Path | None = N
     path = Path(path)
     if path.is_dir():
         inside = path / 'model.yaml'
-        hint = f'name the model in it, {inside}' if inside.is_file() else 'there is no model.yaml'
+        hint = f'give {inside}' if inside.is_file() else 'the folder has no model.yaml'
         raise ModelError(f'{path}: this is a folder, not a model.yaml; {hint}')
     if isinstance(robot, ArmModel):
         robot = robot.robot
@@ -192,12 +192,12 @@ def load_model(path: str | Path, robot: Robot | ArmModel | str | Path | None = N
 
 def load_misfit(path: str | Path) -> Misfit | None:
     """
-    Read the misfit of a model from model.yaml; None if the file has none.
+    Read the misfit of a model from model.yaml; None if the file has no misfit.
 
     Parameters
     ----------
     path : str or Path
-        model.yaml.
+        The model.yaml.
 
     Raises
     ------
@@ -214,7 +214,7 @@ def load_misfit(path: str | Path) -> Misfit | None:
 
 def read_model(text: str, robot: Robot, source: str) -> ArmModel:
     """
-    Parse the text of a model.yaml.
+    Return the arm model in the text of a model.yaml.
 
     Parameters
     ----------
@@ -223,7 +223,7 @@ def read_model(text: str, robot: Robot, source: str) -> ArmModel:
     robot : Robot
         The description; its inertial parameters and gravity are replaced by those of the text.
     source : str
-        Name of the source of the text, for messages.
+        Name of the source of the text, for error messages.
 
     Raises
     ------
@@ -235,14 +235,14 @@ def read_model(text: str, robot: Robot, source: str) -> ArmModel:
         return _arm(checked_model(text), robot)
 
 
-def with_named(arm: ArmModel, effect: Effect, values: FloatArray) -> ArmModel:
-    """Return the arm with an effect added; its values add to existing ones."""
-    there = place_in(arm, effect)
+def add_effect(arm: ArmModel, effect: Effect, values: FloatArray) -> ArmModel:
+    """Return the arm with an effect added; if the arm has the effect, the values are added."""
+    there = _find_effect(arm, effect)
     if there is None:
-        words = effect.named_as(values, arm)
-        if all(one.linear and place_in(arm, one) for one, _ in words):
-            for one, own_values in words:
-                arm = with_named(arm, one, own_values)
+        named = effect.named_as(values, arm)
+        if all(one.linear and _find_effect(arm, one) for one, _ in named):
+            for one, own_values in named:
+                arm = add_effect(arm, one, own_values)
             return arm
         return arm.with_effect(effect, values)
     position, rows = there
@@ -251,8 +251,8 @@ def with_named(arm: ArmModel, effect: Effect, values: FloatArray) -> ArmModel:
     return replace(arm, values=(*arm.values[:position], changed, *arm.values[position + 1 :]))
 
 
-def place_in(arm: ArmModel, effect: Effect) -> tuple[int, list[int]] | None:
-    """Return where the arm has an effect: index and rows of its parameters, or None."""
+def _find_effect(arm: ArmModel, effect: Effect) -> tuple[int, list[int]] | None:
+    """Return the index of an effect in the arm and those of its parameters; None if missing."""
     wanted = [(p.name, p.joint) for p in effect.parameters(arm.robot)]
     for position, own in enumerate(arm.effects):
         if isinstance(effect, type(own)) and not own.shapes and not own.points:
@@ -262,28 +262,23 @@ def place_in(arm: ArmModel, effect: Effect) -> tuple[int, list[int]] | None:
     return None
 
 
-def in_words(arm: ArmModel) -> ArmModel:
-    """
-    Return the arm with effects of the catalogue in place of effects that only a search uses.
-
-    Effects for searches only are converted: a gravity vector becomes base tilt and gravity
-    magnitude.
-
-    """
-    translated = replace(arm, effects=(), values=())
+def _with_catalogue_effects(arm: ArmModel) -> ArmModel:
+    """Return the arm with catalogue effects in place of effects that only searches use."""
+    # a gravity vector, for example, becomes a tilt of the base and a magnitude of gravity
+    converted = replace(arm, effects=(), values=())
     for effect, values in zip(arm.effects, arm.values, strict=True):
-        words = effect.named_as(values, arm)
-        if len(words) == 1 and words[0][0] == effect:
-            translated = translated.with_effect(effect, values)
+        named = effect.named_as(values, arm)
+        if len(named) == 1 and named[0][0] == effect:
+            converted = converted.with_effect(effect, values)
             continue
-        for one, own_values in words:
-            translated = with_named(translated, one, own_values)
-    return translated
+        for one, own_values in named:
+            converted = add_effect(converted, one, own_values)
+    return converted
 
 
 def checked_model(text: str) -> dict[str, Any]:
     """
-    Return a validated document of a model.yaml: keys, numbers and units.
+    Parse the text of a model.yaml, and check its keys, numbers and units.
 
     Parameters
     ----------
@@ -298,12 +293,13 @@ def checked_model(text: str) -> dict[str, Any]:
     """
     document = load_yaml(text)
     if not isinstance(document, dict) or document.get('schema') != SCHEMA:
-        raise ModelError(f"this is not an arm model: its 'schema' has to be {SCHEMA}")
+        raise ModelError(f"the file is not an arm model: its 'schema' has to be {SCHEMA}")
     strange = [key for key in document if key not in _KEYS]
     if strange:
         line = yaml_line(text, (strange[0],))
         raise ModelError(
-            f"line {line}: unknown key '{str(strange[0])[:40]}'; a model has {', '.join(_KEYS)}"
+            f"line {line}: the key '{str(strange[0])[:40]}' is not known; the keys of a model are "
+            f'{", ".join(_KEYS)}'
         )
     _require(document, _NEEDED, 'a model')
     for place, row, units in _rows(document, text):
@@ -314,7 +310,7 @@ def checked_model(text: str) -> dict[str, Any]:
 
 
 def _wrong_unit(row: Mapping[str, Any], units: Collection[str]) -> str:
-    """Return an error if the unit of a parameter is wrong; empty if it is correct or missing."""
+    """Return an error message if the unit of a parameter is wrong; empty if right or missing."""
     if not units or row.get('unit', next(iter(units))) in units:
         return ''
     expected = ' or '.join(f"'{unit}'" for unit in units)
@@ -324,13 +320,13 @@ def _wrong_unit(row: Mapping[str, Any], units: Collection[str]) -> str:
 def _rows(
     document: Mapping[str, Any], text: str
 ) -> Iterator[tuple[tuple[str | int, ...], Any, tuple[str, ...]]]:
-    """Yield for each parameter its keys in the file, the parameter, and its units (empty: any)."""
+    """Yield the keys in the file, the content and the permitted units of each parameter."""
     for k, row in enumerate(document['rigid_parameters']):
         yield ('rigid_parameters', k), row, link_unit(_name(row))
     for k, entry in enumerate(document['effects']):
         if not isinstance(entry, dict):
             line = yaml_line(text, ('effects', k))
-            raise ModelError(f'line {line}: an effect has to have {", ".join(_NEEDED_OF_EFFECT)}')
+            raise ModelError(f'line {line}: an effect needs {", ".join(_NEEDED_OF_EFFECT)}')
         _require(entry, _NEEDED_OF_EFFECT, f"effect '{str(entry.get('name'))[:40]}'")
         kind = CATALOGUE.find(str(entry['name']))
         known: tuple[Quantity | Shape, ...] = (*kind.quantities, *kind.shapes)
@@ -341,20 +337,20 @@ def _rows(
 
 
 def _fault(row: Any, units: tuple[str, ...]) -> tuple[str, str]:
-    """Return key and error of a parameter in the file; the error is empty if it is correct."""
+    """Return the key and the error message of an invalid parameter; empty if it is valid."""
     if not isinstance(row, dict):
         keys = ', '.join(_KEYS_OF_PARAMETER)
-        return '', f'a parameter has {keys}; here is {str(row)[:40]!r}'
+        return '', f'a parameter has {keys}, but this entry is {str(row)[:40]!r}'
     called = _called(row)
     strange = [str(key) for key in row if key not in _KEYS_OF_PARAMETER]
     if strange:
         known = ', '.join(_KEYS_OF_PARAMETER)
         return strange[0], (
-            f"{called}: no key '{strange[0][:40]}' is known; a parameter has {known}"
+            f"{called}: the key '{strange[0][:40]}' is not known; the keys are {known}"
         )
     missing = [key for key in _NEEDED_OF_PARAMETER if key not in row]
     if missing:
-        return 'name', f"{called}: no '{missing[0]}'"
+        return 'name', f"{called}: '{missing[0]}' is missing"
     try:
         finite(row['value'], called)
     except ValueError as fault:
@@ -362,27 +358,31 @@ def _fault(row: Any, units: tuple[str, ...]) -> tuple[str, str]:
     return 'unit', _wrong_unit(row, units)
 
 
-def _require(content: Mapping[str, Any], keys: Collection[str], whose: str) -> None:
+def _require(content: Mapping[str, Any], keys: Collection[str], part: str) -> None:
+    """Raise ModelError if a part of the document lacks one of its keys."""
     missing = [key for key in keys if key not in content]
     if missing:
-        raise ModelError(f"{whose}: no '{missing[0]}'; it needs {', '.join(keys)}")
+        raise ModelError(f"{part}: '{missing[0]}' is missing; needed are {', '.join(keys)}")
 
 
 def _name(row: Any) -> str:
+    """Return the name of a parameter in the document; empty if the entry is not valid."""
     return str(row.get('name')) if isinstance(row, dict) else ''
 
 
 def _called(row: Mapping[str, Any]) -> str:
+    """Return name and joint of a parameter in the document, for error messages."""
     return f"parameter '{row.get('name')}' of joint '{row.get('joint')}'"
 
 
 def _arm(document: dict[str, Any], robot: Robot) -> ArmModel:
+    """Return the arm model in a checked document, on a robot."""
     try:
         gravity = [finite(part, 'gravity') for part in document['gravity']]
         arm = ArmModel(robot.with_gravity(np.array(gravity).reshape(3)))
     except (TypeError, ValueError):
         raise ModelError(
-            "'gravity' has to be three finite numbers [m/s^2] in the frame of the base, as "
+            "'gravity' has to be three finite numbers [m/s^2] in the base frame, such as "
             f'[0, 0, -9.81], not {str(document["gravity"])[:40]!r}'
         ) from None
     arm = arm.with_theta(_values(document['rigid_parameters'], arm.parameters))
@@ -401,20 +401,20 @@ def _arm(document: dict[str, Any], robot: Robot) -> ArmModel:
 
 
 def _values(rows: Sequence[dict[str, Any]], names: Sequence[ParameterName]) -> FloatArray:
-    """Return the values of parameters; each has to be given once, in its unit."""
+    """Return the values of parameters from their entries; each has to occur once, in its unit."""
     table: dict[tuple[str, str], dict[str, Any]] = {}
     units = {(name.name, name.joint): [name.unit] for name in names}
     for row in rows:
         key = str(row['name']), str(row['joint'])
         if key in table:
-            raise ModelError(f'{_called(row)} is given twice')
+            raise ModelError(f'{_called(row)} occurs twice; remove one of the entries')
         table[key] = row
         if wrong := _wrong_unit(row, units.get(key, ())):
             raise ModelError(wrong)
     missing = [name for name in names if (name.name, name.joint) not in table]
     if missing:
         raise ModelError(
-            f"parameter '{missing[0].name}' of joint '{missing[0].joint}' is missing; is this the "
-            'file of another robot?'
+            f"parameter '{missing[0].name}' of joint '{missing[0].joint}' is missing; check that "
+            'the file belongs to this robot'
         )
     return np.array([float(table[name.name, name.joint]['value']) for name in names])

@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Checks of the contract of effects, for tests of user-defined effects.
+Checks that an effect class keeps the contract of effects, for tests of own effects.
 
 In a test of a package that provides an effect::
 
@@ -10,7 +10,7 @@ In a test of a package that provides an effect::
     def test_hose_keeps_the_contract():
         check_effect(Hose)
 
-Simulation, identification and diagnosis rely only on the checked properties. Each check is a
+Simulation, identification and diagnosis depend only on the checked properties. Each check is a
 function of an ``EffectCase`` that raises AssertionError. ``CHECKS`` contains all checks.
 
 """
@@ -36,7 +36,7 @@ _STEP = 1e-6
 @dataclass(frozen=True)
 class EffectCase:
     """
-    A test case: an effect on a robot, with values and a motion.
+    Test case: an effect on a robot, with parameter values and a motion.
 
     Attributes
     ----------
@@ -45,7 +45,7 @@ class EffectCase:
     robot : Robot
         The arm.
     motion : Motion
-        N samples in sines, with a measured torque.
+        N samples of sine motions, with a measured torque.
     values : ndarray, shape (P,)
         Typical values, of both signs if both are possible.
 
@@ -66,14 +66,14 @@ class EffectCase:
         seed: int = 3,
     ) -> EffectCase:
         """
-        Make a test case of a class of effects.
+        Make a test case of a class of effects, with random values and a smooth motion.
 
         Parameters
         ----------
         kind : type of Effect
-            The class.
+            The class of the effect.
         robot : Robot, optional
-            The shipped arm by default.
+            The arm; by default the shipped humanoid_arm.
         size : array_like, optional
             Size of each quantity; by default the geometric mean of the typical range.
         seed : int
@@ -96,7 +96,7 @@ class EffectCase:
         return cls(effect, robot, motion, np.clip(values, *effect.bounds()))
 
     def arm(self, values: npt.ArrayLike) -> ArmModel:
-        """Return the arm with the effect."""
+        """Return the arm model with the effect at given parameter values."""
         return ArmModel(self.robot).with_effect(self.effect, values)
 
     def torque(self, values: FloatArray) -> FloatArray:
@@ -105,7 +105,7 @@ class EffectCase:
 
 
 def sines(robot: Robot, duration: float = 0.5, rate: float = 200.0) -> Motion:
-    """Return a motion of sines within the limits, different in every joint, without torque."""
+    """Return a motion of sines within the position limits, different in every joint."""
     t = np.arange(0.0, duration, 1.0 / rate)
     frequency = 2.0 * np.pi * np.linspace(0.4, 2.1, robot.n_joints)
     phase = frequency * t[:, np.newaxis] + np.arange(robot.n_joints)
@@ -123,14 +123,14 @@ def sines(robot: Robot, duration: float = 0.5, rate: float = 200.0) -> Motion:
 
 def check_effect(kind: type[Effect], robot: Robot | None = None) -> None:
     """
-    Check that an effect class satisfies the interface of `Effect`.
+    Check that an effect class keeps the contract of `Effect`; raise AssertionError if not.
 
     Parameters
     ----------
     kind : type of Effect
-        The class; it need not be registered.
+        The class of the effect; it need not be registered.
     robot : Robot, optional
-        An arm for which the effect is meant; a shipped arm by default.
+        An arm for which the effect is made; a shipped arm by default.
 
     Raises
     ------
@@ -153,17 +153,17 @@ def check_effect(kind: type[Effect], robot: Robot | None = None) -> None:
         try:
             check(trial)
         except Exception as fault:  # a user-defined effect may raise any exception
-            said = ' '.join(str(fault).split())
+            reason = ' '.join(str(fault).split())
             kind_of_fault = '' if isinstance(fault, AssertionError) else type(fault).__name__ + ' '
-            wrong.append(f'{check.__name__.replace("_", " ")}: {kind_of_fault}{said}')
+            wrong.append(f'{check.__name__.replace("_", " ")}: {kind_of_fault}{reason}')
     if wrong:
-        raise AssertionError(f'{kind.name} breaks the contract of effects: ' + '; '.join(wrong))
+        raise AssertionError(f'the effect {kind.name} fails the checks: {"; ".join(wrong)}')
 
 
-def it_says_what_it_is(trial: EffectCase) -> None:
-    """Fail if the effect lacks a docstring, bounds or names."""
+def docstring_bounds_and_names_are_valid(trial: EffectCase) -> None:
+    """Fail if the effect class lacks a docstring, or its bounds and names are invalid."""
     kind = type(trial.effect)
-    assert kind.__doc__ and not kind.__doc__.startswith(f'{kind.__name__}('), 'no docstring'
+    assert kind.__doc__ and not kind.__doc__.startswith(f'{kind.__name__}('), 'it has no docstring'
     for quantity in kind.quantities:
         assert quantity.lower < quantity.upper, f'{quantity.name} has no range'
         if quantity.typical is not None:
@@ -172,35 +172,35 @@ def it_says_what_it_is(trial: EffectCase) -> None:
             assert within, f'typical sizes of {quantity.name} are {quantity.typical}'
     names = [(p.name, p.joint) for p in trial.effect.parameters(trial.robot)]
     assert len(set(names)) == len(names), f'parameters share a name: {names}'
-    assert len(names) == len(trial.effect.bounds()[0]), 'not one bound for each parameter'
+    assert len(names) == len(trial.effect.bounds()[0]), 'bounds() needs one bound per parameter'
 
 
-def columns_have_one_place_per_parameter(trial: EffectCase) -> None:
-    """Fail if columns have nonfinite values or a shape other than (N, n, P)."""
+def columns_are_finite_and_one_per_parameter(trial: EffectCase) -> None:
+    """Fail if columns are not finite, or their shape is not (N, n, P)."""
     columns = ArmModel(trial.robot).columns_of(trial.effect, trial.motion)
     assert np.all(np.isfinite(columns)), 'columns are not finite'
 
 
 def size_zero_changes_nothing(trial: EffectCase) -> None:
-    """Fail if the effect acts with zero values."""
+    """Fail if the effect changes the torque when its parameters are zero."""
     bare = ArmModel(trial.robot).torque(trial.motion)
     np.testing.assert_allclose(trial.torque(0.0 * trial.values), bare, atol=1e-12)
 
 
 def columns_are_the_derivative_at_zero(trial: EffectCase) -> None:
-    """Fail if ``columns`` and ``action`` do not agree for a small effect."""
+    """Fail if ``columns`` is not the derivative of the torque by ``action`` at zero."""
     columns = ArmModel(trial.robot).columns_of(trial.effect, trial.motion)
     _compare(trial, np.zeros_like(trial.values), columns)
 
 
 def columns_are_the_derivative_at_any_size(trial: EffectCase) -> None:
-    """Fail if ``columns`` and ``action`` do not agree for an effect of typical size."""
+    """Fail if ``columns`` is not the derivative of the torque by ``action`` at typical values."""
     columns = trial.arm(trial.values).columns(trial.motion)
     _compare(trial, trial.values, columns[:, :, -len(trial.values) :])
 
 
 def linear_means_exact(trial: EffectCase) -> None:
-    """Fail if the torque of a linear effect differs from columns times values."""
+    """Fail if the torque of a linear effect differs from columns times parameter values."""
     if trial.effect.linear:
         bare = ArmModel(trial.robot)
         columns = bare.columns_of(trial.effect, trial.motion)
@@ -210,7 +210,7 @@ def linear_means_exact(trial: EffectCase) -> None:
 
 
 def instantaneous_means_sample_by_sample(trial: EffectCase) -> None:
-    """Fail if columns of an instantaneous effect depend on neighbouring samples."""
+    """Fail if the columns of an instantaneous effect depend on neighbouring samples."""
     if trial.effect.instantaneous:
         arm, part = ArmModel(trial.robot), slice(40, 60)
         whole = arm.columns_of(trial.effect, trial.motion)[part]
@@ -220,7 +220,7 @@ def instantaneous_means_sample_by_sample(trial: EffectCase) -> None:
 
 
 def shapes_stay_possible(trial: EffectCase) -> None:
-    """Fail if default shapes or start values of a search are outside the bounds."""
+    """Fail if default shapes, or initial shapes of a search, are outside their bounds."""
     effect, motion = trial.effect, trial.motion
     assert motion.tau is not None
     nothing = np.zeros((*motion.q.shape, 0))
@@ -234,13 +234,13 @@ def shapes_stay_possible(trial: EffectCase) -> None:
             assert inside, f'{shape.name}: {value} is beyond its bounds'
 
 
-def it_goes_to_other_processes(trial: EffectCase) -> None:
-    """Fail if the effect cannot be pickled."""
+def effect_can_be_pickled(trial: EffectCase) -> None:
+    """Fail if the effect cannot be pickled, as for other processes."""
     assert pickle.loads(pickle.dumps(trial.effect)) == trial.effect
 
 
 def _compare(trial: EffectCase, values: FloatArray, columns: FloatArray) -> None:
-    """Compare columns with finite differences, one-sided at a lower bound."""
+    """Compare columns with finite differences of the torque, one-sided at a lower bound."""
     lower, _ = trial.effect.bounds()
     for parameter, step in enumerate(_STEP * np.eye(len(values))):
         if values[parameter] - _STEP > lower[parameter]:
@@ -257,13 +257,13 @@ def _compare(trial: EffectCase, values: FloatArray, columns: FloatArray) -> None
 
 #: All checks, in order.
 CHECKS: tuple[Callable[[EffectCase], None], ...] = (
-    it_says_what_it_is,
-    columns_have_one_place_per_parameter,
+    docstring_bounds_and_names_are_valid,
+    columns_are_finite_and_one_per_parameter,
     size_zero_changes_nothing,
     columns_are_the_derivative_at_zero,
     columns_are_the_derivative_at_any_size,
     linear_means_exact,
     instantaneous_means_sample_by_sample,
     shapes_stay_possible,
-    it_goes_to_other_processes,
+    effect_can_be_pickled,
 )

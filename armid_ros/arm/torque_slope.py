@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Derivatives of the torque of an arm by its motion, with all effects."""
+"""Derivatives of the torque of an arm, with all effects, by its motion."""
 
 from __future__ import annotations
 
@@ -16,19 +16,19 @@ import numpy as np
 @dataclass(frozen=True)
 class TorqueSlope:
     """
-    Derivatives of the torque of an arm, ``ArmModel.joint_torque``, along a motion.
+    Derivatives of the true joint torque of an arm by q, dq and ddq along a motion.
 
-    The direction of motion in dry friction, and the twist between motors and links, are
-    constants.
+    The torque is that of ``ArmModel.joint_torque``. The direction of motion in dry friction, and
+    the twist between motors and links, are held constant.
 
     Attributes
     ----------
     motion : Motion
         N samples.
     by_q, by_dq, by_ddq : ndarray, shape (N, n, n)
-        Derivatives; [k, j, m] is that of the torque of joint j by joint m in sample k.
+        Derivatives; element [k, j, m] is that of the torque of joint j by joint m in sample k.
     hysteresis : Hysteresis or None
-        Friction that depends on the motion before a sample as well.
+        Friction that also depends on the motion before a sample.
 
     """
 
@@ -40,9 +40,9 @@ class TorqueSlope:
 
     @classmethod
     def of(cls, arm: ArmModel, motion: Motion) -> TorqueSlope:
-        """Differentiate the torque of an arm along a motion."""
+        """Differentiate the joint torque of an arm along a motion."""
         action, link = arm.along(motion).action(), arm.link_motion(motion)
-        slopes = inverse_dynamics_derivatives(arm.body, arm.felt(link))
+        slopes = inverse_dynamics_derivatives(arm.body, arm.rigid_body_motion(link))
         if arm.quasi_static:
             slopes = slopes[0], np.zeros_like(slopes[1]), np.zeros_like(slopes[2])
         together = arm.with_load_friction(motion, np.concatenate(slopes, axis=2))
@@ -59,7 +59,7 @@ class TorqueSlope:
 
     def pullback(self, weights: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """
-        Differentiate the sum of weights * torque by q, dq and ddq.
+        Differentiate a weighted sum of all joint torques by q, dq and ddq.
 
         Parameters
         ----------

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The rigid body: inverse dynamics, regressor, base parameters, gravity composites."""
+"""Rigid-body model of an arm: inverse dynamics, regressor, base parameters and link frames."""
 
 from armid_ros.model.base_parameters import (
     BaseParameters,

@@ -1,12 +1,12 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Base parameters: the identifiable combinations of parameters.
+Base parameters: the identifiable combinations of standard parameters.
 
 The columns of a regressor are linearly dependent. In a chosen order, each column in the span of
-the kept columns is dropped, and its parameter is grouped with their parameters. The results are
-the groupings of Gautier (1991), such as 'Ixx2 - Iyy2'. The method is a QR factorisation; the
-remaining length of each column reveals the rank.
+the kept columns is dropped, and its parameter is grouped with the parameters of these columns.
+The results are the groupings of Gautier (1991), such as 'Ixx2 - Iyy2'. The method is a QR
+factorisation; the length of each column outside the span of the kept columns reveals the rank.
 
 """
 
@@ -20,8 +20,8 @@ from armid_ros.robots import NO_MASS, Robot
 import numpy as np
 import numpy.typing as npt
 
-#: Part of a unit column outside the span of the kept columns, below which it is dependent.
-#: Dependent columns have 1e-15 to 1e-13 by rounding; independent ones rarely have less than 1e-5.
+#: Length of a unit column outside the span of the kept columns, below which it is dependent.
+#: Rounding gives dependent columns 1e-15 to 1e-13; independent columns rarely have below 1e-5.
 RANK_TOLERANCE = 1e-9
 
 
@@ -33,7 +33,7 @@ _KEEP_ORDER = ('Ixx', 'Ixy', 'Ixz', 'Iyy', 'Iyz', 'Izz', 'mx', 'my', 'mz', 'm')
 @dataclass(frozen=True)
 class BaseParameters:
     """
-    Identifiable combinations of a list of standard parameters.
+    Identifiable combinations of a list of standard parameters, named by expressions.
 
     Attributes
     ----------
@@ -60,7 +60,7 @@ class BaseParameters:
 
     @property
     def terms(self) -> tuple[dict[str, float], ...]:
-        """Factors of the standard parameters in each base parameter, by symbol."""
+        """Return the factor of each standard parameter in each base parameter, by symbol."""
         symbols = [symbol(parameter) for parameter in self.standard]
         return tuple(
             {symbols[column]: float(row[column]) for column in np.flatnonzero(row)}
@@ -71,12 +71,12 @@ class BaseParameters:
         self, standard: tuple[ParameterName, ...], columns: npt.NDArray[np.intp]
     ) -> BaseParameters:
         """
-        Return these base parameters for a longer list of parameters; they ignore the added ones.
+        Return these base parameters as functions of a longer list of standard parameters.
 
         Parameters
         ----------
         standard : tuple of ParameterName
-            The longer list.
+            The longer list; its added parameters have the factor 0.
         columns : ndarray of int, shape (P,)
             Positions of the present standard parameters in the longer list.
 
@@ -87,12 +87,12 @@ class BaseParameters:
         return BaseParameters(standard, self.parameters, independent, read_only(grouping))
 
     def values(self, theta: npt.ArrayLike) -> FloatArray:
-        """Return the base parameters, shape (r,), of standard parameters, shape (P,)."""
+        """Return the values of the base parameters (r,), given standard parameters (P,)."""
         return np.asarray(self.grouping @ np.asarray(theta, dtype=float))
 
     def lift(self, beta: npt.ArrayLike, prior: npt.ArrayLike) -> FloatArray:
         """
-        Return the standard parameters with given base parameters that are nearest to a prior.
+        Return the standard parameters nearest to a prior that have given base parameters.
 
         Parameters
         ----------
@@ -119,7 +119,7 @@ def group_columns(
     w: FloatArray, standard: tuple[ParameterName, ...], tolerance: float = RANK_TOLERANCE
 ) -> BaseParameters:
     """
-    Find the base parameters of a regressor: group its dependent columns.
+    Group the dependent columns of a regressor, and return its base parameters.
 
     Parameters
     ----------
@@ -129,7 +129,8 @@ def group_columns(
         Names of the P columns. Earlier columns are kept in preference to later ones; within a
         link, inertia is kept first and mass last.
     tolerance : float
-        Share of its length outside the span of the kept columns, below which a column is grouped.
+        Share of a column's length outside the span of the kept columns, below which the column is
+        grouped.
 
     Returns
     -------
@@ -174,15 +175,15 @@ def group_columns(
 
 def regroup(theory: BaseParameters, data: BaseParameters) -> BaseParameters:
     """
-    Join two steps of grouping: for any motion, and for given data.
+    Combine the grouping that holds for any motion with a further grouping for given data.
 
     Parameters
     ----------
     theory : BaseParameters
         Combinations that are identifiable with a suitable motion.
     data : BaseParameters
-        Combinations of these that the data identify; its standard parameters are those that
-        `theory` keeps.
+        Combinations of these combinations that the data identify. Its standard parameters are the
+        parameters that `theory` keeps.
 
     """
     independent = theory.independent[data.independent]
@@ -192,6 +193,7 @@ def regroup(theory: BaseParameters, data: BaseParameters) -> BaseParameters:
 def _named(
     standard: tuple[ParameterName, ...], independent: npt.NDArray[np.intp], grouping: FloatArray
 ) -> BaseParameters:
+    """Return base parameters with names by their grouping, whose rounding errors become zero."""
     grouping = np.where(np.abs(grouping) < RANK_TOLERANCE, 0.0, grouping)
     parameters = tuple(
         replace(standard[leader], name=_expression(row, leader, standard))
@@ -202,10 +204,11 @@ def _named(
 
 def levelled(robot: Robot) -> Robot:
     """
-    Return the robot with gravity along an axis of its first joint, if it nearly is.
+    Return the robot with gravity exactly along a joint axis, if rounding tilts it slightly.
 
-    A hanging base with a rounded angle of 3.1416 excites first moments by 7e-6 of their weight,
-    which is far below noise.
+    Components of gravity below 0.2 %, across the axes of the first joint, become zero. A hanging
+    base with a rounded angle of 3.1416 excites first moments by 7e-6 of their weight, far below
+    the noise.
 
     """
     turn = robot.model.jointPlacements[1].rotation
@@ -215,18 +218,18 @@ def levelled(robot: Robot) -> Robot:
 
 
 def _symbol_of(parameter: ParameterName) -> str:
-    """Return the name of a parameter without the number of its link."""
+    """Return the name of a parameter without the number of its link: 'mx' for 'mx2'."""
     return parameter.name.rstrip('0123456789')
 
 
 def symbol(parameter: ParameterName) -> str:
-    """Return the symbol of a parameter, with its joint unless the name ends with a number."""
+    """Return the name of a parameter, with its joint unless the name ends with a link number."""
     numbered = parameter.name[-1:].isdigit() or not parameter.joint
     return parameter.name if numbered else f'{parameter.name}[{parameter.joint}]'
 
 
 def _expression(row: FloatArray, leader: int, standard: tuple[ParameterName, ...]) -> str:
-    """Format a linear combination, with common factors in front of sums."""
+    """Return a linear combination of parameters as text: 'Izz1 + 0.25 (m2 + m3)'."""
     text = standard[leader].name
     factors: dict[float, list[tuple[float, str]]] = {}
     # angles rounded to four digits make factors of 4e-6

@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-The compiled kernel, `kernel.c`, and rigid bodies in its format.
+Access to the compiled kernel, `kernel.c`, and rigid bodies in its format.
 
 The kernel computes torques and regressors over whole motions, and steps of the simulation. It is
 compiled at installation. Without a compiler, Pinocchio and Python compute the same numbers.
@@ -39,14 +39,14 @@ _JOINT = np.dtype(
 
 class Structure(ctypes.Structure):
     """
-    Base of the C structures of the kernel.
+    Base class of the C structures that the kernel reads.
 
     Attributes
     ----------
     arrays : tuple of ndarray
-        Arrays whose addresses the structure has; they live as long as it does.
+        Arrays whose addresses are in the structure; they live as long as the structure.
     address : int
-        Address of the structure.
+        Address of the structure in memory.
 
     """
 
@@ -54,12 +54,12 @@ class Structure(ctypes.Structure):
 
     @property
     def address(self) -> int:
-        """Return the address of the structure."""
+        """Return the address of the structure in memory."""
         return ctypes.addressof(self)
 
 
 class BodyOfKernel(Structure):
-    """A rigid body of n joints in the format of the kernel."""
+    """Rigid body of n joints in the format of the kernel."""
 
     _fields_ = (
         ('n', COUNT),
@@ -70,7 +70,7 @@ class BodyOfKernel(Structure):
 
     def along(self, motion: Motion, quantity: str, out: FloatArray) -> None:
         """
-        Compute a quantity of the rigid body along a motion.
+        Compute the torques or regressors of the rigid body along a motion.
 
         Parameters
         ----------
@@ -79,7 +79,7 @@ class BodyOfKernel(Structure):
         quantity : str
             'torques', (N, n), or 'regressors', (N, n, 10 n).
         out : ndarray
-            Array for the result; it has to be zero before the call.
+            Array for the result; it has to contain zeros before the call.
 
         """
         arrays = [np.ascontiguousarray(x) for x in (motion.q, motion.dq, motion.ddq)]
@@ -89,7 +89,7 @@ class BodyOfKernel(Structure):
 
 @cache
 def kernel() -> ctypes.CDLL | None:
-    """Return the compiled kernel; None if it was not compiled."""
+    """Load the compiled kernel; return None if it was not compiled."""
     found = find_spec('armid_ros.model._kernel')
     if found is None or found.origin is None:
         return None
@@ -106,7 +106,7 @@ def kernel_body(
     robot: Robot, added_inertia: FloatArray | None = None, weighs: bool = True
 ) -> BodyOfKernel | None:
     """
-    Return a rigid-body model in the format of the kernel.
+    Convert the rigid body of a robot to the format of the kernel.
 
     Parameters
     ----------
@@ -120,7 +120,7 @@ def kernel_body(
     Returns
     -------
     BodyOfKernel or None
-        None without a compiled kernel, or for more joints than it supports.
+        None without a compiled kernel, or for more joints than the kernel supports.
 
     """
     library, n = kernel(), robot.n_joints

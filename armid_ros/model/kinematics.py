@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Points of links along whole motions: all samples at once, joint by joint."""
+"""Positions, velocities and Jacobians of points on links, for all samples of a motion at once."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ def points_motion(
     robot: Robot, joints: Sequence[str], offsets: FloatArray, q: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """
-    Return the positions and Jacobians of points of links.
+    Return the positions and Jacobians of points on links along joint positions.
 
     Parameters
     ----------
@@ -42,14 +42,14 @@ def points_motion(
 
 @dataclass(frozen=True)
 class _Frame:
-    """A link: rotation (3, 3, N), origin (3, N), and the joints that move it."""
+    """Frame of a link at N samples: rotation (3, 3, N), origin (3, N), and its moving joints."""
 
     rotation: FloatArray
     origin: FloatArray
     movers: tuple[int, ...]
 
     def turned(self, vectors: FloatArray) -> FloatArray:
-        """Return vectors of the link, (3,), (3, N) or (3, m, N), in the base frame."""
+        """Rotate vectors (3,), (3, N) or (3, m, N) from the link frame to the base frame."""
         x, y, z = (self.rotation[:, axis] for axis in range(3))
         if vectors.ndim == 3:
             x, y, z = x[:, np.newaxis], y[:, np.newaxis], z[:, np.newaxis]
@@ -59,7 +59,7 @@ class _Frame:
 @dataclass(frozen=True)
 class LinkFrames:
     """
-    Frames of links along a motion.
+    Frames of links and twists of joints along a motion.
 
     Samples are on the last axis of attributes, and on the first axis of results.
 
@@ -86,7 +86,7 @@ class LinkFrames:
     @classmethod
     def of(cls, robot: Robot, q: FloatArray, joints: Sequence[str] | None = None) -> LinkFrames:
         """
-        Return the frames of the links that some joints move.
+        Compute the frames of the links that some joints move.
 
         Parameters
         ----------
@@ -95,7 +95,7 @@ class LinkFrames:
         q : ndarray, shape (N, n)
             Joint positions.
         joints : sequence of str, optional
-            The joints; all by default.
+            Joints that move the links; all by default.
 
         Raises
         ------
@@ -124,16 +124,16 @@ class LinkFrames:
 
     @classmethod
     def in_the_middle(cls, robot: Robot) -> LinkFrames:
-        """Return the frames with all joints in the middle of their range; 0 without limits."""
+        """Compute the frames with all joints in the middle of their range; at 0 without limits."""
         return cls.of(robot, robot.middle_pose[np.newaxis])
 
     def places(self, joint: str, offset: FloatArray) -> FloatArray:
-        """Return the positions of a point (3,) of the link of a joint, shape (N, 3) [m]."""
+        """Return the positions (N, 3) [m] of a point (3,) on the link that a joint moves."""
         frame = self.frames[self.joints.index(joint)]
         return np.asarray((frame.origin + frame.turned(offset)).T)
 
     def points(self, joints: Sequence[str], offsets: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return positions (N, k, 3) and Jacobians (N, k, 3, n) as `points_motion` does."""
+        """Return the positions (N, k, 3) and Jacobians (N, k, 3, n) of points on links."""
         positions = np.empty((len(joints), 3, self.lines.shape[2]))
         jacobians = np.zeros((len(joints), *self.lines.shape))
         for k, (joint, offset) in enumerate(zip(joints, offsets, strict=True)):
@@ -144,14 +144,14 @@ class LinkFrames:
         return positions.transpose(2, 0, 1), self._by_driven(by_moving)
 
     def _by_driven(self, by_moving: FloatArray) -> FloatArray:
-        """Convert derivatives by the moving joints, (N, ..., m), to the driven joints."""
+        """Convert derivatives by moving joints (N, ..., m) to derivatives by driven joints."""
         if self.coupling is None:
             return by_moving
         return np.asarray(np.einsum('k...m,kmn->k...n', by_moving, self.coupling))
 
     def torques(self, joint: str, places: FloatArray, forces: FloatArray) -> FloatArray:
         """
-        Return the joint torques J^T f of forces on a link.
+        Return the joint torques J^T f of forces that act on a link.
 
         Parameters
         ----------
@@ -174,7 +174,7 @@ class LinkFrames:
 
 
 def _cross(a: FloatArray, b: FloatArray) -> FloatArray:
-    """Return the vector products of columns, (3, N)."""
+    """Return the cross products of the columns of two arrays, (3, N)."""
     result = np.empty(b.shape)
     for x, y, z in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
         result[x] = a[y] * b[z] - a[z] * b[y]

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""A MuJoCo model (MJCF) of the driven joints of a robot."""
+"""Export of the driven joints of a robot as a MuJoCo model (MJCF)."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from armid_ros.robots.geometry import shapes_of
 import numpy as np
 import pinocchio as pin
 
-#: File types of meshes that MuJoCo reads.
+#: Suffixes of the mesh files that MuJoCo can read.
 _MESHES = ('.stl', '.obj', '.msh')
-#: Stiffness of dry friction: as stiff as the time step of 2 ms allows. With the softer default of
-#: MuJoCo, a slow joint of an arm has a tenth of its friction.
+#: Solver parameters of dry friction, as stiff as the time step of 2 ms allows. With the softer
+#: default of MuJoCo, a slow joint of an arm has a tenth of its friction.
 _FRICTION_SOLVER = {'solreffriction': '0.004 1', 'solimpfriction': '0.9999 0.9999 0.001 0.5 2'}
 #: Contact attributes: visuals have no contacts; collision shapes have contacts with the
 #: environment and not with each other, because neighbouring links overlap.
@@ -33,7 +33,7 @@ def export_mjcf(
     robot: Robot, values: Mapping[str, Mapping[str, float]], remarks: Sequence[str] = ()
 ) -> tuple[str, tuple[str, ...]]:
     """
-    Return a MuJoCo model of a robot: base, bodies with their shapes, joints and motors.
+    Return a MuJoCo model of a robot with its links, shapes, joints and motors.
 
     Parameters
     ----------
@@ -47,9 +47,9 @@ def export_mjcf(
     Returns
     -------
     text : str
-        MJCF; files of meshes have absolute paths.
+        MJCF with absolute paths of mesh files.
     left_out : tuple of str
-        Parts of the description that the file lacks; a comment lists them too.
+        Parts of the description that the MJCF lacks; a comment in the file lists them too.
 
     Raises
     ------
@@ -111,7 +111,7 @@ def export_mjcf(
 
 
 def _couplings(root: ElementTree.Element, robot: Robot) -> list[str]:
-    """Add the couplings of joints as equalities; return those that MuJoCo cannot have."""
+    """Add couplings and loops of joints as constraints; return those that MuJoCo cannot have."""
     if robot.mechanism is None:
         return []
     tendons = ElementTree.SubElement(root, 'tendon')
@@ -145,7 +145,7 @@ def _couplings(root: ElementTree.Element, robot: Robot) -> list[str]:
 def _shapes(
     robot: Robot, bodies: Mapping[int, ElementTree.Element], assets: ElementTree.Element
 ) -> list[str]:
-    """Add the shapes of links to their bodies; return names of meshes that MuJoCo cannot read."""
+    """Add the shapes of links to their bodies; return the meshes that MuJoCo cannot read."""
     left_out: dict[str, None] = {}
     files: dict[tuple[Path, tuple[float, ...]], str] = {}
     for of in _CLASSES:
@@ -172,12 +172,13 @@ def _shapes(
 
 
 def _place(placement: pin.SE3) -> dict[str, str]:
+    """Return the MJCF attributes of a placement: position and quaternion."""
     x, y, z, w = pin.Quaternion(placement.rotation).coeffs()
     return {'pos': _numbers(placement.translation), 'quat': _numbers([w, x, y, z])}
 
 
 def _joint(robot: Robot, index: int) -> dict[str, str]:
-    """Return the attributes of a joint without its friction."""
+    """Return the MJCF attributes of a joint: type, axis and limits."""
     slides = bool(robot.prismatic[index])
     geometry = robot.geometry[index]
     attributes = {
@@ -194,4 +195,5 @@ def _joint(robot: Robot, index: int) -> dict[str, str]:
 
 
 def _numbers(values: Sequence[float] | FloatArray) -> str:
+    """Return numbers as text, separated by blanks."""
     return ' '.join(repr(float(value)) for value in values)

@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-The pseudo-inertia of a link, and the physical consistency of its parameters.
+The pseudo-inertia matrix of a link, and the physical consistency of inertial parameters.
 
 Ten inertial parameters belong to a body of positive density if and only if the 4x4 matrix P =
 [[S, h], [h', m]] is positive definite. S is the second moment of the mass about the origin of
@@ -24,7 +24,7 @@ import numpy.typing as npt
 
 
 def _basis() -> FloatArray:
-    """Return the pseudo-inertia of each unit parameter, shape (10, 4, 4)."""
+    """Return the pseudo-inertia matrix of each unit parameter, shape (10, 4, 4)."""
     basis = np.zeros((PER_LINK, 4, 4))
     basis[0, 3, 3] = 1.0
     for axis in range(3):
@@ -38,13 +38,13 @@ def _basis() -> FloatArray:
     return basis
 
 
-#: Pseudo-inertia of each unit parameter; a pseudo-inertia is linear in the ten parameters.
+#: Pseudo-inertia of each unit parameter, since a pseudo-inertia is linear in the ten parameters.
 BASIS = _basis()
 
 
 def pseudo_inertia(parameters: npt.ArrayLike) -> FloatArray:
     """
-    Return the pseudo-inertia of one link or of several.
+    Return the 4x4 pseudo-inertia matrix of one or several links.
 
     Parameters
     ----------
@@ -63,7 +63,7 @@ def pseudo_inertia(parameters: npt.ArrayLike) -> FloatArray:
 
 def link_parameters(matrix: npt.ArrayLike) -> FloatArray:
     """
-    Return the ten parameters of a pseudo-inertia; the inverse of `pseudo_inertia`.
+    Return the ten inertial parameters of a pseudo-inertia matrix, inverse of `pseudo_inertia`.
 
     Parameters
     ----------
@@ -86,14 +86,15 @@ def link_parameters(matrix: npt.ArrayLike) -> FloatArray:
 @dataclass(frozen=True)
 class Consistency:
     """
-    Physical consistency of the parameters of a link.
+    Mass, centre, principal moments and pseudo-inertia eigenvalues of a link.
 
     Attributes
     ----------
     link : str
-        The link.
+        Name of the link.
     eigenvalues : ndarray, shape (4,)
-        Eigenvalues of its pseudo-inertia, ascending; only signs count, as kg m^2 and kg mix.
+        Eigenvalues of the pseudo-inertia, ascending. Only their signs have a meaning, as the
+        matrix has kg m^2 and kg.
     mass : float
         Mass [kg].
     center : ndarray, shape (3,)
@@ -111,7 +112,7 @@ class Consistency:
 
     @staticmethod
     def of(link: str, parameters: npt.ArrayLike) -> Consistency:
-        """Return the consistency of ten parameters of a link."""
+        """Compute mass, centre, moments and eigenvalues from the ten parameters of a link."""
         matrix = pseudo_inertia(parameters)
         mass = float(matrix[3, 3])
         center = moments = np.full(3, np.nan)
@@ -125,20 +126,20 @@ class Consistency:
 
     @property
     def consistent(self) -> bool:
-        """Whether the parameters are possible for a body with positive density."""
+        """Whether a body of positive density can have these parameters."""
         return bool(self.eigenvalues[0] > 0.0)
 
 
 def require_consistent(links: tuple[str, ...], parameters: npt.ArrayLike) -> None:
     """
-    Raise an error if a link is not physically consistent.
+    Raise ModelError if no body can have the inertial parameters of a link.
 
     Parameters
     ----------
     links : tuple of str
         Names of the n links.
     parameters : array_like, shape (10 n,)
-        Rigid parameters.
+        Inertial parameters of the links.
 
     Raises
     ------
@@ -150,7 +151,8 @@ def require_consistent(links: tuple[str, ...], parameters: npt.ArrayLike) -> Non
         found = Consistency.of(link, values)
         if not found.consistent:
             raise ModelError(
-                f"link '{link}': no body has these inertial parameters (mass {found.mass:.4g} kg, "
-                f'smallest eigenvalue of the pseudo-inertia {found.eigenvalues[0]:.3g}); '
-                'use identify(..., physical=True) or armid identify --physical'
+                f"link '{link}': no body can have these inertial parameters (mass "
+                f'{found.mass:.4g} kg, smallest eigenvalue of the pseudo-inertia '
+                f'{found.eigenvalues[0]:.3g}); use identify(..., physical=True) or armid identify '
+                '--physical'
             )

@@ -1,11 +1,11 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Rigid-body quantities over whole motions.
+Torques, regressors and derivatives of a rigid-body arm along motions.
 
-Only this module loops over samples, as Pinocchio's algorithms take one configuration at a time.
-The kernel, if compiled, computes torques and regressors. All quantities are linear in the
-gravity vector and in the inertial parameters of the robot.
+Only this module loops over samples, since Pinocchio's algorithms take one configuration at a
+time. The compiled kernel, if there is one, computes torques and regressors. All quantities are
+linear in the gravity vector and in the inertial parameters of the robot.
 
 """
 
@@ -30,7 +30,7 @@ LINK_UNITS = ('kg', 'kg m', 'kg m', 'kg m') + ('kg m^2',) * 6
 
 def rigid_parameter_names(robot: Robot) -> tuple[ParameterName, ...]:
     """
-    Name the inertial parameters of a robot.
+    Return the names of the ten inertial parameters of each moving joint.
 
     Returns
     -------
@@ -46,26 +46,28 @@ def rigid_parameter_names(robot: Robot) -> tuple[ParameterName, ...]:
 
 
 def link_unit(name: str) -> tuple[str, ...]:
-    """Return the unit of an inertial parameter such as 'mx2'; empty for other names."""
+    """Return the unit of an inertial parameter such as 'mx2', alone in a tuple; else empty."""
     units = dict(zip(LINK_PARAMETERS, LINK_UNITS, strict=True))
     unit = units.get(name.rstrip('0123456789'))
     return () if unit is None else (unit,)
 
 
 class _Prepared(threading.local):
-    """Work space of Pinocchio and body of the kernel, cached per robot and thread."""
+    """Work space of Pinocchio and kernel body of each robot, cached in each thread."""
 
     def __init__(self) -> None:
         self.data: WeakKeyDictionary[Robot, pin.Data] = WeakKeyDictionary()
         self.bodies: WeakKeyDictionary[Robot, BodyOfKernel | None] = WeakKeyDictionary()
 
     def data_of(self, robot: Robot) -> pin.Data:
+        """Return the work space of Pinocchio for a robot."""
         data = self.data.get(robot)
         if data is None:
             data = self.data[robot] = robot.model.createData()
         return data
 
     def body_of(self, robot: Robot) -> BodyOfKernel | None:
+        """Return a robot in the format of the kernel; None without a kernel."""
         if robot not in self.bodies:
             self.bodies[robot] = kernel_body(robot)
         return self.bodies[robot]
@@ -102,7 +104,7 @@ def inverse_dynamics_derivatives(
     robot: Robot, motion: Motion
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """
-    Differentiate the joint torques of the rigid body by position, velocity and acceleration.
+    Differentiate rigid-body joint torques by position, velocity and acceleration.
 
     Returns
     -------
@@ -148,12 +150,12 @@ def inverse_dynamics_derivatives(
 
 
 def _projected(jacobian: FloatArray, torques: FloatArray) -> FloatArray:
-    """Return J^T times the torques of moving joints, or times their columns, (N, m, ...)."""
+    """Return J^T times torques of moving joints, (N, m, ...), as torques of driven joints."""
     return np.asarray(np.einsum('kmn,km...->kn...', jacobian, torques))
 
 
 def _difference(robot: Robot, motion: Motion, name: str) -> FloatArray:
-    """Differentiate the torques by the positions or velocities of each joint, (N, n, n)."""
+    """Differentiate torques by positions or velocities, with central differences, (N, n, n)."""
     step = 1e-5
     slopes = []
     for shift in step * np.eye(robot.n_joints):
@@ -169,7 +171,7 @@ def _difference(robot: Robot, motion: Motion, name: str) -> FloatArray:
 
 def regressor(robot: Robot, motion: Motion) -> FloatArray:
     """
-    Compute the matrix Y of tau = Y pi for every sample of a motion.
+    Compute the regressor Y of tau = Y pi for every sample of a motion.
 
     Parameters
     ----------
@@ -215,7 +217,7 @@ def regressor(robot: Robot, motion: Motion) -> FloatArray:
 
 def gravity_sensitivity(robot: Robot, q: FloatArray) -> FloatArray:
     """
-    Differentiate the joint torques by the gravity vector; torques are linear in gravity.
+    Differentiate the joint torques by the gravity vector.
 
     Parameters
     ----------
@@ -244,7 +246,7 @@ def gravity_sensitivity(robot: Robot, q: FloatArray) -> FloatArray:
 
 def random_motion(robot: Robot, rng: np.random.Generator, n_samples: int | None = None) -> Motion:
     """
-    Draw independent random states that excite every identifiable parameter.
+    Draw independent random joint states that excite every identifiable parameter.
 
     Positions are uniform within the limits (one turn without limits), velocities and accelerations
     are normal with a standard deviation of 1 rad/s and 1 rad/s^2 (or m). Temperatures rise from

@@ -1,12 +1,12 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Springs between two machines: geometry, forces, torques, derivatives.
+Springs that tie two machines together: geometry, torques and their derivatives.
 
-A tie connects a point of a link of one machine with a point of a link of the other, such as a
-strap between a human and an exoskeleton shank. The vector D = p - r points from the point r of
-the other machine to the point p of this one. A spring k pulls this machine with the force -k D,
-and the other one with +k D. A relaxed spring has D = 0.
+A tie connects a point on a link of one machine with a point on a link of another machine, such as
+a strap between a human shank and an exoskeleton shank. The vector D = p - r points from the point
+r of the other machine to the point p of the first machine. A spring k pulls the first machine with
+the force -k D, and the other machine with +k D. A relaxed spring has D = 0.
 Source: the human-exoskeleton leg pair, equations (16), (18), (23), (25), physical signs.
 
 """
@@ -30,14 +30,14 @@ _DIFFERENCE_STEP = 1e-5
 @dataclass(frozen=True)
 class TiedMachines:
     """
-    Two machines and the places of the springs that tie them.
+    Two machines and the end points of the springs that tie them together.
 
     Attributes
     ----------
     robot, other : Robot
         The machine whose torques are measured, and the machine to which it is tied.
     ties : sequence of Tie
-        Places of the springs.
+        End points of the springs.
 
     """
 
@@ -48,18 +48,18 @@ class TiedMachines:
 
 class TieGeometry(NamedTuple):
     """
-    Geometry of the ties along a motion.
+    End points, vectors and Jacobians of ties along a motion of both machines.
 
     Attributes
     ----------
     way : ndarray, shape (N, S, 3)
-        Vector D from the point of the other machine to that of this machine [m].
+        Vector D from the end on the other machine to the end on the first machine [m].
     position, other_position : ndarray, shape (N, S, 3)
         Positions of the two ends [m].
     jacobian : ndarray, shape (N, S, 3, n)
-        Jacobian of the machine's end.
+        Jacobian of the end on the first machine.
     other_jacobian : ndarray, shape (N, S, 3, m)
-        Jacobian of the other machine's end.
+        Jacobian of the end on the other machine.
 
     """
 
@@ -71,9 +71,9 @@ class TieGeometry(NamedTuple):
 
     def pulled(self, slack: float | FloatArray) -> FloatArray:
         """
-        Return the torque of the machine's actuators per stiffness, J^T D, shape (N, n, S) [m^2].
+        Return the torque on the first machine's actuators per stiffness, J^T D, (N, n, S) [m^2].
 
-        Springs pull only if they are longer than a slack [m].
+        A spring pulls only if it is longer than its slack [m].
 
         """
         way = extension(self.way, slack)
@@ -81,7 +81,7 @@ class TieGeometry(NamedTuple):
 
 
 def extension(way: FloatArray, slack: float | FloatArray) -> FloatArray:
-    """Return the parts of vectors, shape (..., 3), beyond a slack, shape (...) [m]."""
+    """Return vectors (..., 3) shortened by a slack (...) [m], or zero if they are too short."""
     # the direction of a vector shorter than this [m] is undefined
     length = np.maximum(np.linalg.norm(way, axis=-1), 1e-12)
     return np.asarray(np.maximum(1.0 - slack / length, 0.0)[..., np.newaxis] * way)
@@ -91,7 +91,7 @@ def tie_geometry(
     robot: Robot, q: FloatArray, other: Robot, other_q: FloatArray, ties: Sequence[Tie]
 ) -> TieGeometry:
     """
-    Return the geometry of ties along positions of both machines, shapes (N, n) and (N, m).
+    Compute the geometry of ties along positions (N, n) and (N, m) of two machines.
 
     Raises
     ------
@@ -125,7 +125,7 @@ def tie_columns_derivatives(
     slack: float | FloatArray = 0.0,
 ) -> tuple[FloatArray, FloatArray]:
     """
-    Differentiate ``TieGeometry.pulled`` by the positions of both machines.
+    Differentiate ``TieGeometry.pulled`` by the joint positions of both machines.
 
     Parameters
     ----------
@@ -134,14 +134,14 @@ def tie_columns_derivatives(
     q, other_q : ndarray, shape (N, n) and (N, m)
         Joint positions of the machines.
     ties : sequence of Tie
-        Places of the springs.
+        End points of the springs.
     slack : float or ndarray, shape (S,)
         Length beyond which the springs pull [m].
 
     Returns
     -------
     by_q : ndarray, shape (N, n, S, n)
-        Derivatives by the machine's own positions, from central differences of 1e-5 rad.
+        Derivatives by the positions of the first machine, from central differences of 1e-5 rad.
     by_other_q : ndarray, shape (N, n, S, m)
         Derivatives by the other machine's positions; without slack exact, -J^T J of the two ends.
 

@@ -1,11 +1,11 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Export of a URDF with new inertial parameters, otherwise unchanged.
+Export of a URDF with new inertial parameters and friction, otherwise unchanged.
 
-A driven joint may move several links, on fixed joints or on joints that are not driven. The
-other links keep their inertials as far as physical consistency permits. The driven joint's own
-link has the remainder, so the sum is exactly the given parameters.
+A driven joint may move several links, on fixed joints or on joints that are not driven. The child
+link of the driven joint gets new inertial parameters, so that the sum over the links is exactly as
+given. The other links keep their inertial parameters as far as physical consistency permits.
 
 """
 
@@ -28,7 +28,7 @@ import numpy as np
 import pinocchio as pin
 import scipy.linalg
 
-#: Smallest share of a body's pseudo-inertia, in any direction, that its own link keeps.
+#: Smallest share of a body's pseudo-inertia, in any direction, that the child link keeps.
 _MIN_SHARE = 0.05
 
 
@@ -36,12 +36,12 @@ def export_urdf(
     robot: Robot, values: Mapping[str, Mapping[str, float]], remarks: Sequence[str] = ()
 ) -> str:
     """
-    Return the robot's description with its present inertial parameters.
+    Return the URDF of a robot with its present inertial parameters and new friction.
 
     Parameters
     ----------
     robot : Robot
-        The arm; ``robot.urdf`` is the description that is changed.
+        The arm; ``robot.urdf`` is the URDF that is changed.
     values : mapping of str to mapping of str to float
         'damping' [N m s/rad] and 'friction' [N m] of <dynamics>, each by joint.
     remarks : sequence of str
@@ -94,20 +94,21 @@ def export_urdf(
 
 
 def _parsed(urdf: str) -> tuple[minidom.Document, minidom.Element]:
-    """Parse a description with comments and prefixes; return it and its root."""
+    """Parse a URDF with its comments and namespace prefixes; return document and root element."""
     document = expatbuilder.parseString(urdf, namespaces=False)
     assert document.documentElement is not None
     return document, document.documentElement
 
 
 def _text(document: minidom.Document) -> str:
+    """Return an XML document as text with a declaration."""
     return '\n'.join(
         ['<?xml version="1.0"?>', *(node.toxml() for node in document.childNodes), '']
     )
 
 
 def _children(parent: minidom.Element, name: str) -> Iterator[minidom.Element]:
-    """Return the children of an XML element with a given tag."""
+    """Return the child elements of an XML element that have a given tag."""
     return (
         child
         for child in parent.childNodes
@@ -116,7 +117,7 @@ def _children(parent: minidom.Element, name: str) -> Iterator[minidom.Element]:
 
 
 def _child(parent: minidom.Element, name: str) -> minidom.Element:
-    """Return the first child with a tag; a missing child is added, indented as the others."""
+    """Return the first child element with a tag; if there is none, add it with indentation."""
     found = next(_children(parent, name), None)
     if found is None:
         document = minidom.Document()
@@ -135,12 +136,13 @@ def _child(parent: minidom.Element, name: str) -> minidom.Element:
 
 
 def _parameters(robot: Robot, urdf: str) -> FloatArray:
+    """Return the inertial parameters of each driven joint in a URDF, shape (n, 10)."""
     read = robot_from_urdf(urdf, joints=robot.joints, source=robot.name)
     return read.rigid_parameters.reshape(-1, PER_LINK)
 
 
 def _without_inertials(urdf: str, links: Sequence[str]) -> str:
-    """Return a URDF with inertials of zero in some links."""
+    """Return a URDF in which the mass and inertia of some links are zero."""
     document, root = _parsed(urdf)
     for link in _children(root, 'link'):
         for inertial in _children(link, 'inertial'):
@@ -151,7 +153,7 @@ def _without_inertials(urdf: str, links: Sequence[str]) -> str:
 
 
 def _share(body: FloatArray, others: FloatArray) -> float:
-    """Return the share of the other links' inertia with which the own link stays consistent."""
+    """Return the factor of the other links' inertia with which the child link stays consistent."""
     if not np.any(others):
         return 1.0
     if not Consistency.of('', others).eigenvalues[0] > -1e-12:
@@ -161,14 +163,14 @@ def _share(body: FloatArray, others: FloatArray) -> float:
 
 
 def _scaled(robot: Robot, shares: FloatArray) -> str:
-    """Return the URDF with scaled mass and inertia of links that are fixed to driven ones."""
+    """Return the URDF with scaled mass and inertia of links that are fixed to child links."""
     document, root = _parsed(robot.urdf)
     carriers = {joint.child: joint for joint in robot.description.joints}
     for link in _children(root, 'link'):
         name, inertial = link.getAttribute('name'), next(_children(link, 'inertial'), None)
         if inertial is None or name in robot.links:
             continue
-        # up to the nearest driven joint
+        # go up to the nearest driven joint
         carrier = carriers.get(name)
         while carrier is not None and carrier.name not in robot.joints:
             carrier = carriers.get(carrier.parent)
@@ -182,7 +184,7 @@ def _scaled(robot: Robot, shares: FloatArray) -> str:
 
 
 def _set_inertial(link: minidom.Element, parameters: FloatArray) -> None:
-    """Write ten parameters as mass, centre and inertia about it, in the axes of the link."""
+    """Write ten parameters to a link: mass, centre, and inertia about the centre."""
     body = pin.Inertia.FromDynamicParameters(parameters)
     values = {
         'origin': {'xyz': ' '.join(map(repr, body.lever.tolist())), 'rpy': '0 0 0'},
@@ -200,13 +202,13 @@ def _set_inertial(link: minidom.Element, parameters: FloatArray) -> None:
 
 
 def _check(robot: Robot, urdf: str) -> None:
-    """Raise ModelError if the result, read again, has other parameters."""
+    """Raise ModelError if a URDF, read again, does not have the inertial parameters of a robot."""
     found, wanted = _parameters(robot, urdf), robot.rigid_parameters.reshape(-1, PER_LINK)
     worst = np.max(np.abs(found - wanted), axis=1)
     scale = float(np.max(np.abs(wanted)))
     if np.any(worst > 1e-11 * scale):
         link = robot.links[int(np.argmax(worst))]
         raise ModelError(
-            f'{robot.name}: the exported description does not reproduce the parameters of link '
-            f"'{link}': they differ by {worst.max():.3g}"
+            f"{robot.name}: the exported URDF, read again, has other parameters of link '{link}': "
+            f'they differ by {worst.max():.3g}; report this as a bug'
         )

@@ -15,8 +15,8 @@ from dataclasses import dataclass, replace
 
 from armid_ros.arm import ArmModel, Misfit
 from armid_ros.arm.memoized_arm import memoized_arm, plain_arm
-from armid_ros.arm.misfit import louder
-from armid_ros.arm.model_file import with_named
+from armid_ros.arm.misfit import growth
+from armid_ros.arm.model_file import add_effect
 from armid_ros.diagnosis.data.baseline import Baseline
 from armid_ros.diagnosis.data.days import Rows
 from armid_ros.diagnosis.data.evidence import Evidence, noise_floor, torque_rms
@@ -154,7 +154,7 @@ class Explainer:
         for one, span in zip(nuisance.accepted, nuisance.spans, strict=True):
             if not one.effect.joints:
                 named = one.at(means[span], arm.robot)
-                arm = with_named(arm, named.effect, named.values)
+                arm = add_effect(arm, named.effect, named.values)
         return arm.body.gravity
 
     def _explain_change(self, written: Misfit) -> Explanation:
@@ -185,7 +185,7 @@ class Explainer:
         """Explain what changed since the baseline."""
         prepared = self.prepared
         now, then = torque_rms(prepared.data), torque_rms(baseline.data)
-        misfit = baseline.misfit * louder(now, then)
+        misfit = baseline.misfit * growth(now, then)
         rough = [noise_floor(part, self.arm).rough for part in baseline.data]
         noise = _noise_within(misfit, prepared, np.sqrt(np.mean(np.square(rough), axis=0)))
         sigma = tuple(np.maximum(one, misfit) for one in noise)
@@ -217,7 +217,7 @@ class Explainer:
 
         """
         today, more = self.prepared.data, self.unseen
-        faster = louder(_speed([*today, *more]), _speed(baseline.data))
+        faster = growth(_speed([*today, *more]), _speed(baseline.data))
         first, second = count_recordings(baseline.data), count_recordings(today)
         mean = np.sqrt(np.mean(np.square(sigma), axis=0))
         rows = Rows(

@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 
 from armid_ros.arm import ArmModel
 from armid_ros.arm.memoized_arm import memoized_arm
-from armid_ros.arm.model_file import with_named
+from armid_ros.arm.model_file import add_effect
 from armid_ros.diagnosis.data.days import Rows
 from armid_ros.diagnosis.data.evidence import Evidence
 from armid_ros.diagnosis.data.trajectory import Trajectory
@@ -285,7 +285,7 @@ class JointFit:
 def patched_arm(arm: ArmModel, named: Sequence[NamedEffect]) -> ArmModel:
     """Return an arm with named effects."""
     for own in named:
-        arm = with_named(arm, own.effect, own.values)
+        arm = add_effect(arm, own.effect, own.values)
     return arm
 
 
