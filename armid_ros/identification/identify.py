@@ -22,11 +22,11 @@ from armid_ros.identification.fitting.identifiability import (
 from armid_ros.identification.fitting.instruments import fit_by_instruments
 from armid_ros.identification.fitting.least_squares import Estimator, ESTIMATORS, Method
 from armid_ros.identification.fitting.nonlinear import (
+    exact_at,
     fit_values,
     FittedValues,
-    through,
     torques,
-    ungrouped,
+    unidentifiable_directions,
 )
 from armid_ros.identification.physical.fit_among_bodies import (
     fit_to_bodies,
@@ -65,20 +65,20 @@ import numpy as np
 @dataclass(frozen=True)
 class IdentificationSettings:
     """
-    Settings of an identification.
+    Method, filters and physical constraints of an identification.
 
     Attributes
     ----------
     method : {'ols', 'wls', 'irls', 'iv'}
-        Least squares: ordinary, weighted by the noise of each joint, or robust as well;
+        Ordinary least squares; weighted by the noise of each joint; weighted and robust;
         instrumental variables.
     signals : SignalSettings
         Filtering and decimation.
     physical : PhysicalSettings or None
         Constraints for a physically consistent fit; None for an unconstrained fit.
     prefers_bodies : bool
-        Whether to fit physically consistent links if the torque error grows by a tenth at most:
-        simulators need such links, and a model that lacks an effect costs more.
+        Whether to fit physically consistent links, as simulators need, if the torque error grows
+        by a tenth at most. With a model that lacks an effect, it grows by more.
 
     """
 
@@ -100,12 +100,12 @@ class IdentificationSettings:
 
     @property
     def least_squares(self) -> Method:
-        """Return the method itself, or for 'iv' the least-squares method of its initial fit."""
+        """Return the least-squares method; that of the initial fit for instrumental variables."""
         return 'wls' if self.method == 'iv' else self.method
 
     @property
     def holds_description(self) -> bool:
-        """Whether parameters keep described values that are more certain than the data."""
+        """Whether parameters keep their described values if the data determine them worse."""
         return self.physical is None and self.method != 'iv'
 
 
@@ -117,15 +117,15 @@ class Identification:
     Attributes
     ----------
     arm : ArmModel
-        Identified model, with the standard parameters nearest to the description among those with
-        the identified base parameters.
+        Identified model. Of all standard parameters with the identified base parameters, it has
+        those nearest to the description.
     theory : BaseParameters
         Base parameters that are identifiable in some motion of the arm.
     base : BaseParameters
         Base parameters that the data identify, with their grouping of standard parameters.
     estimate : Estimate
-        Base and effect parameters with covariance; for a physically consistent fit, that of the
-        data alone.
+        Base and effect parameters with covariance; for a physically consistent fit, the covariance
+        of the data alone.
     condition_number : float
         Condition number of the weighted base regressor.
     joint_std : ndarray, shape (n,)
@@ -133,7 +133,7 @@ class Identification:
     training : tuple of Fit
         Predictions of the training data.
     used : Conditioning
-        Filters of the training data; validation data are filtered alike.
+        Filters of the training data; held-out data are filtered alike.
     settings : IdentificationSettings
         Settings of the fit.
     notes : tuple of str
@@ -141,7 +141,7 @@ class Identification:
     halves : Score
         Torque error when either half of the data predicts the other.
     scatter : ndarray, shape (K, r)
-        Jackknife changes of the values without each recording; see `scatter`.
+        Jackknife changes of the values without each of K recordings; see `scatter`.
     physical : PhysicalCertificate or None
         Evidence that the links are physically consistent, if requested.
     bodies_cost : float or None
@@ -168,7 +168,7 @@ class Identification:
     passes: int = 1
 
     def __repr__(self) -> str:
-        """Return a summary of a few lines."""
+        """Return robot, relative error, condition number and estimate in a few lines."""
         error = Score.of(self.training).relative_error_percent
         return (
             f'Identification of {self.arm.robot.name}: {error:.2f} % relative error, condition '
@@ -177,11 +177,11 @@ class Identification:
 
     @property
     def unidentified(self) -> tuple[Unidentified, ...]:
-        """Return the unidentified parameters with reasons."""
+        """Return the parameters that the data do not identify, with reasons."""
         return unidentified(self.theory, self.base, self.estimate)
 
     def predict(self, recordings: Sequence[Recording]) -> tuple[Fit, ...]:
-        """Predict the torques of other recordings, filtered like the training data."""
+        """Predict the torques of other recordings, filtered like the training data; see `Fit`."""
         check_recordings(recordings)
         recordings, _ = without_damage(recordings, self.used)
         found = predictions(self.arm, recordings, self.used)
@@ -204,7 +204,7 @@ def identify(
     Parameters
     ----------
     arm : ArmModel
-        Robot and effects; unidentifiable directions keep its values.
+        Robot and effects; unidentifiable combinations of parameters keep the values of this model.
     recordings : sequence of Recording
         Training data with torques.
     settings : IdentificationSettings, optional
@@ -217,7 +217,7 @@ def identify(
     Returns
     -------
     Identification
-        Model, estimate with covariance, fit.
+        Model, estimate with covariance, and predicted torque.
 
     Raises
     ------
@@ -242,15 +242,11 @@ def identify(
     _require_samples(theory, recordings, columns, used)
     base, problem = excited(theory, columns)
     notes += check_torque(arm, recordings, problem)
-    bodies = None
+    data, bodies = (base, problem, recordings, used), None
     if described:
-        problem = through(problem, torques(whole, recordings, used), base.values(whole.theta))
-        free = ungrouped(whole, whole.base_parameters(rng))
-        fit = fit_values(whole, base, problem, recordings, used, settings.least_squares, free)
-        fit, remarks = _with_uncertain_inertia(whole, fit, recordings, used)
+        fit, remarks = _fit_quasi_static(whole, data, settings.least_squares, rng)
         notes += remarks
     else:
-        data = base, problem, recordings, used
         bodies = _among_bodies(arm, theory, data, settings, rng)
         if bodies is not None and (settings.physical or bodies[3].cost <= 0.1):
             settings, theory, fit, _ = bodies
@@ -268,7 +264,10 @@ def identify(
         estimate=Estimate(fit.base.parameters, fit.values, fit.solution.covariance),
         condition_number=fit.solution.condition_number,
         joint_std=fit.solution.joint_std,
-        training=fit.fits,
+        training=tuple(
+            Fit(part.source, part.motion, part.informative, torque)
+            for part, torque in zip(fit.problem, fit.predicted, strict=True)
+        ),
         used=used,
         settings=settings,
         notes=notes + _remarks(fit, theory),
@@ -287,19 +286,19 @@ def _among_bodies(
     settings: IdentificationSettings,
     rng: np.random.Generator,
 ) -> tuple[IdentificationSettings, BaseParameters, FittedValues, PhysicalCertificate] | None:
-    """Fit physically consistent links; None if not requested, or if optional and impossible."""
+    """Fit physically consistent links; None if not requested, or if optional and infeasible."""
     if settings.method == 'iv' or not (settings.physical or settings.prefers_bodies):
         return None
-    known = settings.physical or PhysicalSettings()
-    asked = replace(settings, physical=known)
-    theory, fit = _fitted(arm, theory, data, asked, rng)
+    constraints = settings.physical or PhysicalSettings()
+    physical = replace(settings, physical=constraints)
+    theory, fit = _fitted(arm, theory, data, physical, rng)
     try:
-        found = fit_to_bodies(arm, fit, *data[2:], asked.least_squares, known)
+        found = fit_to_bodies(arm, fit, *data[2:], physical.least_squares, constraints)
     except IdentificationError:
         if settings.physical is not None:
             raise
         return None
-    return asked, theory, *found
+    return physical, theory, *found
 
 
 def _fitted(
@@ -309,7 +308,7 @@ def _fitted(
     settings: IdentificationSettings,
     rng: np.random.Generator,
 ) -> tuple[BaseParameters, FittedValues]:
-    """Fit parameters that data determine better than the description; return grouping and fit."""
+    """Fit the parameters that the data determine; return base parameters of any motion and fit."""
     base, problem, recordings, used = data
     method, rigid = settings.least_squares, len(arm.robot.rigid_parameters)
     refitted = False
@@ -317,11 +316,12 @@ def _fitted(
         kept, free, solution = base, None, None
         if settings.holds_description:
             kept, problem, solution = determined(arm, base, problem, method)
-            free = None if kept.rank == base.rank else ungrouped(arm, base)
+            free = None if kept.rank == base.rank else unidentifiable_directions(arm, base)
         fit = fit_values(arm, kept, problem, recordings, used, method, free, solution)
         if refitted or np.all(np.any(theory.grouping[:, rigid:], axis=0)):
             return theory, fit
-        # fit again with effects that the described arm does not have, such as unreached saturation
+        # fit again with effects that have no column at the described values, such as saturation
+        # at a torque that is not reached
         identifiable = fit.arm.base_parameters(rng)
         if identifiable.rank <= theory.rank:
             return theory, fit
@@ -329,25 +329,31 @@ def _fitted(
         base, problem = excited(theory, regressions(arm, theory.independent, recordings, used))
 
 
-def _with_uncertain_inertia(
-    description: ArmModel, fit: FittedValues, recordings: Sequence[Recording], used: Conditioning
+def _fit_quasi_static(
+    arm: ArmModel,
+    data: tuple[BaseParameters, Sequence[Regression], Sequence[Recording], Conditioning],
+    method: Method,
+    rng: np.random.Generator,
 ) -> tuple[FittedValues, tuple[str, ...]]:
-    """Add the uncertainty of the described inertia to a fit of slow motions; return a note too."""
-    # Weight is fitted, and inertia has the described values. Even in slow motion, the torque of
-    # inertia varies with position as weight does, so errors of the description bias the weight.
+    """Fit weight and friction to slow motions with the described inertia; return notes too."""
+    base, problem, recordings, used = data
+    problem = exact_at(problem, torques(arm, recordings, used), base.values(arm.theta))
+    free = unidentifiable_directions(arm, arm.base_parameters(rng))
+    fit = fit_values(arm, base, problem, recordings, used, method, free)
+    # Even in slow motion, the torque of inertia varies with position as weight does, so errors of
+    # the described inertia bias the weight.
     # negligible deviation due to inertia, over the standard deviation of the fit
     negligible = 0.1
-    rigid = len(description.robot.rigid_parameters)
+    rigid = len(arm.robot.rigid_parameters)
     everything = regressions(fit.arm, np.arange(rigid), recordings, used)
     # base parameters that a weighted fit of each rigid column gives
-    rows, body = (
+    columns, body = (
         weighted_rows(part, fit.solution.weights)[0] for part in (fit.problem, everything)
     )
-    scale = np.linalg.norm(rows, axis=0)
-    fitted = np.linalg.lstsq(rows / scale, body, rcond=None)[0] / scale[:, np.newaxis]
-    pull = fitted - fit.base.grouping[:, :rigid]
-    spread = near_deviation(description.robot)
-    added = (pull * spread) @ (pull * spread).T
+    scale = np.linalg.norm(columns, axis=0)
+    fitted = np.linalg.lstsq(columns / scale, body, rcond=None)[0] / scale[:, np.newaxis]
+    bias = (fitted - fit.base.grouping[:, :rigid]) * near_deviation(arm.robot)
+    added = bias @ bias.T
     plain = fit.solution.covariance
     solution = replace(fit.solution, covariance=plain + added)
     ratio = np.sqrt(np.diag(added) / np.maximum(np.diag(plain), 1e-300)).max()
@@ -373,7 +379,7 @@ def _require_samples(
     columns: Sequence[Regression],
     used: Conditioning,
 ) -> None:
-    """Raise an error for fewer than two torques per parameter."""
+    """Raise an error if a recording is too short, or for fewer than two torques per parameter."""
     filtered = {part.source for part in columns}
     for recording in recordings:
         if recording.source not in filtered:
@@ -389,7 +395,7 @@ def _require_samples(
 
 
 def _remarks(fit: FittedValues, theory: BaseParameters) -> tuple[str, ...]:
-    """Return notes on grouped parameters, outliers and convergence."""
+    """Return notes on grouped parameters, outliers and missing convergence of a fit."""
     remarks = []
     if fit.base.rank < theory.rank:
         remarks.append(
@@ -398,7 +404,7 @@ def _remarks(fit: FittedValues, theory: BaseParameters) -> tuple[str, ...]:
         )
     if fit.solution.outliers:
         remarks.append(f'{fit.solution.outliers} outliers of torque have reduced weight')
-    if not fit.settled:
+    if not fit.converged:
         remarks.append(
             f'the fit has not converged after {fit.passes} linearisations: the effects '
             'affect each other too much in these data; leave some out, or record more'

@@ -1,10 +1,10 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Sandwich covariances, bread middle bread', of estimates whose errors are not white noise.
+Sandwich covariances, B M B', of estimates whose errors are not white noise.
 
-The bread is the inverse of the products of the columns. The middle is the covariance of the
-products of columns and noise; it follows from the spectrum of the residuals (`noise_products`) or
+The bread B is the inverse of the products of the columns. The middle M is the covariance of the
+products of columns and noise. M follows from the spectrum of the residuals (`noise_products`) or
 from neighbouring scores (`score_products`).
 
 """
@@ -25,7 +25,7 @@ MIN_RESIDUAL_SHARE = 0.1
 
 
 def sandwich(bread: FloatArray, middle: FloatArray) -> FloatArray:
-    """Return the sandwich covariance bread middle bread', positive semi-definite, (p, p)."""
+    """Return B M B' for bread B and middle M, made positive semi-definite, shape (p, p)."""
     covariance = bread @ middle @ bread.T
     std = np.sqrt(np.maximum(np.abs(np.diag(covariance)), 1e-300))
     sizes, axes = np.linalg.eigh(covariance / np.outer(std, std))
@@ -36,16 +36,16 @@ def sandwich(bread: FloatArray, middle: FloatArray) -> FloatArray:
 
 def score_products(scores: Sequence[FloatArray], lags: int) -> FloatArray:
     """
-    Return the covariance of a sum of autocorrelated scores.
+    Return the covariance of the sum of scores that are correlated with their neighbours.
 
     Source: Newey and West 1987.
 
     Parameters
     ----------
     scores : sequence of ndarray, each of shape (M, p)
-        Scores of the rows of each stretch.
+        Scores of the samples of each stretch: products of columns and residual.
     lags : int
-        Number of rows over which errors may be correlated.
+        Number of samples over which errors may be correlated.
 
     Returns
     -------
@@ -62,7 +62,7 @@ def score_products(scores: Sequence[FloatArray], lags: int) -> FloatArray:
 
 
 def widened(covariance: FloatArray, bread: FloatArray, middle: FloatArray) -> FloatArray:
-    """Widen a covariance, (p, p), to at least the deviations of the sandwich of `middle`."""
+    """Return a covariance, (p, p), with variances not below those of the sandwich B M B'."""
     ratio = np.diag(bread @ middle @ bread) / np.diag(covariance)
     factor = np.sqrt(np.maximum(ratio, 1.0))
     return np.asarray(covariance * np.outer(factor, factor))
@@ -76,12 +76,12 @@ def noise_products(
     instruments: Sequence[FloatArray] | None = None,
 ) -> FloatArray:
     """
-    Return the covariance of the products of columns and noise, W' n.
+    Return the covariance of W' e, the products of the weighted columns and the noise.
 
     The noise of each joint is coloured, with a spectrum Phi that is estimated from its residual.
     Noise is taken as independent between joints and between stretches. A fit removes noise at
-    frequencies at which the regressor has power. At a frequency of a joint, it removes the share
-    x^H H^-1 x, the leverage, where x is the transform of the joint's rows.
+    frequencies at which the regressor has power. At each frequency, it removes the share
+    x^H H^-1 x (leverage), where x is the Fourier transform of the joint's columns.
 
     Parameters
     ----------
@@ -92,7 +92,7 @@ def noise_products(
     inverse : ndarray, shape (r, r)
         Inverse of the triangular factor of the weighted problem: H^-1 = inverse inverse'.
     instruments : sequence of ndarray, each of shape (M, n, k), optional
-        Further columns, one array a stretch.
+        Further columns, one array per stretch.
 
     Returns
     -------
@@ -128,7 +128,7 @@ def noise_products(
 def _noise_spectrum(
     residual: FloatArray, informative: npt.NDArray[np.bool_], leverage: FloatArray
 ) -> FloatArray:
-    """Estimate the power of noise (M + 1,) on the bins of an rfft from a residual (M,)."""
+    """Return the power spectrum of the noise of a joint, (M + 1,), from its residual, (M,)."""
     count = len(residual)
     size = 2 * count
     # the autocovariance of the informative samples is divided by the number of their pairs
@@ -161,7 +161,7 @@ def _noise_spectrum(
 
 
 def _smoothed(spectrum: FloatArray, reach: int) -> FloatArray:
-    """Smooth a spectrum on the bins of an rfft: keep small lags, with Parzen's weights."""
+    """Return a power spectrum smoothed by Parzen's window over the first `reach` lags."""
     size = 2 * (len(spectrum) - 1)
     lags = np.fft.irfft(spectrum, size)
     x = np.arange(reach) / reach

@@ -3,13 +3,13 @@
 """
 Cross-validation: errors of predicting parts of the data from a fit to other parts.
 
-If a motion is too short or excites too little, parameters are fitted to noise. The two halves of
-the data then yield different parameters, and each predicts the other half badly.
+If a motion is too short or excites too little, the fit follows the noise. The two halves of the
+data then yield different parameters, and each predicts the other half badly.
 
 A spectrum of positions above white noise need not be motion. Jitter of stamps, encoder steps and
 backlash of gears look like motion, and differentiation amplifies them by the square of their
-frequency. Torques distinguish motion from them, so the cut-off is chosen by the prediction of
-held-out torques.
+frequency. Torques distinguish motion from these faults. The cut-off is therefore chosen by the
+prediction of held-out torques.
 
 """
 
@@ -32,7 +32,7 @@ from armid_ros.recording import Recording
 import numpy as np
 import numpy.typing as npt
 
-#: Number of rows for the comparison of cut-offs: about a hundred for every parameter of seven
+#: Number of samples for the comparison of cut-offs: about a hundred for every parameter of seven
 #: joints.
 _MAX_ROWS = 6000
 
@@ -44,16 +44,16 @@ def halves_error(
     spread: FloatArray | None = None,
 ) -> Score:
     """
-    Cross-validate with two halves: fit one and predict the other.
+    Return the torque error with which a fit to each half of the data predicts the other half.
 
     Parameters
     ----------
     problem : sequence of Regression
-        N rows of r columns, in the order of time.
+        N samples of r columns, in the order of time.
     weights : ndarray, shape (N, n)
-        Factors of the rows in the fit: inverse residual of each joint.
+        Weight of each sample of each joint in the fit: inverse residual of the joint.
     described : ndarray, shape (r,)
-        Values of the description, which parameters keep that a half does not determine.
+        Values of the description; parameters that a half does not determine keep them.
     spread : ndarray, shape (r,), optional
         Largest expected errors of these values; by default, errors of the size of the torque.
 
@@ -63,7 +63,7 @@ def halves_error(
         Errors of the predicted torque.
 
     """
-    # about fifty rows for every parameter of seven joints
+    # about fifty samples for every parameter of seven joints
     step, columns, tau, target, informative = _some_rows(problem, 4000)
     difference, weight = target - columns @ described, weights[::step]
     expected = np.full(len(described), np.inf) if spread is None else spread
@@ -72,9 +72,9 @@ def halves_error(
     residual = np.zeros_like(tau)
     for fitted, predicted in (halves, halves[::-1]):
         # Bayesian estimate in units of the residual. The prior deviation is the expected error
-        # of the description, or the size of the torque. Without it, parameters that a half does
-        # not determine would be arbitrary. With a residual near zero, they keep the described
-        # values
+        # of the description, or the size of the torque. Without a prior, parameters that a half
+        # does not determine would be arbitrary. With a residual near zero, these parameters keep
+        # the described values.
         own = weight[fitted]
         size = np.sqrt(np.mean((columns[fitted] * own[:, :, np.newaxis]) ** 2, axis=(0, 1)))
         torque = np.sqrt(np.mean((tau[fitted] * own) ** 2))
@@ -86,18 +86,19 @@ def halves_error(
 
 def scatter(problem: Sequence[Regression], weights: FloatArray, values: FloatArray) -> FloatArray:
     """
-    Return the jackknife changes of each value; the squared changes sum to its variance.
+    Return the jackknife changes of fitted values: how each changes without each recording.
 
-    The weight of a change is the precision with which the other recordings determine the value.
-    For white noise, the sum of squares then equals the variance of least squares, even if one
-    recording determines most of a value. Values that the others do not determine have no change.
+    The squared changes of a value sum to its variance. The weight of a change is the precision
+    with which the other recordings determine the value. For white noise, the sum of squares then
+    equals the variance of least squares, even if one recording determines most of a value. Values
+    that the other recordings do not determine have no change.
 
     Parameters
     ----------
     problem : sequence of Regression
-        N rows of r columns.
+        N samples of r columns.
     weights : ndarray, shape (N, n)
-        Factors of the rows in the fit.
+        Weight of each sample of each joint in the fit.
     values : ndarray, shape (r,)
         Fitted values.
 
@@ -141,11 +142,12 @@ def cutoff_of_torques(
     used: Conditioning,
 ) -> Conditioning:
     """
-    Lower the cut-off of the position filter while held-out torques are predicted better.
+    Return filters whose position cut-off gives the best prediction of held-out torques.
 
-    The result is the highest cut-off whose held-out loss is within a tenth, or one standard
-    error, of the smallest loss. The cut-off of clean data therefore does not change. Source of the
-    standard error: Breiman et al., Classification and Regression Trees, 1984.
+    The cut-off is halved while held-out torques are predicted better. The result is the highest
+    cut-off whose held-out loss is within a tenth, or one standard error, of the smallest loss. The
+    cut-off of clean data therefore does not change. Source of the standard error: Breiman et al.,
+    Classification and Regression Trees, 1984.
 
     Parameters
     ----------
@@ -164,9 +166,12 @@ def cutoff_of_torques(
         Filters with the chosen cut-off.
 
     """
+    # smallest gain, as a share of the error, for which a cut-off is lowered. Jitter and backlash
+    # increase the error by a third or more on every tested machine.
+    min_gain = 0.1
     recordings = _windows(recordings, 2 * _MAX_ROWS * used.decimation)
     tried: dict[float, list[list[Regression]]] = {}
-    losses: dict[float, FloatArray] = {}
+    good = [used.cutoff_hz]
     cutoff, rows = used.cutoff_hz, 0
     while True:
         lower = replace(used, cutoff_hz=cutoff)
@@ -179,14 +184,18 @@ def cutoff_of_torques(
             break
         rows = max(rows, count)
         tried[cutoff] = problem
-        losses = {hz: _losses(_shared(one, problem)) for hz, one in tried.items()}
+        losses = {hz: _losses(one, problem) for hz, one in tried.items()}
         best = min(losses.values(), key=np.mean)
-        if not _as_good(losses[cutoff], best):
+        worse = {hz: own - best for hz, own in losses.items()}
+        good = [
+            hz
+            for hz, excess in worse.items()
+            if np.mean(excess) <= max(np.std(excess, ddof=1) / np.sqrt(len(excess)), min_gain)
+        ]
+        if cutoff not in good:
             break
         cutoff *= 0.5
-    if not tried:
-        return used
-    return replace(used, cutoff_hz=max(hz for hz, own in losses.items() if _as_good(own, best)))
+    return replace(used, cutoff_hz=max(good))
 
 
 def _windows(recordings: Sequence[Recording], samples: int) -> list[Recording]:
@@ -205,39 +214,24 @@ def _windows(recordings: Sequence[Recording], samples: int) -> list[Recording]:
     return result
 
 
-def _shared(
-    problem: Sequence[Sequence[Regression]], shorter: Sequence[Sequence[Regression]]
-) -> list[Regression]:
-    """Return the rows of each recording that a lower cut-off also has."""
-    # A lower cut-off removes more rows at the ends, while the arm starts and stops.
-    result = []
-    for parts, others in zip(problem, shorter, strict=True):
-        for part in parts:
-            t = part.motion.t
-            inside = [(t >= own.motion.t[0]) & (t <= own.motion.t[-1]) for own in others]
-            kept = np.flatnonzero(np.any(inside, axis=0))
-            if len(kept):
-                result.append(part.select(kept))
-    return result
-
-
-def _as_good(losses: FloatArray, best: FloatArray) -> bool:
-    """Whether losses are within one standard error, or a tenth, of the smallest loss."""
-    # smallest gain, as a share of the error, for which a cut-off is lowered. Jitter and backlash
-    # increase the error by a third or more on every tested machine.
-    min_gain = 0.1
-    worse = losses - best
-    standard_error = np.std(worse, ddof=1) / np.sqrt(len(worse))
-    return bool(np.mean(worse) <= max(float(standard_error), min_gain))
-
-
-def _losses(problem: Sequence[Regression]) -> FloatArray:
-    """Return the held-out loss of each fold, the mean log rms error of its joints, (S,)."""
+def _losses(
+    problem: Sequence[Sequence[Regression]], lowest: Sequence[Sequence[Regression]]
+) -> FloatArray:
+    """Return the mean log rms error with which each of S folds is predicted, shape (S,)."""
     # Odd folds are predicted from even ones, and vice versa; their losses give the standard error
     # of the mean. Every joint counts by the ratio of its errors: a light joint, whose torque is
     # mostly noise, gains by a low cut-off and must not hide that a heavy one loses.
     n_folds = 16
-    _, x, _, y, informative = _some_rows(problem, _MAX_ROWS)
+    # the lowest cut-off has fewer samples at the ends, while the arm starts and stops
+    shared = []
+    for parts, shorter in zip(problem, lowest, strict=True):
+        for part in parts:
+            t = part.motion.t
+            inside = [(t >= own.motion.t[0]) & (t <= own.motion.t[-1]) for own in shorter]
+            kept = np.flatnonzero(np.any(inside, axis=0))
+            if len(kept):
+                shared.append(part.select(kept))
+    _, x, _, y, informative = _some_rows(shared, _MAX_ROWS)
     fold = np.arange(len(y)) * n_folds // len(y)
     residual = np.zeros_like(y)
     whole = _fit(x, y, informative)
@@ -252,7 +246,7 @@ def _losses(problem: Sequence[Regression]) -> FloatArray:
 
 
 def _rms(values: FloatArray, informative: npt.NDArray[np.bool_]) -> FloatArray:
-    """Return the root mean square over the informative rows, shape (n,)."""
+    """Return the root mean square of each joint over its informative samples, shape (n,)."""
     count = np.maximum(informative.sum(axis=0), 1)
     return np.asarray(np.sqrt(np.sum(values**2, axis=0, where=informative) / count))
 
@@ -263,7 +257,7 @@ def _fit(
     weights: npt.NDArray[np.floating] | npt.NDArray[np.bool_],
     precision: FloatArray | float = 0.0,
 ) -> FloatArray:
-    """Fit weighted rows by least squares with a prior at zero, given its precision, (r,)."""
+    """Return the values of a weighted fit whose prior is zero with a given precision, (r,)."""
     rows = (x * weights[:, :, np.newaxis]).reshape(-1, x.shape[2])
     normal = rows.T @ rows
     normal[np.diag_indices_from(normal)] += precision
@@ -273,7 +267,7 @@ def _fit(
 def _some_rows(
     problem: Sequence[Regression], most: int
 ) -> tuple[int, FloatArray, FloatArray, FloatArray, npt.NDArray[np.bool_]]:
-    """Return stride, columns (N, n, r), torque, target and mask of about `most` rows."""
+    """Return every k-th sample, about `most`: k, columns (N, n, r), torque, target and mask."""
     step = max(1, sum(len(part.tau) for part in problem) // most)
     columns, tau, target = (
         np.concatenate([getattr(part, name) for part in problem])[::step]

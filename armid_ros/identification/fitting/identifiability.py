@@ -3,10 +3,11 @@
 """
 Parameters that given data determine, their bounds, and the reasons for undetermined ones.
 
-Parameters that a motion does not separate are grouped. Parameters that the data determine worse
-than the description keep their described values: the mean squared error of an unbiased estimate is
-its variance, and that of the description is its largest expected error squared. If joints move one
-after the other, columns of coupling are small but independent. They would fit noise.
+Parameters that a motion does not separate are grouped into base parameters. Parameters that the
+data determine worse than the description keep their described values. The mean squared error of an
+unbiased estimate is its variance; that of a described value is its largest expected error squared.
+For example, if joints move one after the other, the columns that couple joints are small. Their
+parameters would fit noise.
 
 """
 
@@ -32,7 +33,7 @@ from armid_ros.robots import Robot
 import numpy as np
 import numpy.typing as npt
 
-#: Reason for a parameter without a value that more motion of the joint would give.
+#: Reason for a parameter that more motion of its joint would identify.
 NOT_SHOWN: Literal['this motion does not show it'] = 'this motion does not show it'
 
 #: Half width of a 95 % interval in standard deviations.
@@ -65,7 +66,7 @@ class Unidentified:
 
 
 def excludes_zero(values: npt.ArrayLike, std: npt.ArrayLike) -> npt.NDArray[np.bool_]:
-    """Return whether the 95 % interval of each estimate excludes zero."""
+    """Return for each estimate whether its 95 % confidence interval excludes zero."""
     return np.asarray(np.abs(values) > HALF_WIDTH * np.asarray(std, dtype=float))
 
 
@@ -73,7 +74,7 @@ def unidentified(
     theory: BaseParameters, base: BaseParameters, estimate: Estimate
 ) -> tuple[Unidentified, ...]:
     """
-    List the parameters that data do not identify.
+    Return the parameters that the data of an identification do not determine, with reasons.
 
     Parameters
     ----------
@@ -114,7 +115,7 @@ def excited(
     theory: BaseParameters, problem: Sequence[Regression]
 ) -> tuple[BaseParameters, tuple[Regression, ...]]:
     """
-    Group parameters that a motion does not separate, such as links of a joint at rest.
+    Group the parameters that a motion does not separate, such as those of a joint at rest.
 
     Parameters
     ----------
@@ -139,7 +140,7 @@ def identifiable_base(
     theory: BaseParameters, normal: NormalEquations
 ) -> tuple[BaseParameters, list[int]]:
     """
-    Group parameters that normal equations do not separate.
+    Group the parameters that normal equations do not separate.
 
     Parameters
     ----------
@@ -151,9 +152,9 @@ def identifiable_base(
     Returns
     -------
     base : BaseParameters
-        Base parameters that these rows identify.
+        Base parameters that the normal equations identify.
     kept : list of int
-        Indices of its columns among those of `theory`.
+        Indices of the columns of `base` among those of `theory`.
 
     """
     names = tuple(theory.standard[column] for column in theory.independent)
@@ -167,7 +168,7 @@ def identifiable_base(
 
 
 def bounds(arm: ArmModel, base: BaseParameters) -> tuple[FloatArray, FloatArray]:
-    """Return the bounds of base parameters; a group of parameters has none."""
+    """Return lower and upper bounds of base parameters, infinite for combinations, each (r,)."""
     free = np.full(len(arm.robot.rigid_parameters), np.inf)
     effects = [effect.bounds() for effect in arm.effects]
     lower = np.concatenate([-free, *(limits[0] for limits in effects)])[base.independent]
@@ -180,7 +181,7 @@ def determined(
     arm: ArmModel, base: BaseParameters, problem: Sequence[Regression], method: Method
 ) -> tuple[BaseParameters, tuple[Regression, ...], Solution]:
     """
-    Fix parameters to their described values if these are more certain than the data.
+    Fit base parameters, and fix those at described values that the data determine worse.
 
     Parameters are fixed one at a time, as each fixed parameter makes the others more certain.
 
@@ -200,7 +201,7 @@ def determined(
     base : BaseParameters
         Base parameters that are fitted.
     problem : tuple of Regression
-        Columns of these, with the torque of held parameters as a constant.
+        Columns of the fitted parameters, with the torque of fixed parameters as a constant.
     solution : Solution
         Solution of the returned problem.
 
@@ -235,7 +236,7 @@ def determined(
 
 def base_spread(arm: ArmModel, base: BaseParameters) -> FloatArray:
     """
-    Return the largest expected errors of described base parameters, shape (r,).
+    Return the largest expected error of the described value of each base parameter, shape (r,).
 
     The error is infinite for an effect of unknown size, and if no link has a mass.
 
@@ -249,5 +250,5 @@ def base_spread(arm: ArmModel, base: BaseParameters) -> FloatArray:
 
 
 def near_deviation(robot: Robot) -> FloatArray:
-    """Return the prior standard deviation of rigid parameters about the description, (10 n,)."""
+    """Return the prior standard deviations of described inertial parameters, shape (10 n,)."""
     return np.asarray(robot.described_spread.ravel() / np.sqrt(3.0))

@@ -5,12 +5,13 @@ Fit by instrumental variables from the smoothed motion, and a test for the bias 
 
 Least squares with noisy columns W is biased, because W' W contains the squared noise. With
 columns Z of a motion without encoder noise, the solution of Z' (tau - W theta) = 0 is unbiased.
-The motion without noise is the recorded motion, smoothed to far below the band of the regressor,
-which leaves 1/3000 of the noise of accelerations. Two checks of a least-squares fit use it:
+The motion without noise is the recorded motion, smoothed to far below the band of the regressor.
+Smoothing leaves 1/3000 of the noise of accelerations. Two checks of a least-squares fit use the
+smoothed motion:
 
-- The Durbin-Wu-Hausman test compares the fit with one by instruments.
-- The bias itself comes from a simulation: the arm follows the smoothed motion, noise as in the
-  recorded positions is added to its positions, and it is identified again.
+- The Durbin-Wu-Hausman test compares the least-squares fit with the fit by instruments.
+- A simulation gives the bias: the arm follows the smoothed motion, white noise of the recorded
+  size is added to the positions, and the parameters are fitted again.
 
 Source: Young 2011; Hausman 1978; Janot, Vandanjon and Gautier 2014 for robots, with instruments of
 a simulated arm; Cook and Stefanski 1994 for the simulation.
@@ -33,7 +34,7 @@ from armid_ros.identification.fitting.nonlinear import (
     linearised,
     moved,
     torques,
-    ungrouped,
+    unidentifiable_directions,
 )
 from armid_ros.identification.rows.regression import Regression, weighted_rows
 from armid_ros.identification.rows.signals import (
@@ -51,7 +52,7 @@ from scipy.stats import chi2
 
 
 class _Instrumented(NamedTuple):
-    """Result of an estimate of r parameters by instrumental variables."""
+    """Estimate of r parameters by instrumental variables, and its difference to least squares."""
 
     values: FloatArray
     covariance: FloatArray  # correlation of the residuals included
@@ -63,19 +64,19 @@ def fit_by_instruments(
     fit: FittedValues, recordings: Sequence[Recording], used: Conditioning
 ) -> FittedValues:
     """
-    Fit by instrumental variables from the smoothed motion, starting at a weighted fit.
+    Fit base parameters by instrumental variables from the smoothed motion.
 
     Parameters
     ----------
     fit : FittedValues
-        Weighted least squares.
+        Weighted least-squares fit, the start.
     recordings : sequence of Recording
         Training data.
     used : Conditioning
         Filters.
 
     """
-    base, free = fit.base, ungrouped(fit.arm, fit.base)
+    base, free = fit.base, unidentifiable_directions(fit.arm, fit.base)
     limits, weights = bounds(fit.arm, base), fit.solution.weights
     calm = _smoothed(recordings, used)
     # the torque of an arm may be nonlinear in its parameters
@@ -104,8 +105,8 @@ def _by_instruments(
     """
     Estimate theta by the instrumental-variable equation Z' (tau - W theta) = 0.
 
-    The instruments Z of each stretch have the shape (M, n, r) of its columns W; `weights` are the
-    factors of the rows of both, and `limits` the bounds of physical values.
+    The instruments Z of each stretch have the shape (M, n, r) of its columns W. The `weights`,
+    (N, n), multiply the samples of both; `limits` are the bounds of physical values.
 
     """
     w, target = weighted_rows(problem, weights)
@@ -160,7 +161,7 @@ def _smoothed(recordings: Sequence[Recording], used: Conditioning) -> list[Recor
 @dataclass(frozen=True)
 class NoiseCheck:
     """
-    The effect of encoder noise on an identification.
+    Test whether encoder noise biases an identification, and size of this bias.
 
     Attributes
     ----------
@@ -194,13 +195,13 @@ class NoiseCheck:
 
     @property
     def consistent(self) -> bool:
-        """Whether the test found no significant effect of encoder noise."""
+        """Whether the Durbin-Wu-Hausman test found no significant effect of encoder noise."""
         # significance of the test
         return self.p_value >= 0.05
 
     @property
     def relative_bias(self) -> FloatArray:
-        """Bias in standard deviations of each parameter, shape (r,)."""
+        """Bias of each parameter, in its standard deviations, shape (r,)."""
         return np.asarray(self.bias / np.where(self.std > 0.0, self.std, np.inf))
 
     @property
@@ -211,10 +212,10 @@ class NoiseCheck:
 
     def findings(self) -> tuple[tuple[str, bool], tuple[str, bool]]:
         """
-        Return a sentence per finding, and whether the finding is satisfactory.
+        Return two sentences, on the test and on the bias, each with whether it is satisfactory.
 
         If the test is significant and the bias by noise is negligible, the two fits differ for
-        another reason: a missing effect of the model changes them differently.
+        another reason: a missing effect of the model changes the two fits differently.
 
         """
         found = 'no sign' if self.consistent else 'a sign'
@@ -255,12 +256,12 @@ def check_noise(
     progress: Callable[[float], None] = lambda share: None,
 ) -> NoiseCheck:
     """
-    Test an identification for the effect of encoder noise and estimate its bias.
+    Test whether encoder noise biases an identification, and estimate the bias by simulation.
 
     Parameters
     ----------
     problem_of : callable
-        Function that returns the linear problem of recordings.
+        Function that returns the linear problem of given recordings.
     estimate : Estimate
         Estimate of the identification.
     method : {'ols', 'wls', 'irls'}
@@ -286,28 +287,25 @@ def check_noise(
     found = _by_instruments(problem, [part.columns for part in exact], weights)
     unit = 1.0 / np.sqrt(np.diag(found.covariance))
     sizes, axes = np.linalg.eigh(found.spread * np.outer(unit, unit))
-    # negligible difference between the two fits, in standard deviations. Without it, the test is
-    # too sensitive: two fits of the same data are distinguishable to a thousandth.
+    # A difference of 0.1 standard deviations between the two fits is negligible. Without this
+    # allowance, the test is too sensitive: two fits of the same data differ by a thousandth.
     counted = 1.0 / (sizes.clip(0.0) + 0.1**2)
     statistic = float(np.sum((axes.T @ (found.difference * unit)) ** 2 * counted))
     freedom = max(float(np.sum(sizes.clip(0.0) * counted)), 1.0)  # expected value of the statistic
 
     # A fit with noisy columns V to the torque W beta of exact columns yields M beta, M = V^+ W.
-    # The estimate beta_hat is M times the truth, so its bias is beta_hat - M^-1 beta_hat. This
-    # is M^-1 V^+ times the difference of its torques along the exact and the noisy motion.
+    # The estimate beta_hat is M times the truth, so its bias is beta_hat - M^-1 beta_hat. The bias
+    # is therefore M^-1 V^+ times the difference of the torques of beta_hat along both motions.
     noise = np.sqrt(np.mean([position_noise(r) ** 2 for r in recordings], axis=0))
     values, std = estimate.values, estimate.std
     scale = np.where(std > 0.0, std, 1.0)
-
-    def torque(problem: Sequence[Regression]) -> FloatArray:
-        """Return the weighted torque of linear models, shape (N n,)."""
-        return np.asarray((weights * np.concatenate([p.torque(values) for p in problem])).ravel())
-
-    w, exact_torque = weighted_rows(exact, weights)[0] * scale, torque(exact)
+    w = weighted_rows(exact, weights)[0] * scale
     biases = []
     for k in range(repeats):
         noisy = problem_of([replace(r, q=r.q + noise * rng.normal(size=r.q.shape)) for r in calm])
-        both = np.column_stack([w, exact_torque - torque(noisy)])
+        pairs = zip(exact, noisy, strict=True)
+        lost = np.concatenate([one.torque(values) - other.torque(values) for one, other in pairs])
+        both = np.column_stack([w, (weights * lost).ravel()])
         gain = np.linalg.lstsq(weighted_rows(noisy, weights)[0] * scale, both, rcond=None)[0]
         biases.append(np.linalg.solve(gain[:, :-1], gain[:, -1]))
         progress((k + 3.0) / (repeats + 2))
@@ -325,9 +323,9 @@ def check_noise(
 
 def position_noise(recording: Recording) -> FloatArray:
     """
-    Return the standard deviation of white position noise, shape (n,) [rad or m].
+    Return the standard deviation of the white noise of recorded positions, (n,) [rad or m].
 
-    It follows from the upper end of the spectrum. Jumps across gaps are no noise.
+    The noise follows from the upper end of the spectrum. Jumps across gaps are no noise.
 
     """
     rate = 1.0 / recording.period

@@ -3,8 +3,9 @@
 """
 Weighted and robust least squares of arms, by normal equations.
 
-Normal equations do not grow with the rows, and they add up over stretches, recordings and workers.
-Joints are summed separately, because their weights are known only after all rows.
+The size of normal equations does not depend on the number of samples. Normal equations add up over
+stretches, recordings and workers. Each joint has its own, because the weights of joints are known
+only after all samples.
 
 The standard deviations come from the spectrum of the actual residuals. With filtered,
 over-sampled or badly modelled torque, neighbouring residuals are correlated. Standard deviations
@@ -28,8 +29,8 @@ import scipy.optimize
 
 #: Largest number of iterations of reweighting; the weights converge in three to ten.
 _MAX_ITERATIONS = 20
-#: Share of the largest eigenvalue of normalised columns below which a direction is not
-#: identifiable, given the digits of products of columns.
+#: Share of the largest eigenvalue of normalised products of columns below which a direction is not
+#: identifiable: the rounding error of the products.
 _MIN_EIGENVALUE = 1e-10
 
 Method = Literal['ols', 'wls', 'irls']
@@ -62,9 +63,9 @@ class Solution:
     condition_number : float
         Condition number of the weighted regressor.
     outliers : int
-        Samples whose weight was reduced below one half.
+        Number of samples whose weight was reduced below one half.
     weights : ndarray, shape (N, n)
-        Factors of the rows of all stretches, one after the other.
+        Weight of each sample of each joint, stretches one after the other.
 
     """
 
@@ -79,14 +80,14 @@ class Solution:
 @dataclass(frozen=True, eq=False)
 class NormalEquations:
     """
-    Normal equations of all joints.
+    Normal equations of each joint: products of its columns and its torque with each other.
 
     Attributes
     ----------
     products : ndarray, shape (n, r + 1, r + 1)
-        [W_j, y_j]' [W_j, y_j] of each joint.
+        [W_j, y_j]' [W_j, y_j] of each joint, with columns W_j and target y_j.
     counts : ndarray, shape (n,)
-        Informative rows of each joint.
+        Number of informative samples of each joint.
 
     """
 
@@ -103,9 +104,9 @@ class NormalEquations:
         Parameters
         ----------
         problem : sequence of Regression
-            N rows of each of n joints in r columns.
+            N samples of each of n joints in r columns.
         weights : ndarray, shape (N, n), optional
-            Factors of the rows; by default 1, and 0 for a row that is not informative.
+            Weight of each sample; by default 1, and 0 for a sample that is not informative.
 
         """
         n_joints, rank = problem[0].columns.shape[1:]
@@ -125,11 +126,11 @@ class NormalEquations:
         return cls(products, counts)
 
     def __add__(self, other: NormalEquations) -> NormalEquations:
-        """Add the normal equations of two sets of rows."""
+        """Return the normal equations of two sets of samples together."""
         return NormalEquations(self.products + other.products, self.counts + other.counts)
 
     def restrict(self, columns: Sequence[int] | npt.NDArray[np.intp]) -> NormalEquations:
-        """Return the normal equations of some of the columns."""
+        """Return the normal equations of the columns with the given indices."""
         kept = np.append(np.asarray(columns, dtype=np.intp), self.rank)
         return NormalEquations(self.products[:, kept[:, np.newaxis], kept], self.counts)
 
@@ -139,12 +140,12 @@ class NormalEquations:
         return int(self.products.shape[2]) - 1
 
     def summed(self, scale: npt.ArrayLike = 1.0) -> FloatArray:
-        """Return the sum over joints, each divided by a scale (n,), shape (r + 1, r + 1)."""
+        """Return the sum over joints, (r + 1, r + 1), with the rows of each divided by a scale."""
         weight = np.broadcast_to(np.asarray(scale, dtype=float), self.counts.shape) ** -2.0
         return np.asarray(np.tensordot(weight, self.products, axes=1))
 
     def squares(self, values: FloatArray) -> FloatArray:
-        """Return the sum of the squared residuals of each joint, shape (n,) [(N m)^2]."""
+        """Return the sum of squared residuals of each joint for values, (n,) [(N m)^2]."""
         ends = np.append(values, -1.0)
         # smaller values are rounding errors of the products
         return np.asarray(
@@ -152,12 +153,12 @@ class NormalEquations:
         )
 
     def relative_error_percent(self, values: FloatArray) -> float:
-        """Return 100 |residual| / |target| over all joints."""
+        """Return the residual of given values over the target of all joints, 100 |r| / |y| [%]."""
         whole = self.products[:, -1, -1].sum()
         return float(100.0 * np.sqrt(self.squares(values).sum() / whole))
 
     def joint_std(self, values: FloatArray) -> FloatArray:
-        """Return the standard deviation of the residual of each joint, shape (n,) [N m]."""
+        """Return the standard deviation of each joint's residual for values, (n,) [N m]."""
         counts = np.maximum(self.counts, 1.0)
         rows = float(counts.sum())
         freedom = rows / max(1.0, rows - len(values))  # correction for degrees of freedom
@@ -187,12 +188,12 @@ def solve(
     bounds: tuple[FloatArray, FloatArray] | None = None,
 ) -> Solution:
     """
-    Fit parameters to one or more stretches of motion.
+    Fit parameters to the torques of one or more stretches by least squares.
 
     Parameters
     ----------
     problem : sequence of Regression
-        Stretches with the same columns.
+        Columns and torques of stretches, with the same parameters.
     method : {'ols', 'wls', 'irls'}
         Equal weights; weights by the residual of each joint; the latter with outliers weighted
         down (Huber's function).
@@ -228,7 +229,7 @@ def solve(
 def _robust(
     problem: Sequence[Regression], used: npt.NDArray[np.bool_], fit: WeightedFit
 ) -> tuple[WeightedFit, FloatArray]:
-    """Reduce the weight of outliers; return the fit and the weights before scaling, (N, n)."""
+    """Return a fit with reduced weight of outliers, and the weights before scaling, (N, n)."""
     relative: FloatArray = used.astype(float)
     for _ in range(_MAX_ITERATIONS):
         before = (fit.scale, relative)
@@ -250,16 +251,16 @@ def _robust(
 @dataclass(frozen=True, eq=False)
 class WeightedFit:
     """
-    Solution of weighted least squares.
+    Solution of weighted normal equations.
 
     Attributes
     ----------
     values : ndarray, shape (r,)
         Parameters.
     scale : ndarray, shape (n,)
-        Divisor of the rows of each joint.
+        Divisor of columns and torque of each joint.
     factor, inverse : ndarray, shape (r, r)
-        F, with F' F the products of the weighted columns, and its inverse.
+        Factor F of the products F' F of the weighted columns, and its inverse.
 
     """
 
@@ -271,14 +272,14 @@ class WeightedFit:
 
 def weighted_fit(normal: NormalEquations, *, weighted: bool = True) -> WeightedFit:
     """
-    Fit parameters to normal equations.
+    Solve normal equations, by default with each joint weighted by its own residual.
 
     Parameters
     ----------
     normal : NormalEquations
-        Normal equations of the rows.
+        Products of columns and torques.
     weighted : bool
-        Whether every joint is weighted by its own residual.
+        Whether every joint is weighted by its own residual; otherwise all weights are equal.
 
     """
     fit = scaled_fit(normal, np.ones(len(normal.counts)))
@@ -291,22 +292,22 @@ def weighted_fit(normal: NormalEquations, *, weighted: bool = True) -> WeightedF
 
 
 def scaled_fit(normal: NormalEquations, scale: FloatArray) -> WeightedFit:
-    """Solve normal equations with the rows of every joint divided by a scale, shape (n,)."""
+    """Solve normal equations with columns and torque of each joint divided by a scale, (n,)."""
     products = normal.summed(scale)
     factor, inverse = factored(products[:-1, :-1])
     return WeightedFit(inverse @ (inverse.T @ products[:-1, -1]), scale, factor, inverse)
 
 
 def _positive(scale: FloatArray) -> FloatArray:
-    """Apply a lower bound to scales, so that an exactly fitted joint has a finite weight."""
+    """Return residual scales, (n,), with a lower bound for joints that are fitted exactly."""
     return np.maximum(scale, max(1e-9 * float(np.max(scale)), 1e-100))
 
 
 def factored(products: FloatArray) -> tuple[FloatArray, FloatArray]:
     """
-    Return F with F' F = products, shape (p, p), and its inverse.
+    Return a factor F of products = F' F, shape (p, p), and its inverse.
 
-    Eigenvalues below the rounding error are raised to it.
+    Eigenvalues below the rounding error are raised to the rounding error.
 
     """
     length = np.sqrt(np.diag(products))
@@ -321,14 +322,14 @@ def within(
     values: FloatArray, factor: FloatArray, bounds: tuple[FloatArray, FloatArray]
 ) -> FloatArray:
     """
-    Return the fit within bounds whose predictions are nearest to those without bounds.
+    Return the values within bounds whose torques are nearest to those of an unbounded fit.
 
     Parameters
     ----------
     values : ndarray, shape (r,)
         Values of the unbounded fit.
     factor : ndarray, shape (r, r)
-        F with F' F the products of the weighted columns.
+        Factor F of the products F' F of the weighted columns.
     bounds : tuple of two ndarray, each of shape (r,)
         Lower and upper bounds.
 
@@ -344,7 +345,7 @@ def within(
 
 def informative_basis(products: FloatArray) -> FloatArray:
     """
-    Return a basis of the identifiable directions.
+    Return a basis B of the identifiable directions of parameters, scaled to unit variance.
 
     Parameters
     ----------
@@ -354,7 +355,7 @@ def informative_basis(products: FloatArray) -> FloatArray:
     Returns
     -------
     ndarray, shape (p, k)
-        Basis B, where B B' is the pseudo-inverse of the products.
+        Basis, where B B' is the pseudo-inverse of the products.
 
     """
     scale = 1.0 / np.sqrt(np.maximum(np.diag(products), 1e-300))
@@ -362,8 +363,8 @@ def informative_basis(products: FloatArray) -> FloatArray:
     lower, failed = scipy.linalg.lapack.dpotrf(scaled, lower=True)
     if not failed and len(scaled):
         inverse, _ = scipy.linalg.lapack.dtrtri(lower, lower=True)
-        # every direction is determined: the smallest eigenvalue is at least 1 / trace(inverse),
-        # and the largest is at most trace(products)
+        # every direction is identifiable, as the smallest eigenvalue is at least
+        # 1 / trace(inverse), and the largest is at most trace(products)
         if np.sum(inverse**2) * np.trace(scaled) * _MIN_EIGENVALUE <= 1.0:
             return np.asarray(scale[:, np.newaxis] * inverse.T)
     values, vectors = np.linalg.eigh(scaled)
@@ -373,7 +374,7 @@ def informative_basis(products: FloatArray) -> FloatArray:
 
 def informative_solution(products: FloatArray, aim: FloatArray) -> FloatArray:
     """
-    Solve normal equations; unidentifiable directions stay zero.
+    Solve normal equations, with zero in the directions that are not identifiable.
 
     Parameters
     ----------
@@ -393,9 +394,9 @@ def informative_solution(products: FloatArray, aim: FloatArray) -> FloatArray:
 
 def scaled_inverse(matrix: FloatArray) -> FloatArray:
     """
-    Invert a covariance or a precision, (p, p), with values of any units.
+    Return the inverse of a covariance or precision, (p, p), of values with different units.
 
-    Eigenvalues below the rounding error are raised to it.
+    Eigenvalues below the rounding error are raised to the rounding error.
 
     """
     scale = 1.0 / np.sqrt(np.maximum(np.diag(matrix), 1e-300))

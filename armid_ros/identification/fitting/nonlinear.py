@@ -5,9 +5,9 @@ Least squares by Gauss-Newton for an arm whose torque may be nonlinear in its pa
 
 Friction in proportion to the load, gains of torque sensors, zeros of encoders, gravity and
 elasticity change the columns of all other parameters. A fit with the columns of the description
-is therefore only the first step. The arm is linearised again at the fitted values until the
-linear model and the arm have the same torque. Steps that worsen the fit are damped (Marquardt
-1963).
+is therefore only the first step. The model of the arm is linearised again at the fitted values
+until the linear and the nonlinear model have the same torque. Steps that worsen the fit are damped
+(Marquardt 1963).
 
 """
 
@@ -20,7 +20,6 @@ from armid_ros.arm import ArmModel
 from armid_ros.identification.fitting.identifiability import bounds
 from armid_ros.identification.fitting.least_squares import Method, Solution, solve
 from armid_ros.identification.rows.regression import (
-    Fit,
     predictions,
     Regression,
     regressions,
@@ -45,12 +44,12 @@ Torques = tuple[FloatArray, ...]
 @dataclass(frozen=True)
 class FittedValues:
     """
-    Fitted values with their arm and their torque.
+    Fitted base parameters, the arm model with these values, and its torque.
 
     Attributes
     ----------
     arm : ArmModel
-        The arm with the values.
+        The arm model with the fitted values.
     base : BaseParameters
         Base parameters that the data identify.
     values : ndarray, shape (r,)
@@ -58,13 +57,13 @@ class FittedValues:
     problem : tuple of Regression
         Linear problem of the last step.
     solution : Solution
-        Solution of that problem: covariance, weights.
+        Solution of the linear problem: covariance, weights.
     predicted : tuple of ndarray, each of shape (M, n)
         Torque of the arm, filtered, for each stretch [N m].
     passes : int
         Number of linearisations; 1 if the torque is linear.
-    settled : bool
-        Whether the linear model and the arm agree.
+    converged : bool
+        Whether the torques of the linear and the nonlinear model agree.
 
     """
 
@@ -75,15 +74,7 @@ class FittedValues:
     solution: Solution
     predicted: Torques
     passes: int = 1
-    settled: bool = True
-
-    @property
-    def fits(self) -> tuple[Fit, ...]:
-        """Return the predicted torques of the training data."""
-        return tuple(
-            Fit(part.source, part.motion, part.informative, torque)
-            for part, torque in zip(self.problem, self.predicted, strict=True)
-        )
+    converged: bool = True
 
 
 def fit_values(
@@ -97,12 +88,12 @@ def fit_values(
     solution: Solution | None = None,
 ) -> FittedValues:
     """
-    Fit base parameters: one linear solution, or Gauss-Newton steps if effects make them nonlinear.
+    Fit base parameters by one linear solution, or by Gauss-Newton steps if the arm is nonlinear.
 
     Parameters
     ----------
     arm : ArmModel
-        Start of the fit; parameters that the data do not determine keep its values.
+        Start of the fit; parameters that the data do not determine keep the values of this model.
     base : BaseParameters
         Base parameters that the data identify at the start.
     problem : sequence of Regression
@@ -117,12 +108,12 @@ def fit_values(
         Orthonormal directions of the rigid parameters that change no torque; by default, all that
         `base` does not identify.
     solution : Solution, optional
-        Solution of the problem, if known.
+        Solution of `problem`, if known.
 
     """
     solution = solution or solve(problem, method, bounds(arm, base))
     motions = [part.motion for part in problem]
-    chosen = ungrouped(arm, base) if free is None else free
+    chosen = unidentifiable_directions(arm, base) if free is None else free
     reached = moved(arm, base, solution.values, chosen)
     bare = arm.with_theta(
         np.where(np.arange(len(arm.theta)) < len(arm.robot.rigid_parameters), arm.theta, 0.0)
@@ -131,8 +122,7 @@ def fit_values(
         problem, _ = linearised(arm, base, recordings, used)
     elif not curved(arm, reached, motions):
         predicted = tuple(part.torque(solution.values) for part in problem)
-        # parameters nearest to the description, if their torque along this motion is the fitted
-        # one
+        # parameters nearest to the description, if they have the fitted torque along this motion
         nearest = arm.with_theta(base.lift(solution.values, arm.theta))
         rigid = len(arm.robot.rigid_parameters)
         if free is None and (
@@ -146,12 +136,12 @@ def fit_values(
 
 def curved(before: ArmModel, after: ArmModel, motions: Sequence[Motion]) -> bool:
     """
-    Whether the torque between two arms is nonlinear in their parameters.
+    Return whether the torque is nonlinear in the parameters between the values of two arm models.
 
     Parameters
     ----------
     before, after : ArmModel
-        Two arms that differ in their values.
+        Two models of an arm that differ in their values.
     motions : sequence of Motion
         Motions along which torques are computed.
 
@@ -172,15 +162,15 @@ def curved(before: ArmModel, after: ArmModel, motions: Sequence[Motion]) -> bool
 
 def moved(arm: ArmModel, base: BaseParameters, values: FloatArray, free: FloatArray) -> ArmModel:
     """
-    Return the arm with new values of its base parameters.
+    Return the arm model with new values of its base parameters.
 
-    In unidentifiable directions, effects keep their values and rigid parameters change as little
-    as possible: an unidentifiable direction of rigid parameters is so with any effects.
+    In unidentifiable directions, effects keep their values and inertial parameters change as
+    little as possible: these directions are unidentifiable with any effects.
 
     Parameters
     ----------
     arm : ArmModel
-        Arm with the present values.
+        Model with the present values.
     base : BaseParameters
         The base parameters that are identifiable.
     values : ndarray, shape (r,)
@@ -197,8 +187,8 @@ def moved(arm: ArmModel, base: BaseParameters, values: FloatArray, free: FloatAr
     links = theta[:rigid].reshape(-1, len(LINK_PARAMETERS))
     lacking = (np.abs(links[:, 0]) < NO_MASS) & np.any(np.abs(links[:, 1:4]) >= NO_MASS, axis=1)
     if np.any(lacking):
-        # the fit gave a first moment to a link without described mass. The mass of this link is
-        # not identifiable: with suitable changes of previous links, it changes no torque
+        # The fit gave a first moment to a link without described mass. The mass of this link is
+        # not identifiable: with suitable changes of previous links, it changes no torque.
         mass = np.zeros_like(links)
         # the centre of mass of such a link is assumed 0.2 m away
         mass[lacking, 0] = np.linalg.norm(links[lacking, 1:4], axis=1) / 0.2
@@ -210,30 +200,30 @@ def linearised(
     arm: ArmModel, base: BaseParameters, recordings: Sequence[Recording], used: Conditioning
 ) -> tuple[tuple[Regression, ...], Torques]:
     """
-    Linearise the torque of an arm about its present values.
+    Linearise the torque of an arm model about its present values.
 
     Returns
     -------
     problem : tuple of Regression
-        Linear model whose torque at the values of the arm is the arm's torque.
+        Linear model that has the torque of the arm model at these values.
     predicted : tuple of ndarray, each of shape (M, n)
-        Torque of the arm, filtered [N m].
+        Torque of the arm model, filtered [N m].
 
     """
     predicted = torques(arm, recordings, used)
     problem = regressions(arm, base.independent, recordings, used)
-    return through(problem, predicted, base.values(arm.theta)), predicted
+    return exact_at(problem, predicted, base.values(arm.theta)), predicted
 
 
 def torques(arm: ArmModel, recordings: Sequence[Recording], used: Conditioning) -> Torques:
-    """Return the filtered torque of an arm along every stretch of recordings."""
+    """Return the filtered torque of an arm model along each stretch of recordings."""
     return tuple(part.predicted for part in predictions(arm, recordings, used))
 
 
-def through(
+def exact_at(
     problem: Sequence[Regression], predicted: Torques, values: FloatArray
 ) -> tuple[Regression, ...]:
-    """Shift linear models so that they predict the exact torque at the given values."""
+    """Return linear problems with constants for which given values predict given torques."""
     return tuple(
         replace(part, constant=torque - part.columns @ values)
         for part, torque in zip(problem, predicted, strict=True)
@@ -241,15 +231,20 @@ def through(
 
 
 def agree(
-    problem: Sequence[Regression], weights: FloatArray, promised: Torques, predicted: Torques
+    problem: Sequence[Regression], weights: FloatArray, linear: Torques, predicted: Torques
 ) -> bool:
-    """Whether the torque of an arm agrees with its linear model."""
-    off = _size(weights, [p - q for p, q in zip(promised, predicted, strict=True)])
-    whole = _size(weights, [part.tau for part in problem])
-    residual = [part.tau - torque for part, torque in zip(problem, promised, strict=True)]
-    # linear model and arm agree where they differ by less than this share of the residual,
-    # or of the torque
-    return bool(off <= max(1e-4 * _size(weights, residual), _MIN_TORQUE_SHARE * whole))
+    """Return whether torques of a linear model agree with those of the nonlinear model."""
+    measured = [part.tau for part in problem]
+    difference, torque, residual = (
+        float(np.linalg.norm(weights * np.concatenate(parts)))
+        for parts in (
+            [one - other for one, other in zip(linear, predicted, strict=True)],
+            measured,
+            [tau - one for tau, one in zip(measured, linear, strict=True)],
+        )
+    )
+    # a smaller share of the residual, or of the torque, is irrelevant
+    return difference <= max(1e-4 * residual, _MIN_TORQUE_SHARE * torque)
 
 
 def _iterate(
@@ -261,54 +256,54 @@ def _iterate(
     method: Method,
     free: FloatArray,
 ) -> FittedValues:
-    """Take damped Gauss-Newton steps until the linear model and the arm agree."""
+    """Take damped Gauss-Newton steps until the linear and the nonlinear model agree."""
     # damping factors of a step, relative to the squared columns
     dampings = tuple(10.0 ** np.arange(-8.0, 3.0))
     limits = bounds(arm, base)
     now = _State(arm, base.values(arm.theta), problem)
-    passes, settled = 0, True
+    passes, converged = 0, True
     while True:
         passes += 1
         solution = solve(now.problem, method, limits)
-        promised = tuple(part.torque(solution.values) for part in now.problem)
+        linear = tuple(part.torque(solution.values) for part in now.problem)
         # decrease of the cost that corresponds to one standard deviation of one parameter
-        if passes > 1 and abs(now.gain(promised)) < 1.0:
+        if passes > 1 and abs(now.gain(linear)) < 1.0:
             break
         trial: _State | None = None
-        vain = 0.0
+        unattained = 0.0  # largest decrease of the cost that a linear model predicts
         # the undamped step if its cost is near the predicted one, otherwise the best damped step
         for damping in (0.0, *dampings):
             values = now.damped(damping, limits) if damping else solution.values
             if damping:
-                vain = max(vain, now.gain(tuple(part.torque(values) for part in now.problem)))
+                expected = tuple(part.torque(values) for part in now.problem)
+                unattained = max(unattained, now.gain(expected))
             stepped = moved(now.arm, base, values, free)
             predicted = torques(stepped, recordings, used)
             if now.cost(predicted) <= now.cost(None if trial is None else trial.predicted):
-                trial = _State(stepped, values, through(now.problem, predicted, values))
+                trial = _State(stepped, values, exact_at(now.problem, predicted, values))
             # largest ratio of the cost of an undamped step to the cost that the linear model
             # predicts
-            if not damping and now.cost(predicted) <= 2.0 * now.cost(promised):
+            if not damping and now.cost(predicted) <= 2.0 * now.cost(linear):
                 break
         if trial is None:
-            # largest unattained decrease of the cost, as a share of it, with which a fit counts as
-            # converged
-            settled = vain < 0.5 * now.cost()
+            # largest unattained decrease, as a share of the cost, of a fit that has converged
+            converged = unattained < 0.5 * now.cost()
             break
-        settled = agree(now.problem, solution.weights, promised, trial.predicted)
+        converged = agree(now.problem, solution.weights, linear, trial.predicted)
         # decrease of the cost by a step below which the iteration ends
-        settled = settled or now.gain(trial.predicted) < 0.1
-        if settled or passes == _MAX_PASSES:
+        converged = converged or now.gain(trial.predicted) < 0.1
+        if converged or passes == _MAX_PASSES:
             now = trial
             break
         fresh = regressions(trial.arm, base.independent, recordings, used)
-        now = _State(trial.arm, trial.values, through(fresh, trial.predicted, trial.values))
+        now = _State(trial.arm, trial.values, exact_at(fresh, trial.predicted, trial.values))
     return FittedValues(
-        now.arm, base, now.values, now.problem, solution, now.predicted, max(passes, 2), settled
+        now.arm, base, now.values, now.problem, solution, now.predicted, max(passes, 2), converged
     )
 
 
 class _State:
-    """State of an iteration: arm, values, linear model and residual."""
+    """Step of a Gauss-Newton iteration: arm model, its values, linear problem and residual."""
 
     def __init__(self, arm: ArmModel, values: FloatArray, problem: Sequence[Regression]) -> None:
         self.arm, self.values, self.problem = arm, values, tuple(problem)
@@ -321,8 +316,8 @@ class _State:
         self._weights = self._used / np.maximum(rms, _MIN_TORQUE_SHARE * max(rms.max(), 1e-100))
 
     def gain(self, predicted: Torques) -> float:
-        """Return the decrease of the cost with predicted torques; zero without a residual."""
-        # a smaller residual torque counts as zero
+        """Return by how much predicted torques reduce the cost; zero without a residual."""
+        # a smaller residual torque is a rounding error
         if np.linalg.norm(self._used * self._residual) <= 1e-6 * np.linalg.norm(
             self._used * self._tau
         ):
@@ -339,17 +334,13 @@ class _State:
         return np.clip(self.values + step / np.where(size > 0.0, size, np.inf), *limits)
 
     def cost(self, predicted: Torques | None = None) -> float:
-        """Return the total squared residual, in units of the present rms of each joint."""
+        """Return the sum of squared residuals of predicted torques over the present rms errors."""
         if predicted is None:
             return float(np.sum((self._weights * self._residual) ** 2))
         residual = self._weights * (self._tau - np.concatenate(predicted))
         return float(np.sum(residual**2))
 
 
-def ungrouped(arm: ArmModel, base: BaseParameters) -> FloatArray:
-    """Return changes of the rigid parameters that change no base parameter, (10 n, k)."""
+def unidentifiable_directions(arm: ArmModel, base: BaseParameters) -> FloatArray:
+    """Return orthonormal changes of inertial parameters that change no torque, (10 n, k)."""
     return np.asarray(scipy.linalg.null_space(base.grouping[:, : len(arm.robot.rigid_parameters)]))
-
-
-def _size(weights: FloatArray, torque: Sequence[FloatArray]) -> float:
-    return float(np.linalg.norm(weights * np.concatenate(torque)))

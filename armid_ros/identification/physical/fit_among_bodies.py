@@ -247,16 +247,16 @@ def fit_to_bodies(
     if free.passes == 1:
         return fit, certificate
     for passes in range(1, 8):
-        promised = tuple(part.torque(fit.values) for part in fit.problem)
+        linear = tuple(part.torque(fit.values) for part in fit.problem)
         problem, predicted = linearised(fit.arm, fit.base, recordings, used)
         fit = replace(fit, predicted=predicted, passes=free.passes + passes)
-        if agree(fit.problem, fit.solution.weights, promised, predicted):
-            return replace(fit, settled=free.settled), certificate
+        if agree(fit.problem, fit.solution.weights, linear, predicted):
+            return replace(fit, converged=free.converged), certificate
         solution = solve(problem, method, bounds(fit.arm, fit.base))
         fit = replace(fit, problem=problem, solution=solution)
         fit, certificate = _bodies(arm, fit, settings)
     predicted = torques(fit.arm, recordings, used)
-    return replace(fit, predicted=predicted, settled=False), certificate
+    return replace(fit, predicted=predicted, converged=False), certificate
 
 
 def _bodies(
