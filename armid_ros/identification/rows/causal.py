@@ -3,7 +3,7 @@
 """
 Causal filtering and differentiation of a stream of joint states.
 
-Two low-passes in series. The motion filter G turns positions into positions, velocities and
+Two low-passes are in series. The motion filter G turns positions into positions, velocities and
 accelerations and is applied to the torque as well. The regressor, a nonlinear function of the
 motion, is evaluated behind G, and the row filter F is applied to its rows and to the torque. F is
 linear and the same on both sides, so the equation tau = Y theta holds for filtered signals, for
@@ -29,23 +29,23 @@ from scipy import signal as signals
 
 #: Cut-off frequency (-3 dB) of three equal lags in series, divided by that of a single lag.
 _CUTOFF_OF_POLE = float(np.sqrt(2.0 ** (1.0 / 3.0) - 1.0))
-#: G is faster than F by this factor, where the sampling rate allows it.
+#: Cut-off of the motion filter over that of the row filter, where the sampling rate allows it.
 MOTION_FILTER_RATIO = 4.0
-#: Largest valid position or torque [SI units]; squares of larger numbers dominate the rest.
+#: Largest valid position or torque [SI units]; squares of larger numbers dominate all others.
 MAX_MAGNITUDE = 1e6
 
 
 def check_gap(samples: int) -> None:
-    """Raise an error for a largest gap below 1 sample."""
+    """Raise an error if the longest gap to interpolate across is below 1 sample."""
     if samples < 1:
         raise IdentificationError(
-            f'the longest interruption to bridge has to be at least 1 sample, not {samples}'
+            f'the longest gap to interpolate across, {samples} samples, has to be 1 or more'
         )
 
 
 class TripleLag:
     """
-    Three equal first-order lags in series, 1 / (1 + s / pole)^3, for a stack of signals.
+    Low-pass for several signals: three equal first-order lags in series, 1 / (1 + s / pole)^3.
 
     The response is exact for a signal that is linear between its samples, at any intervals. The
     stages therefore give exact derivatives of the output, also with jitter of the stamps.
@@ -71,12 +71,12 @@ class TripleLag:
         return 3.0 / self.pole
 
     def reset(self) -> None:
-        """Clear the state; the next sample starts at rest."""
+        """Forget all samples; the next sample is the initial output."""
         self._state = None
 
     def update(self, dt: float, signal: FloatArray) -> FloatArray:
         """
-        Filter the next sample of a stack of signals.
+        Filter the next sample of all signals.
 
         Parameters
         ----------
@@ -103,7 +103,7 @@ class TripleLag:
         return stages
 
     def _set_step(self, dt: float) -> None:
-        """Compute the state transition of the three lags for a time step."""
+        """Set the transition matrix of the three lags for a time step [s]."""
         # A ramp u is followed by stage i at u - i * slope / pole; the rest decays.
         x, step = self.pole * dt, self._step
         self._dt = dt
@@ -120,12 +120,12 @@ class TripleLag:
 
 class CausalMotion(NamedTuple):
     """
-    One sample of joint motion behind the motion filter.
+    Motion and torque of all joints at one time, after the motion filter.
 
     Attributes
     ----------
     t : float
-        Stamp of the newest sample in it [s].
+        Time stamp of the newest sample [s].
     q, dq, ddq, tau : ndarray, shape (n,)
         Filtered position, velocity, acceleration, torque.
 
@@ -140,13 +140,13 @@ class CausalMotion(NamedTuple):
 
 class CausalFilter:
     """
-    Filter and differentiate a stream of joint states.
+    Motion filter for a stream of joint states, which also differentiates positions.
 
     The sampling period is the median of the first intervals, learned again after every restart.
     A sample with a wrong length, or with a number that is not finite or above MAX_MAGNITUDE, is
     left out and counted; the signal is interpolated across it. A gap, or a stamp that does not
-    increase, restarts the filter. Until it has settled again, it has no output. A
-    `SpikeGate` removes full turns of positions beforehand.
+    increase, restarts the filter. A started filter has no output until its initial state has
+    decayed. A `SpikeGate` removes full turns of positions beforehand.
 
     Parameters
     ----------
@@ -169,7 +169,7 @@ class CausalFilter:
     Attributes
     ----------
     generation : int
-        Number of starts; later filters have to restart when it changes.
+        Number of starts; filters behind this one have to restart when it changes.
     period : float or None
         Sampling period [s], None until it is known.
     rejected, restarts : Counter of str
@@ -198,7 +198,7 @@ class CausalFilter:
         self.reset()
 
     def reset(self) -> None:
-        """Restart, and set the counters to zero."""
+        """Restart the filter, and set the counters to zero."""
         self.rejected: Counter[str] = Counter()
         self.restarts: Counter[str] = Counter()
         self._begin()
@@ -226,18 +226,18 @@ class CausalFilter:
         self, t: float, q: npt.ArrayLike, dq: npt.ArrayLike | None, tau: npt.ArrayLike
     ) -> FloatArray | None:
         """
-        Stack the signals of one joint state, shape (2 n,) or (3 n,).
+        Return position, velocity if used, and torque of a valid joint state in one array.
 
         Parameters
         ----------
         t : float
-            Stamp [s].
+            Time stamp [s].
         q, dq, tau : array_like, shape (n,)
             Measured position, velocity (or None) and torque.
 
         Returns
         -------
-        ndarray or None
+        ndarray, shape (2 n,) or (3 n,), or None
             None for a sample that is left out.
 
         """
@@ -259,7 +259,7 @@ class CausalFilter:
         return signal
 
     def advance(self, t: float, signal: FloatArray) -> CausalMotion | None:
-        """Filter a stacked signal; None while the filter settles."""
+        """Filter the array of a joint state; None until the initial state has decayed."""
         dt = 0.0 if self._last is None else t - self._last
         longest = self.max_gap * self.period if self.period else np.inf
         if self._last is not None and not 0.0 < dt <= longest:
@@ -286,7 +286,7 @@ class CausalFilter:
         return CausalMotion(t, value[:n], dq[:n], ddq[:n], value[-n:])
 
     def _missing(self, t: float, dt: float, signal: FloatArray) -> list[FloatArray]:
-        """Return interpolated samples for a gap before a sample."""
+        """Return interpolated samples for the gap of length `dt` [s] before a sample."""
         # A straight line would have no acceleration in the gap. A cubic goes through the sample
         # after the gap and three samples before it. Their distances equal the gap, so the cubic
         # has hardly more noise than the samples.
@@ -305,7 +305,7 @@ class CausalFilter:
         return list(np.vander(inside, len(place)) @ factors)
 
     def _learn_period(self, dt: float) -> None:
-        """Add an interval; create the filter after enough intervals."""
+        """Add an interval between samples [s]; create the filter after 20 intervals."""
         if dt > 0.0:
             self._intervals.append(dt)
         if len(self._intervals) < 20:  # too few for a median
@@ -329,20 +329,20 @@ class CausalFilter:
 @dataclass(frozen=True)
 class RowNoise:
     """
-    White noise behind the filters.
+    Noise of rows after the filters, relative to the white noise of samples.
 
-    Noise of samples, of standard deviation s and density s^2 T, has the variance s^2 T B behind a
-    filter H. Its bandwidth B is the integral of |H|^2 over all frequencies. Rows at intervals of
-    `step` hold step B independent observations each.
+    Noise of samples, of standard deviation s and density s^2 T, has the variance s^2 T B after a
+    filter H. The noise bandwidth B of the filter is the integral of |H|^2 over all frequencies.
+    Each row at intervals of `step` holds step B independent observations.
 
     Attributes
     ----------
     bandwidth : float
-        B [Hz].
+        Noise bandwidth B of both filters [Hz].
     gain : float
         Standard deviation of the noise of a row over that of a sample.
     single : float
-        Error of one sample that moves a row as much as noise of 1 in all samples does.
+        Error of one sample that changes a row as much as noise of 1 in all samples does.
 
     """
 
@@ -352,7 +352,7 @@ class RowNoise:
 
     @classmethod
     def of(cls, period: float, motion_pole: float, row_pole: float) -> RowNoise:
-        """Return the noise behind motion filter and row filter, given their poles [rad/s]."""
+        """Return the noise of rows, given the period [s] and the poles of both filters [rad/s]."""
         # impulse response of both filters in series, over and in units of the row filter's pole;
         # its square has the integral of the squared gain over all frequencies (Parseval)
         ratio = motion_pole / row_pole
@@ -364,12 +364,12 @@ class RowNoise:
         return cls(bandwidth, gain, gain / (period * row_pole * float(np.max(response))))
 
     def independent(self, step: float) -> float:
-        """Return the number of independent observations in a row, `step` [s] after the last."""
+        """Return the number of independent observations in a row, `step` s after the last row."""
         return min(1.0, self.bandwidth * step)
 
 
 def sensor_noise(robot: Robot, given: tuple[float, ...] | None) -> FloatArray:
-    """Return the noise of the torque of each joint, a share of its limit if not given, (n,)."""
+    """Return the torque noise of each joint, (n,): given, or a share of the joint's limit."""
     if given is not None:
         noise = np.array(given, dtype=np.float64)
         if noise.shape != (robot.n_joints,):

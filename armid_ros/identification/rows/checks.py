@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Conditions that recordings have to meet for an identification, with remedies."""
+"""Checks of recordings before an identification: motion, limits, sign and unit of the torque."""
 
 from __future__ import annotations
 
@@ -20,17 +20,17 @@ from scipy.ndimage import maximum_filter1d
 
 #: A joint that stays within this range is at rest [rad or m].
 REST_RANGE = 1e-3
-#: Excess of a position over a limit that is no fault, as a share of the range: a stop gives way,
-#: and an encoder has noise.
+#: Largest excess of a position over a limit that is no fault, as a share of the range: a stop
+#: gives way, and an encoder has noise.
 _LIMIT_SLACK = 0.01
-#: Shortest recording with a movement [s].
+#: Shortest recording that is long enough for a movement [s].
 MIN_DURATION = 1.0
 #: Correlation of measured and described torque above which their ratio is meaningful: four fifths
 #: of the power are explained.
 MIN_CORRELATION = 0.9
-#: Units of torque that are mistaken for N m, with their number per N m.
+#: Units of torque that are mistaken for N m: number of units in 1 N m.
 TORQUE_UNITS = {'N mm': 1e3, 'N cm': 1e2, 'kN m': 1e-3}
-#: The same, with degrees for radians and units of force on a lever. These two are tested for all
+#: Units of torque, degrees for radians, and units of force on a lever. These are tested for all
 #: joints at once, as a load may increase the torque of one joint tenfold.
 _UNITS_OF_ALL = {
     **TORQUE_UNITS,
@@ -42,22 +42,22 @@ _UNITS_OF_ALL = {
 #: Largest ratio between a factor of torques and the factor of their unit: masses of a description
 #: are wrong by less.
 MAX_UNIT_RATIO = 1.5
-#: Unit of force of a prismatic joint that corresponds to each unit of torque.
+#: Unit of the force of a prismatic joint for each unit of torque.
 FORCE_UNITS = {'N m': 'N', 'N mm': 'mN', 'N cm': 'cN', 'kN m': 'kN'}
 #: Share of its top speed below which a joint may be held by friction with any torque.
 SLOW_SHARE = 0.05
-#: Message on missing torques.
-SILENT = 'the torque of every joint is constant; fill in effort'
+#: Message on torques that do not change.
+SILENT = 'the torque of every joint is constant; fill in the effort of the joint states'
 
 
 def check_motion(robot: Robot, recordings: Sequence[Recording]) -> tuple[str, ...]:
     """
-    Return notes on recordings, such as joints at rest; raise an error without usable motion.
+    Return a note on joints at rest in recordings; raise an error without usable motion.
 
     Raises
     ------
     IdentificationError
-        Naming the recording, the joint and the remedy.
+        If a recording is too short, positions are far out of the limits, or all joints rest.
 
     """
     for recording in recordings:
@@ -73,19 +73,19 @@ def check_motion(robot: Robot, recordings: Sequence[Recording]) -> tuple[str, ..
 
 
 def check_held_out(robot: Robot, held_out: Sequence[Recording]) -> None:
-    """Raise an error for recordings without motion, which cannot validate a model."""
+    """Raise an error if no joint moves in a held-out recording, which then validates no model."""
     for recording in held_out:
         resting(robot, recording.source, np.ptp(recording.q, axis=0))
 
 
 def too_short_to_tell(recordings: Sequence[Recording]) -> tuple[str, ...]:
-    """Return a note if the total time of recordings is short."""
+    """Return a note if recordings are shorter than 5 s in total."""
     duration = sum(recording.duration for recording in recordings)
     return (f'{duration:.2g} s is short; record 20 s or more',) if duration < 5.0 else ()
 
 
 def moving(motions: Iterable[Motion]) -> npt.NDArray[np.bool_]:
-    """Return which joints move in any of some motions, shape (n,)."""
+    """Return for each joint whether it moves in any of the given motions, shape (n,)."""
     ranges = np.max([np.ptp(motion.q, axis=0) for motion in motions], axis=0)
     return np.asarray(ranges >= REST_RANGE)
 
@@ -109,15 +109,15 @@ def check_torque(
     arm: ArmModel, recordings: Sequence[Recording], problem: Sequence[Regression]
 ) -> tuple[str, ...]:
     """
-    Raise an error for absent torques, wrong signs or units, or torques of a controller.
+    Return a note on constant torques; raise an error for torques that no arm model explains.
 
-    Comparison with described links reveals sign and unit, if all comparable joints agree.
+    The torque of the described links reveals sign and unit, if all comparable joints agree.
     Friction reveals the sign of the other joints.
 
     Raises
     ------
     IdentificationError
-        Naming the joints and the remedy.
+        For absent torques, wrong signs or units, or torques of a controller.
 
     """
     robot = arm.robot
@@ -151,8 +151,8 @@ def check_torque(
     if driven:
         raise IdentificationError(f'{source}: {driven}')
     for part in problem:
-        for law in laws_of_controllers(robot, part.motion, part.informative):
-            raise IdentificationError(f'{part.source or "recording"}: {law}')
+        for fault in laws_of_controllers(robot, part.motion, part.informative):
+            raise IdentificationError(f'{part.source or "recording"}: {fault}')
     if silent:
         return (f'torque constant throughout: {", ".join(silent)}',)
     return ()
@@ -160,10 +160,10 @@ def check_torque(
 
 def driven_by_friction(robot: Robot, motions: Sequence[Motion]) -> str:
     """
-    Return an error on joints whose torque clearly has the opposite sign of friction, or ''.
+    Return a message on joints whose torque has the opposite sign of friction; empty if none.
 
     The described torque, weight and inertia are fitted per joint and subtracted. The residual of a
-    wrist is friction, the only evidence for the sign of its torque.
+    wrist is friction, the only evidence for the sign of the wrist's torque.
 
     """
     found, whole = [], joined(motions)
@@ -190,36 +190,36 @@ def laws_of_controllers(
     robot: Robot, motion: Motion, informative: npt.NDArray[np.bool_]
 ) -> tuple[str, ...]:
     """
-    Return messages if the torque of every driven joint is a law of position and direction alone.
+    Return a message for each driven joint if all torques depend only on position and direction.
 
     Gravity compensation outputs the weight of the arm while a hand moves it; energy shaping
     outputs a constant torque in the direction of motion. Such a torque does not contain the torque
     of inertia. A fit then attributes everything to friction, or finds an arm without mass. If only
-    some joints follow such a law, the model lacks their inertia instead, and there is no message.
+    some joints have such a torque, the model lacks their inertia instead, and there is no message.
 
     The motion has R samples, with the torque filtered alike; `informative`, (R, n), is false where
-    a joint is at rest. There is no message if at least as many joints cannot be tested.
+    a joint is at rest. There is no message if at least half of the joints cannot be tested.
 
     """
-    # rows where a joint reverses, and three on either side, which filters smear
+    # samples where a joint reverses, and three on either side, which filters smear
     speed = np.abs(motion.dq)
     slow = speed <= REST_SPEED * speed.max(axis=0, initial=0.0)
     slow[1:] |= np.diff(np.sign(motion.dq), axis=0) != 0
     smeared = maximum_filter1d(slow, 7, axis=0, mode='constant')
-    # 5000 rows are about sixty for every value of seven joints
+    # 5000 samples are about sixty for every parameter of seven joints
     some = slice(None, None, max(1, len(motion) // 5000))
     informative = (informative & ~smeared)[some]
     motion = motion.select(some)
     assert motion.tau is not None
     weight, needed = regressor(robot, motion.at_rest()), inverse_dynamics(robot, motion)
-    laws: list[str] = []
+    found: list[str] = []
     untested = 0
     for joint, (name, unit) in enumerate(zip(robot.joints, robot.torque_units, strict=True)):
         rows = informative[:, joint]
         tau = motion.tau[rows, joint]
         direction = np.sign(motion.dq[rows, joint])
         law = np.column_stack([weight[rows, joint], direction, np.ones_like(tau)])
-        # with fewer rows, any torque fits a law
+        # with fewer samples, any torque follows a law of position and direction
         rank = int(np.linalg.matrix_rank(law)) if len(law) else 0
         if len(law) < 10 * max(rank, 1):
             untested += 1
@@ -229,34 +229,34 @@ def laws_of_controllers(
             for y in (tau, needed[rows, joint])
         )
         size = float(np.sqrt(np.mean(tau**2)))
-        # smallest torque of a driven joint as a share of the torque of the model. With less, the
-        # joint swings freely, or the model is wrong.
+        # smallest torque of a driven joint as a share of the torque of the model. With a smaller
+        # torque, the joint swings freely, or the model is wrong.
         if size < 0.5 * float(np.sqrt(np.mean(needed[rows, joint] ** 2))):
             continue
-        # largest residual of a law as a share of the torque: friction of a real joint depends on
-        # speed, so it differs by more from a law without speed; and over the torque that the
-        # model needs in addition to the law: no model has an inertia that is ten times too large
+        # largest residual of the law, as a share of the torque: friction of a real joint depends
+        # on speed, so it differs by more from a law without speed; and as a share of the torque
+        # that the model needs in addition: no model has an inertia that is ten times too large
         if residual > 0.03 * size or residual > 0.1 * lacking:
             return ()
-        laws.append(
-            f'the torque of {name} is a law of position and direction of motion alone, to '
+        found.append(
+            f'the torque of {name} depends only on position and direction of motion, to '
             f'{100 * residual / size:.1f} %. A controller that holds the weight or pushes along '
-            f'makes such a torque. The {lacking:.2g} {unit} of the inertia are missing in it. '
+            f'makes such a torque, which lacks the {lacking:.2g} {unit} of the inertia. '
             'Something else moves the arm, or body and friction cannot be distinguished: record '
             'the arm while it follows a trajectory'
         )
-    return tuple(laws) if len(laws) > untested else ()
+    return tuple(found) if len(found) > untested else ()
 
 
 def check_positions(robot: Robot, source: str, lowest: FloatArray, highest: FloatArray) -> None:
-    """Raise an error for joints far out of limits, by lowest and highest positions (n,)."""
+    """Raise an error if the range of positions of a joint is far out of its limits."""
     problem = position_problem(robot, lowest, highest)
     if problem:
         raise IdentificationError(f'{source}: {problem}')
 
 
 def position_problem(robot: Robot, lowest: FloatArray, highest: FloatArray) -> str:
-    """Return an error on the joint farthest out of limits, by ranges (n,); empty if none."""
+    """Return a message on the joint farthest out of its limits by its range; empty if none."""
     # largest excess of positions over the limits that is no wrong unit: two turns of a joint that
     # a controller lets spin [rad], or one metre [m]
     turning, sliding = 4.0 * np.pi, 1.0
@@ -285,7 +285,7 @@ def position_problem(robot: Robot, lowest: FloatArray, highest: FloatArray) -> s
 
 
 def beyond_limits(robot: Robot, recordings: Sequence[Recording]) -> tuple[str, ...]:
-    """Return a note on joints that exceed described limits, with position and limit."""
+    """Return a note on joints that exceed the limits of the description, or nothing."""
     slack = _LIMIT_SLACK * (robot.upper - robot.lower)
     found = []
     for sign, limits, ends in (
@@ -306,10 +306,10 @@ def beyond_limits(robot: Robot, recordings: Sequence[Recording]) -> tuple[str, .
 
 def torque_factors(arm: ArmModel, motions: Sequence[Motion]) -> tuple[FloatArray, FloatArray]:
     """
-    Regress measured torques on those of a model, after an offset is removed.
+    Return the factor between measured torques and those of a model, joint by joint.
 
-    If the model has no effects, friction is removed as well. Otherwise only samples in motion are
-    used, as friction holds a joint at rest with any torque.
+    An offset is fitted too, and friction if the model has no effects. With effects, only samples
+    in motion are used, as friction holds a joint at rest with any torque.
 
     Returns
     -------
@@ -338,7 +338,7 @@ def torque_factors(arm: ArmModel, motions: Sequence[Motion]) -> tuple[FloatArray
 
 
 def joined(motions: Sequence[Motion]) -> Motion:
-    """Return all samples of motions with torques, in order."""
+    """Return one motion with the samples of several motions with torques, in order."""
     names = ('t', 'q', 'dq', 'ddq', 'tau')
     arrays = [np.concatenate([getattr(motion, name) for motion in motions]) for name in names]
     return Motion(motions[0].joints, *arrays)
@@ -346,18 +346,18 @@ def joined(motions: Sequence[Motion]) -> Motion:
 
 def unit_of(factor: float, of_joints: Sequence[float] = (), near_force: float = 1.2) -> str:
     """
-    Return the units that explain a factor of torques, joined by 'or'; '' if there are none.
+    Return the units of torque that explain a factor of torques, joined by 'or'; empty if none.
 
     Parameters
     ----------
     factor : float
-        Factor of the torques of all joints together.
+        Measured over expected torques of all joints together.
     of_joints : sequence of float
-        Factors of single joints. A unit has to fit each of them; gains of currents differ.
+        Factors of single joints. A unit has to explain each factor; gains of currents differ.
     near_force : float
-        Largest ratio between a factor and that of a unit of force on a lever. These are near
-        gains of currents: 10 N m/A is 1.02 kgf m/A. Wrong masses change the factor of one joint
-        by a fifth.
+        Largest ratio between a factor and the factor of a unit of force on a lever. The latter
+        are near gains of currents: 10 N m/A is 1.02 kgf m/A. Wrong masses change the factor of
+        one joint by a fifth.
 
     """
     if factor <= 0.0:
@@ -372,5 +372,5 @@ def unit_of(factor: float, of_joints: Sequence[float] = (), near_force: float = 
 
 
 def residual_of_fit(values: FloatArray, columns: FloatArray) -> FloatArray:
-    """Return the residual of a least-squares fit of values by columns, shape (N, ...)."""
+    """Return values, (N, ...), minus their least-squares fit by columns, (N, k)."""
     return np.asarray(values - columns @ np.linalg.lstsq(columns, values, rcond=None)[0])

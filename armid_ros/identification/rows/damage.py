@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Detection of damaged samples of a recording, as in a stream (`spikes`), and interpolation."""
+"""Detection of damaged samples of a recording by the gate of a stream, and interpolation."""
 
 from __future__ import annotations
 
@@ -32,11 +32,11 @@ def without_damage(
     recordings: Sequence[Recording], used: Conditioning
 ) -> tuple[list[Recording], tuple[str, ...]]:
     """
-    Interpolate across damaged samples; return the recordings, and notes on the damage.
+    Return recordings with damaged samples replaced by interpolation, and notes on the damage.
 
-    A torque sample is damaged if it changes a filtered row by more than noise does. Before any
-    fit, the noise is assumed as a share of the spread of the torque. A recording without damage is
-    the same object.
+    A torque sample is damaged if it changes the filtered torque by more than noise does. Before
+    any fit, the noise is assumed as a share of the spread of the torque. A recording without
+    damage is the same object.
 
     """
     peak = float(np.max(used.taps) / np.sum(used.taps))
@@ -48,24 +48,24 @@ def without_damage(
             continue
         some = tau[:: max(1, len(tau) // 10_000)]  # enough for a spread within 2 %
         spread = 1.4826 * np.median(np.abs(some - np.median(some, axis=0)), axis=0)
-        # noise of a torque over the spread of that torque, assumed before any fit
+        # the noise of a torque is assumed to be 1 % of its spread
         floor = np.concatenate([np.zeros(len(joints)), 0.01 * spread / peak])
         excursions = impossible_excursions(t, np.hstack([recording.q, tau]), floor)
         damaged = [sample.t for one in excursions for sample in one.samples]
         good = ~np.isin(t, damaged)
         if not damaged or not good.any():
             continue
-        names = [f'{what} of {joint}' for what in ('position', 'effort') for joint in joints]
+        names = [f'{kind} of {joint}' for kind in ('position', 'effort') for joint in joints]
         named = [
             f'{names[int(np.argmax(one.ratio))]} at {sample.t:.3f} s'
             for one in excursions
             for sample in one.samples
         ]
         named[3:] = ['...'] if len(damaged) > 3 else []
-        what = '1 sample jumps and comes back; it was'
+        jump = '1 sample jumps and comes back; it was'
         if len(damaged) > 1:
-            what = f'{len(damaged)} samples jump and come back; they were'
-        found.append(f'{recording.source}: {what} interpolated across: {", ".join(named)}')
+            jump = f'{len(damaged)} samples jump and come back; they were'
+        found.append(f'{recording.source}: {jump} replaced by interpolation: {", ".join(named)}')
         q, dq, tau = (
             x if x is None else np.column_stack([np.interp(t, t[good], c[good]) for c in x.T])
             for x in (recording.q, recording.dq, tau)
@@ -77,19 +77,19 @@ def without_damage(
 
 def impossible_excursions(t: FloatArray, x: FloatArray, floor: FloatArray) -> list[Excursion]:
     """
-    Return the physically impossible excursions of a recording, as found by a gate.
+    Return the excursions of signals that jump and come back, as no real motion or torque does.
 
-    Usual errors and ranges are those of the whole recording. The gate processes only samples
-    that differ too much from their prediction, and the samples after them.
+    A `SpikeGate` finds them with the prediction errors and ranges of the whole recording. It
+    processes only samples that differ too much from their prediction, and the samples after them.
 
     Parameters
     ----------
     t : ndarray, shape (N,)
-        Stamps, at least 3, each after the one before [s].
+        Increasing time stamps, at least 3 [s].
     x : ndarray, shape (N, 2 n)
         Positions and torques; angles are not wrapped.
     floor : ndarray, shape (2 n,)
-        Negligible error of a sample.
+        Negligible error of each signal of a sample.
 
     Returns
     -------
@@ -132,9 +132,9 @@ def _suspects(
     """
     Find samples that are off the straight line through the two samples before them.
 
-    Returns the first sample of the stretch of each sample, (N,), whether a signal of a sample is
-    off its line by more than the largest allowed error, (N,), and the usual error in the noisiest
-    part.
+    Returns for each sample the first sample of its stretch, (N,), and whether a signal is off its
+    line by more than the largest allowed error, (N,); then the prediction errors in the noisiest
+    window.
 
     """
     dt = np.diff(t)

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Search for the period of a motion."""
+"""Search for the period of a periodic motion in recorded positions."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 
 def find_period(t: FloatArray, positions: FloatArray) -> tuple[int, slice] | None:
     """
-    Find a repeated period in the positions of a motion.
+    Return the period of recorded positions and where it repeats; None if no period repeats.
 
     Parameters
     ----------
@@ -39,7 +39,7 @@ def find_period(t: FloatArray, positions: FloatArray) -> tuple[int, slice] | Non
     change = np.abs(np.gradient(q, axis=0))
     speed = change.max(axis=1)
     moving = speed > 0.05 * speed.max()
-    allowed = tolerance + change  # at this stage, the lag is known to one sample
+    allowed = tolerance + change  # here, the lag is known to one sample
     shortest = int(1.5 * rate / stride)  # the shortest period is 1.5 s
     best: tuple[int, int, int] | None = None
     for lag in range(shortest, int(0.7 * len(q))):
@@ -53,7 +53,7 @@ def find_period(t: FloatArray, positions: FloatArray) -> tuple[int, slice] | Non
         if length <= 0.6 * lag or (best is not None and length <= 1.2 * (best[2] - best[1])):
             continue
         # smallest range of some joint in a period, over the tolerance: slower motion agrees with
-        # itself after any lag. Of 108 recordings of 17 arms, 30 % more or less changes none.
+        # itself after any lag. In 108 recordings of 17 arms, 30 % more or less changes no period.
         if np.ptp(q[start : start + lag], axis=0).max() > 3.0 * tolerance:
             best = lag, start, stop
     if best is None:
@@ -66,14 +66,14 @@ def find_period(t: FloatArray, positions: FloatArray) -> tuple[int, slice] | Non
 
 
 def refined_period(positions: FloatArray, lag: int, where: slice) -> float:
-    """Return a period of `find_period` with a fraction of a sample, from a parabola [samples]."""
+    """Return the period at the minimum of a parabola through three lags around it [samples]."""
     before, least, after = (_mean_change(positions, lag + shift, where) for shift in (-1, 0, 1))
     bend = before - 2.0 * least + after
     return lag + float(0.5 * (before - after) / bend) if 0.0 < bend < np.inf else float(lag)
 
 
 def _mean_change(positions: FloatArray, lag: int, where: slice) -> float:
-    """Return the mean square change of positions (N, n) after a lag, from some samples on."""
+    """Return the mean square difference between positions, (N, n), and those one lag later."""
     end = min(where.stop, len(positions) - lag)
     gap = positions[where.start + lag : end + lag] - positions[where.start : end]
     return float(np.mean(gap**2))

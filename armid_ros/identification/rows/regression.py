@@ -1,13 +1,13 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-The linear problem of an identification: decimated torques and base columns, joint by joint.
+The linear problem of an identification: filtered torques and regressor columns of each joint.
 
 Where a joint reverses between two samples, the time at which its dry friction changed sign is
 unknown. While the joint stops, friction has any value between its limits. An error of the sign
 opposes the acceleration at every reversal, so it does not average out and reduces the estimated
-inertia. Torques and columns are therefore both interpolated across these samples before the
-filters, so that their equation remains valid.
+inertia. Torques and columns are therefore both interpolated across these samples before they are
+filtered. The equation between them remains valid.
 
 """
 
@@ -38,12 +38,12 @@ _Columns = Callable[[Motion], FloatArray]
 @dataclass(frozen=True)
 class Stretch:
     """
-    Rows of one unbroken stretch of a recording, filtered and decimated.
+    Filtered, decimated motion and torque of a stretch of a recording without gaps.
 
     Attributes
     ----------
     source : str
-        Source recording.
+        Path of the recording.
     motion : Motion
         Decimated motion of M samples with the filtered measured torque.
     informative : ndarray of bool, shape (M, n)
@@ -65,15 +65,15 @@ class Stretch:
 @dataclass(frozen=True)
 class Regression(Stretch):
     """
-    Linear problem of a stretch, with the same filters on both sides.
+    Linear problem of a stretch: measured torque = columns times parameters + constant.
 
     Attributes
     ----------
     columns : ndarray, shape (M, n, r)
-        Filtered columns of the chosen parameters.
+        Regressor columns of the chosen parameters, filtered like the torque.
     constant : ndarray, shape (M, n), or float
-        Filtered torque of the linear model where all values are zero: 0 for a model that is linear
-        in all its parameters.
+        Filtered torque of the linear model if all parameters are zero: 0 for a model that is
+        linear in all its parameters.
 
     """
 
@@ -81,30 +81,30 @@ class Regression(Stretch):
     constant: FloatArray | float = 0.0
 
     def __post_init__(self) -> None:
-        """Freeze the columns."""
+        """Make the columns read-only."""
         object.__setattr__(self, 'columns', read_only(self.columns))
 
     @property
     def target(self) -> FloatArray:
-        """Return the torque that the columns are fitted to, shape (M, n)."""
+        """Return the measured torque minus the constant, to which columns are fitted, (M, n)."""
         return np.asarray(self.tau - self.constant)
 
     def torque(self, values: FloatArray) -> FloatArray:
-        """Return the torque of the linear model for values of the columns, shape (M, n)."""
+        """Return the torque of the linear model for parameter values, (r,), shape (M, n)."""
         return np.asarray(self.columns @ values + self.constant)
 
     def residual(self, values: FloatArray) -> FloatArray:
-        """Return the residual torque for values of the columns, shape (M, n)."""
+        """Return the residual torque for parameter values, (r,), shape (M, n)."""
         return np.asarray(self.target - self.columns @ values)
 
     def restrict(self, columns: Sequence[int] | npt.NDArray[np.intp]) -> Regression:
-        """Return the problem with the given columns only; no copy if all are given in order."""
+        """Return the problem with the columns of given indices; not copied if all in order."""
         if np.array_equal(columns, np.arange(self.columns.shape[2])):
             return self
         return replace(self, columns=self.columns[:, :, columns])
 
     def select(self, rows: npt.NDArray[np.intp]) -> Regression:
-        """Return the problem with some of its rows."""
+        """Return the problem with the samples of given indices."""
         return replace(
             self,
             motion=self.motion.select(rows),
@@ -122,14 +122,14 @@ def regressions(
     progress: Callable[[float], None] | None = None,
 ) -> list[Regression]:
     """
-    Set up the linear problem of some columns of an arm's regressor on recordings.
+    Return the linear problem of chosen regressor columns of an arm, per stretch of recordings.
 
     Parameters
     ----------
     arm : ArmModel
         Rigid body and effects.
     columns : ndarray of int, shape (r,)
-        Indices of the columns to keep, as in ``arm.parameters``, such as the independent ones.
+        Indices of the columns to keep, as in ``arm.parameters``, such as the independent columns.
     recordings : sequence of Recording
         Data with torques.
     used : Conditioning
@@ -140,7 +140,7 @@ def regressions(
     Returns
     -------
     list of Regression
-        One per unbroken stretch.
+        One per stretch without gaps.
 
     """
     result = []
@@ -158,19 +158,19 @@ def regressions(
 @dataclass(frozen=True)
 class Fit(Stretch):
     """
-    Prediction of a stretch by a model.
+    Measured and predicted torque of a stretch of a recording.
 
     Attributes
     ----------
     predicted : ndarray, shape (M, n)
-        Torque of the model, filtered alike [N m].
+        Torque of the model, filtered like the measured torque [N m].
 
     """
 
     predicted: FloatArray
 
     def __repr__(self) -> str:
-        """Return source, number of samples and relative error in a line."""
+        """Return recording, number of samples and relative error in one line."""
         error = Score.of([self]).relative_error_percent
         return f'Fit of {self.source}: {len(self.motion)} samples, {error:.2f} % relative error'
 
@@ -183,7 +183,7 @@ class Fit(Stretch):
 @dataclass(frozen=True)
 class Score:
     """
-    Prediction error of a model on recordings.
+    Errors of the torque that a model predicts on recordings.
 
     Attributes
     ----------
@@ -205,7 +205,7 @@ class Score:
 
     @staticmethod
     def of(fits: Sequence[Fit]) -> Score:
-        """Return the common score of one or more stretches."""
+        """Return the errors on all samples of one or more stretches."""
         names = 'residual', 'tau', 'informative'
         return Score.of_rows(*(np.concatenate([getattr(f, one) for f in fits]) for one in names))
 
@@ -213,7 +213,7 @@ class Score:
     def of_rows(
         residual: FloatArray, tau: FloatArray, informative: npt.NDArray[np.bool_]
     ) -> Score:
-        """Return the score of informative rows of residuals and torques, each (N, n)."""
+        """Return the errors of informative samples of residuals and torques, each (N, n)."""
         errors, lengths = (np.linalg.norm(informative * x, axis=0) for x in (residual, tau))
         count, whole = np.maximum(informative.sum(axis=0), 1), np.linalg.norm(lengths)
         return Score(
@@ -227,7 +227,7 @@ class Score:
 def weighted_rows(
     problem: Sequence[Regression], weights: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Return weighted columns (N n, r) and targets (N n,) of all stretches; weights are (N, n)."""
+    """Return columns, (N n, r), and targets, (N n,), of all stretches, times weights, (N, n)."""
     columns = np.concatenate([part.columns for part in problem])
     target = np.concatenate([part.target for part in problem])
     rows = weights[:, :, np.newaxis] * columns
@@ -235,12 +235,12 @@ def weighted_rows(
 
 
 def by_stretch(problem: Sequence[Stretch], rows: FloatArray) -> list[FloatArray]:
-    """Split rows of all stretches, (N, ...), into one array per stretch."""
+    """Split an array of the samples of all stretches, (N, ...), into one array per stretch."""
     return np.split(rows, np.cumsum([len(part.motion) for part in problem])[:-1])
 
 
 def predictions(arm: ArmModel, recordings: Sequence[Recording], used: Conditioning) -> list[Fit]:
-    """Return the predicted torque of an arm along recordings, one per unbroken stretch."""
+    """Return measured and predicted torque of an arm model per stretch of recordings."""
     found = []
     for recording in recordings:
         for motion in segments(recording, used):
@@ -256,7 +256,7 @@ def _rows(
     rest: npt.NDArray[np.bool_],
     unsure: npt.NDArray[np.bool_],
 ) -> tuple[Motion, npt.NDArray[np.bool_]]:
-    """Return the decimated motion and torque of a stretch, and the mask of informative rows."""
+    """Return the decimated motion and torque of a stretch, and which samples are informative."""
     kept = np.array(decimated_samples(len(motion), used), dtype=np.intp)
     assert motion.tau is not None
     tau = decimate(bridged(motion.tau, unsure), used)
@@ -271,7 +271,7 @@ def filtered_columns(
     unsure: npt.NDArray[np.bool_],
 ) -> FloatArray:
     """
-    Filter and decimate some columns of an arm's regressor along one unbroken stretch.
+    Return chosen regressor columns of an arm along a stretch, filtered and decimated.
 
     Parameters
     ----------
@@ -280,7 +280,7 @@ def filtered_columns(
     columns : ndarray of int, shape (r,)
         Indices of the columns to keep, as in ``arm.parameters``.
     motion : Motion
-        The stretch at the full rate.
+        Motion of the stretch at the full sampling rate.
     used : Conditioning
         Filters.
     unsure : ndarray of bool, shape (N, n)
@@ -298,7 +298,8 @@ def filtered_columns(
         (partial(arm.columns_of, effect), len(values), effect.instantaneous)
         for effect, values in zip(arm.effects, arm.values, strict=True)
     ]
-    # functions of a part of the motion, with the indices of their columns there and in the result
+    # functions that need only neighbouring samples, with the indices of their columns among those
+    # of the function and in the result
     local: list[tuple[_Columns, Samples, Samples]] = []
     first = 0
     for function, size, instantaneous in parts:
@@ -336,7 +337,7 @@ def filtered_columns(
 
 
 def _as_slice(indices: npt.NDArray[np.intp]) -> Samples:
-    """Return adjacent indices as a slice, which copies nothing."""
+    """Return adjacent indices as a slice, which copies no array; others unchanged."""
     adjacent = len(indices) and np.array_equal(indices, indices[0] + np.arange(len(indices)))
     return slice(int(indices[0]), int(indices[-1]) + 1) if adjacent else indices
 
@@ -345,14 +346,14 @@ def held_samples(
     arm: ArmModel, motion: Motion
 ) -> tuple[npt.NDArray[np.bool_], npt.NDArray[np.bool_]]:
     """
-    Return at which samples dry friction holds a joint, so that its friction is unknown.
+    Return the samples of each joint at which its dry friction is unknown: rest and reversals.
 
     Returns
     -------
     rest : ndarray of bool, shape (N, n)
-        Samples of a joint at rest, which friction may hold with any torque.
+        Samples at which the joint is at rest; friction may hold it with any torque.
     unsure : ndarray of bool, shape (N, n)
-        Samples next to a reversal of a moving joint.
+        Samples next to a reversal of the moving joint.
 
     """
     rest, unsure = np.zeros((2, *motion.q.shape), dtype=bool)
@@ -374,14 +375,14 @@ def held_samples(
 
 def bridged(values: FloatArray, unsure: npt.NDArray[np.bool_]) -> FloatArray:
     """
-    Interpolate values of each joint across its samples whose friction is unknown.
+    Return values with linear interpolation across samples whose friction is unknown.
 
     Parameters
     ----------
     values : ndarray, shape (N, n, ...)
         Torques or columns.
     unsure : ndarray of bool, shape (N, n)
-        Samples to replace; those at an end get the value of the nearest sure sample.
+        Samples of each joint to replace; at an end, the nearest other sample gives the value.
 
     Returns
     -------

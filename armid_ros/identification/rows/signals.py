@@ -1,11 +1,11 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Conditioning of recorded signals for the fit of a model.
+Filters, differentiation and decimation of recorded signals for the fit of a model.
 
 Positions are low-passed without phase (Butterworth of order 4, forwards and backwards) and
 differentiated by central differences. Torque and regressor then pass the same low-pass and are
-decimated together, so that the filter acts alike on both sides of the equation (parallel
+decimated together. The filter therefore acts alike on both sides of the equation (parallel
 filtering; Gautier 1997).
 
 """
@@ -32,14 +32,14 @@ from scipy.ndimage import correlate1d
 
 #: Band of torque and regressor over that of the motion, with harmonics of friction steps.
 MODEL_BANDS = 10.0
-#: Samples per period of the cut-off that describe a smooth function of the filtered positions.
+#: Samples per period of the cut-off that suffice for a smooth function of the filtered positions.
 _SMOOTH_SAMPLES = 5.0
-#: Ratio of a spectrum of positions to its noise below which it is only noise.
+#: Ratio of the spectrum of positions to the noise level below which the spectrum is only noise.
 NOISE_MARGIN = 3.0
 #: Periods of the cut-off that are removed at both ends, where the filter lacks neighbours.
 EDGE_PERIODS = 4.0
-#: Shortest stretch in periods of the cut-off: the periods removed at both ends, and two more.
-#: The edges of the decimation are extra.
+#: Shortest stretch in periods of the cut-off: the periods removed at both ends, and two more,
+#: without the samples that the decimation removes.
 _CUTOFF_PERIODS = 2.0 * EDGE_PERIODS + 2.0
 #: Best resolution of a drive, as a share of its torque: 13 bits. In a simulation without noise,
 #: errors of differentiation are smaller.
@@ -53,14 +53,14 @@ _MIN_SAMPLES = 4
 @dataclass(frozen=True)
 class SignalSettings:
     """
-    Settings of the filters; None is replaced by a value from the recording.
+    Cut-off and decimation given by the user; None for a value that is chosen from recordings.
 
     Attributes
     ----------
     cutoff_hz : float or None
         Cut-off of the position filter [Hz].
     decimation : int or None
-        Keep one sample of this many; the filter before it passes 0.4 of the new rate.
+        Number of samples of which one is kept; the low-pass before passes 0.4 of the new rate.
 
     """
 
@@ -70,15 +70,17 @@ class SignalSettings:
     def __post_init__(self) -> None:
         """Raise an error for a cut-off or decimation out of range."""
         if self.cutoff_hz is not None and not self.cutoff_hz > 0.0:
-            raise IdentificationError(f'the cut-off, {self.cutoff_hz} Hz, has to be positive')
+            raise IdentificationError(
+                f'the cut-off of positions, {self.cutoff_hz} Hz, has to be positive'
+            )
         if self.decimation is not None and self.decimation < 1:
-            raise IdentificationError(f'decimation is {self.decimation}, but has to be 1 or more')
+            raise IdentificationError(f'the decimation, {self.decimation}, has to be 1 or more')
 
 
 @dataclass(frozen=True)
 class Conditioning:
     """
-    Filters for recordings of one sampling rate.
+    Low-pass of positions and decimation of rows, for recordings of one sampling rate.
 
     Attributes
     ----------
@@ -87,7 +89,7 @@ class Conditioning:
     cutoff_hz : float
         Cut-off of the position filter [Hz].
     decimation : int
-        Factor of the decimation.
+        Number of samples of which one is kept.
     given : frozenset of {'cutoff', 'decimation'}
         Settings given by the user; the others were chosen from recordings.
 
@@ -100,13 +102,13 @@ class Conditioning:
 
     @property
     def kept_hz(self) -> float:
-        """Upper frequency of the signal in the rows [Hz]."""
-        # the decimation filter ends at this share of the rate of the rows
+        """Highest frequency of decimated signals [Hz]."""
+        # the decimation filter ends at this share of the decimated rate
         return 0.4 * self.rate_hz / self.decimation
 
     @cached_property
     def taps(self) -> FloatArray:
-        """Symmetric decimation filter; a single 1 without decimation."""
+        """Coefficients of the symmetric decimation filter; a single 1 without decimation."""
         if self.decimation == 1:
             return read_only(np.ones(1))
         count = 2 * _HALF_TAPS * self.decimation + 1
@@ -116,7 +118,7 @@ class Conditioning:
     @property
     def smooth_stride(self) -> int:
         """
-        Largest stride for smooth functions of the filtered positions, in samples.
+        Largest stride at which smooth functions of filtered positions need values, in samples.
 
         The spectrum of positions ends at the cut-off, that of smooth functions slightly above.
         Five samples per period of the cut-off are enough for the pass band of the decimation.
@@ -129,7 +131,7 @@ class Conditioning:
 
 def conditioning(recordings: Sequence[Recording], settings: SignalSettings) -> Conditioning:
     """
-    Choose the cut-off and the decimation for recordings of one kind.
+    Choose the cut-off of positions and the decimation for recordings of one sampling rate.
 
     The cut-off of positions is the frequency at which their spectrum falls to their noise. It is
     at most a fifth of the sampling rate, as derivatives above are only noise. It is also at most
@@ -154,8 +156,8 @@ def conditioning(recordings: Sequence[Recording], settings: SignalSettings) -> C
             for q in _unbroken_positions(recording, rate)
         ]
         band = MODEL_BANDS * _motion_band(parts, rate)
-        # Largest cut-off of positions, divided by the band of the rows. The Butterworth filter,
-        # applied in both directions, changes that band by at most 5^-8, which is below
+        # Largest cut-off of positions over the band of torque and regressor. The Butterworth
+        # filter, applied in both directions, changes that band by at most 5^-8, which is below
         # TORQUE_RESOLUTION.
         position_bands = 5.0
         if decimation is None:
@@ -169,8 +171,8 @@ def conditioning(recordings: Sequence[Recording], settings: SignalSettings) -> C
             f'{recordings[0].source}: a cut-off of {cutoff:g} Hz needs more than '
             f'{2 * cutoff:g} samples/s; the recording has {rate:g}'
         )
-    asked = {'cutoff': settings.cutoff_hz, 'decimation': settings.decimation}
-    given = frozenset(name for name, value in asked.items() if value is not None)
+    options = {'cutoff': settings.cutoff_hz, 'decimation': settings.decimation}
+    given = frozenset(name for name, value in options.items() if value is not None)
     return Conditioning(rate, cutoff, decimation, given)
 
 
@@ -178,7 +180,7 @@ def velocity_error(recording: Recording, used: Conditioning) -> FloatArray:
     """
     Return the error of velocities that are computed from filtered positions.
 
-    One part is white noise of the positions up to the cut-off, times the square of its frequency.
+    One part is white noise of the positions up to the cut-off, times the square of the frequency.
     The other part is motion above the cut-off, which the filter removes.
 
     Returns
@@ -196,18 +198,19 @@ def velocity_error(recording: Recording, used: Conditioning) -> FloatArray:
 
 def segments(recording: Recording, used: Conditioning) -> Iterator[Motion]:
     """
-    Yield the unbroken stretches of a recording as filtered motions on even time bases.
+    Yield the motion of each stretch without a gap, at even times, with filtered positions.
 
-    Each has the recorded torque unchanged; the position is filtered and differentiated. Stretches
-    too short for the filters are left out.
+    Positions are differentiated as well; torques are unchanged. Stretches too short for the
+    filters are left out.
 
     """
     if recording.tau is None:
-        lacking = [what for what in recording.report.absent if what.startswith('effort')]
+        lacking = [field for field in recording.report.absent if field.startswith('effort')]
+        effort = ''.join(lacking) or 'effort'
         raise IdentificationError(
-            f'{recording.source}: {recording.topic} has no {"".join(lacking) or "effort"} (absent '
-            'or NaN throughout). Identification needs the torque of every joint in '
-            'JointState.effort: fill it in, or leave joints out with --joints'
+            f'{recording.source}: {recording.topic} has no {effort} (absent or NaN throughout). '
+            'Identification needs the torque of every joint in JointState.effort: fill it in, or '
+            'leave joints out with --joints'
         )
     positions = recording.q
     if recording.partner is not None:
@@ -223,20 +226,20 @@ def segments(recording: Recording, used: Conditioning) -> Iterator[Motion]:
 
 
 def unbroken(recording: Recording, rate: float) -> list[npt.NDArray[np.intp]]:
-    """Return the samples of every stretch without a gap, by their indices."""
+    """Return the indices of the samples of each stretch without a gap."""
     longest = GAP_PERIODS * max(1.0 / rate, recording.period)
     breaks = np.flatnonzero(np.diff(recording.t) > longest) + 1
     return np.split(np.arange(len(recording.t)), breaks)
 
 
 def _shortest(used: Conditioning) -> float:
-    """Return the shortest stretch that the filters can process [s]."""
+    """Return the duration of the shortest stretch that the filters can process [s]."""
     edges = 2 * _HALF_TAPS * used.decimation / used.rate_hz  # of the decimation
     return edges + _CUTOFF_PERIODS / used.cutoff_hz
 
 
 def no_stretch(recording: Recording, used: Conditioning) -> IdentificationError:
-    """Return the error for a recording whose stretches are all too short, with the cause."""
+    """Return the error for a recording without a stretch long enough, with cause and remedy."""
     uneven = uneven_stamps(recording, used.cutoff_hz)
     if uneven:
         return IdentificationError(uneven)
@@ -258,16 +261,16 @@ def no_stretch(recording: Recording, used: Conditioning) -> IdentificationError:
 
 def decimate(values: FloatArray, used: Conditioning, stride: int = 1) -> FloatArray:
     """
-    Low-pass and decimate along the first axis.
+    Return values after the low-pass and the decimation of torque and regressor.
 
     Parameters
     ----------
     values : ndarray, shape (ceil(N / stride), ...)
-        Samples at the full rate, or every stride-th of them.
+        Samples at the full rate, or every stride-th sample.
     used : Conditioning
-        The filter.
+        Filters.
     stride : int
-        A divisor of the decimation; above 1 only for values without content beyond the filter.
+        Divisor of the decimation; above 1 only for values without frequencies beyond the filter.
 
     Returns
     -------
@@ -300,13 +303,13 @@ def decimate(values: FloatArray, used: Conditioning, stride: int = 1) -> FloatAr
 
 
 def decimated_samples(n_samples: int, used: Conditioning) -> range:
-    """Return the indices of the full-rate samples at the times of the decimated ones."""
+    """Return the indices of the samples at the full rate that decimated samples belong to."""
     half = (len(used.taps) - 1) // 2
     return range(half, max(half, n_samples - half), used.decimation)
 
 
 def _even(t: FloatArray, period: float, *signals: FloatArray) -> tuple[FloatArray, ...]:
-    """Return equidistant times and the signals at them, by cubic splines if stamps jitter."""
+    """Return even times, and signals at these times, by cubic splines if stamps jitter."""
     grid = np.linspace(t[0], t[-1], round((t[-1] - t[0]) / period) + 1)
     # stamps that differ by less than a twentieth of a period are even
     if len(grid) == len(t) and np.max(np.abs(grid - t)) < 0.05 * period:
@@ -315,7 +318,7 @@ def _even(t: FloatArray, period: float, *signals: FloatArray) -> tuple[FloatArra
 
 
 def even_positions(recording: Recording) -> list[FloatArray]:
-    """Return the positions of every stretch without a gap at even times, each (K, n)."""
+    """Return the positions of each stretch without a gap at even times, each (K, n)."""
     rate = 1.0 / recording.period
     parts = [part for part in unbroken(recording, rate) if len(part) >= _MIN_SAMPLES]
     return [_even(recording.t[part], 1.0 / rate, recording.q[part])[1] for part in parts]
@@ -324,14 +327,14 @@ def even_positions(recording: Recording) -> list[FloatArray]:
 def _differentiated(
     recording: Recording, t: FloatArray, q: FloatArray, tau: FloatArray, used: Conditioning
 ) -> Motion:
-    """Filter and differentiate positions (N, k): those of the arm, then those of its partner."""
+    """Return the filtered motion of a stretch; positions, (N, k), include those of a partner."""
     sections = signal.butter(4, used.cutoff_hz, fs=used.rate_hz, output='sos')
     smooth = signal.sosfiltfilt(sections, q, axis=0)
     dq = _central_difference(smooth, t[1] - t[0])
     n = recording.n_joints
     ddq = _central_difference(dq[:, :n], t[1] - t[0])
     for array in (smooth, dq, ddq):
-        array.setflags(write=False)  # a motion copies arrays that may change
+        array.setflags(write=False)  # a Motion copies arrays that may change
     edge = int(np.ceil(EDGE_PERIODS * used.rate_hz / used.cutoff_hz))
     inner = slice(edge, len(t) - edge)
     # differences of two samples damp the cut-off by sinc(1 / 20), 0.4 %
@@ -362,21 +365,21 @@ def _differentiated(
 
 
 def _central_difference(x: FloatArray, step: float) -> FloatArray:
-    """Differentiate along the first axis by five points, with an error of fourth order."""
+    """Return the derivative of samples along the first axis, with an error of fourth order."""
     weights = np.array([1.0, -8.0, 0.0, 8.0, -1.0]) / (12.0 * step)
     return np.asarray(correlate1d(x, weights, axis=0, mode='nearest'))
 
 
 def _unbroken_positions(recording: Recording, rate: float) -> list[FloatArray]:
-    """Return the positions of every stretch without a gap; of all samples if each is too short."""
+    """Return the positions of each stretch without a gap, or of all samples if all are short."""
     parts = [part for part in unbroken(recording, rate) if len(part) >= _MIN_SAMPLES]
     return [recording.q[part] for part in parts] or [recording.q]
 
 
 def _motion_band(stretches: Sequence[tuple[FloatArray, npt.ArrayLike]], rate: float) -> float:
     """Return the frequency below which the fastest joint has 99 % of its velocity's power [Hz]."""
-    # Each stretch has positions and the frequency above which they, or those of each joint, are
-    # noise. Power above this frequency is ignored, as a joint that hardly moves has only noise
+    # Each stretch has positions and the frequency above which they are noise, of all joints or of
+    # each. Power above this frequency is ignored, as a joint that hardly moves has only noise
     # there. For the same reason, the power is summed over all stretches.
     band = rate / max(len(q) for q, _ in stretches)
     for joint in range(stretches[0][0].shape[1]):
@@ -402,12 +405,13 @@ def mean_spectrum(
     segment: float = 8.0,
 ) -> tuple[FloatArray, FloatArray]:
     """
-    Return the mean power spectrum of stretches that last as long as a segment (Welch 1967).
+    Return the mean power spectrum of signals, by the method of Welch (1967).
 
     Parameters
     ----------
     stretches : sequence of ndarray, each (N, n)
-        Evenly sampled signals; segments are no longer than the longest stretch.
+        Evenly sampled signals of stretches. Stretches shorter than a segment are left out;
+        segments are no longer than the longest stretch.
     rate : float
         Samples per second.
     detrend : {'constant', 'linear'}
@@ -437,7 +441,7 @@ def mean_spectrum(
 
 
 def _position_spectrum(recording: Recording) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return frequencies (K,) and power (K, n) of positions, and their white noise (n,) per Hz."""
+    """Return frequencies, (K,), power, (K, n), and white noise, (n,), of positions per Hz."""
     rate = 1.0 / recording.period
     frequency, power = mean_spectrum(_unbroken_positions(recording, rate), rate)
     upper = frequency > 0.3 * rate  # the upper 40 % of the spectrum contain no motion

@@ -21,7 +21,7 @@ def uneven_stamps(recording: Recording, cutoff_hz: float) -> str:
     Return a message on time stamps too uneven for a cut-off of positions [Hz]; empty otherwise.
 
     Lost samples only make steps longer; varying delays of stamps make short steps too. Windows of
-    50 stamps are compared with an even grid: jitter, but no slow drift of the clock.
+    50 stamps are compared with an even grid, which finds jitter and no slow drift of the clock.
 
     """
     steps, window = np.diff(recording.t), 50
@@ -44,7 +44,7 @@ def rounded_stamps(recording: Recording) -> str:
     """
     Return a message if samples have equal, rounded time stamps; empty otherwise.
 
-    Of samples with equal stamps, one is kept. Its stamp is wrong by up to half of the step.
+    Of samples with equal stamps, the reader keeps one. Its stamp is wrong by up to half a step.
 
     """
     report, steps = recording.report, np.diff(recording.t)
@@ -63,13 +63,13 @@ def rounded_stamps(recording: Recording) -> str:
 
 def check_recordings(recordings: Sequence[Recording]) -> None:
     """
-    Raise an error for recordings that no filter can process.
+    Raise an error for a recording with too few samples per second, or of two senders.
 
     Raises
     ------
     IdentificationError
-        If samples are too far apart, as with stamps that are not in seconds, or if a topic has two
-        senders.
+        If samples are too far apart, as with stamps that are not in seconds, or if two senders
+        publish on the topic.
 
     """
     for recording in recordings:
@@ -93,18 +93,18 @@ def check_recordings(recordings: Sequence[Recording]) -> None:
 
 def two_senders(recording: Recording) -> str:
     """
-    Return a message on positions that alternate between two tracks; empty otherwise.
+    Return a message on positions that alternate as those of two senders; empty otherwise.
 
-    A message has another sender than its neighbours if some joint is far from both, and the two
-    are near each other. Such messages form a separate track; values of a faulty encoder are
+    A sample has another sender than its neighbours if some joint is far from both neighbours, and
+    these are near each other. Such samples form a separate track; values of a faulty encoder are
     scattered.
 
     """
     t, q = recording.t, recording.q
     if len(t) < 40:
         return ''
-    # rows of each joint whose message is far from both neighbours in the same direction; joint by
-    # joint, as the arrays of one fit into the cache
+    # samples of each joint that are far from both neighbours in the same direction; joint by
+    # joint, as the arrays of one joint fit into the cache
     found = []
     for joint in range(recording.n_joints):
         steps = np.diff(q[:, joint])
@@ -113,14 +113,14 @@ def two_senders(recording: Recording) -> str:
         # a step below 1e-3 [rad or m] may be noise at rest
         apart = step > np.maximum(1e-3, 5.0 * np.abs(across))
         found.append(np.flatnonzero(apart & (before * after > 0.0)))
-    # fewer contradicted messages, or less than 1 %, are faulty samples
+    # fewer contradicted samples, or less than 1 %, are faulty samples of one sender
     if len(np.unique(np.concatenate(found))) < max(20, 0.01 * len(t)):
         return ''
     joint = int(np.argmax([len(rows) for rows in found]))
     rows = found[joint]
     jump = float(np.median(np.abs(q[rows + 1, joint] - q[rows, joint])))
-    # A second sender of less than a fifth of the messages sends between those of the first. If
-    # gaps remain without its messages, these are faults of an encoder.
+    # A second sender of less than a fifth of the samples sends between those of the first. If gaps
+    # remain without these samples, they are faults of an encoder.
     if len(rows) < 0.2 * len(t) and np.median(t[rows + 2] - t[rows]) > 1.5 * recording.period:
         return ''
     return (

@@ -1,12 +1,12 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Rows of a recording that may be larger than the memory, in pieces.
+Linear problem of a recording that may be larger than the memory, in pieces.
 
 Pieces overlap, so that effects of the filters at their ends have decayed. A piece begins at the
-time of a row of the previous piece, so all rows equal those of the whole recording. Each row comes
-from one piece. Two values differ between pieces: the even time base of jittering stamps, and the
-top speed that defines a joint at rest.
+time of a decimated sample of the previous piece. All decimated samples therefore equal those of
+the recording in one piece, and each comes from one piece. Two values differ between pieces: the
+even time base of jittering stamps, and the top speed that defines a joint at rest.
 
 """
 
@@ -28,7 +28,7 @@ import numpy.typing as npt
 
 
 def _cuts(piece: Recording, used: Conditioning) -> tuple[int, int]:
-    """Return the stamps of the first sample and of the first row of the next piece [ns]."""
+    """Return the stamps of the next piece's first sample and first decimated sample [ns]."""
     # after 16 periods, the start of a filter of order 4 has decayed to exp(-38)
     periods = (EDGE_PERIODS + 16.0) * used.rate_hz / used.cutoff_hz
     margin = int(np.ceil(periods)) + len(used.taps)
@@ -55,7 +55,7 @@ def streamed(
     settings: ReadSettings,
 ) -> Iterator[tuple[Recording, Sequence[Regression]]]:
     """
-    Yield pieces of a recording without damaged samples, with the rows that belong to each.
+    Yield a recording in pieces without damaged samples, each with its linear problem.
 
     Parameters
     ----------

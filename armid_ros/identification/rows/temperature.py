@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Temperatures of recordings: their means, and friction per kelvin."""
+"""Mean temperatures of recordings, and change of friction per kelvin."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from armid_ros.recording import Recording
 import numpy as np
 from scipy.stats import t as student_t
 
-#: Slopes with temperature, and the coefficients that they change.
+#: Slopes of friction with temperature, and the friction coefficients that they change.
 _SIZES = {'viscous_slope': 'viscous_coefficient', 'coulomb_slope': 'coulomb_torque'}
 
 
@@ -32,7 +32,7 @@ def mean_temperatures(parts: Sequence[Motion | Recording]) -> dict[str, float] |
 
 def at_mean_temperature(arm: ArmModel, recordings: Sequence[Recording]) -> ArmModel:
     """
-    Refer effects without values to the mean temperature of recordings.
+    Return the arm model whose unfitted friction effects refer to the mean measured temperature.
 
     Raises
     ------
@@ -58,9 +58,9 @@ def at_mean_temperature(arm: ArmModel, recordings: Sequence[Recording]) -> ArmMo
 
 def friction_per_kelvin(arm: ArmModel, estimate: Estimate, scatter: FloatArray) -> tuple[str, ...]:
     """
-    Return a note on each joint with its relative slopes of friction with temperature.
+    Return a note per joint: relative change of its friction per kelvin, with 95 % intervals.
 
-    The 95 % intervals are those of noise, or those of the differences between recordings if wider:
+    The intervals are those of noise, or those of the differences between recordings if wider:
     `scatter`, (K, r), has the jackknife changes of the estimated values without each recording.
 
     """
