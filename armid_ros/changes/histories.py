@@ -3,18 +3,19 @@
 """
 Tests for steps and trends in series of estimates, with control of false discoveries in a fleet.
 
-A value of a series is theta + c + e. The effect of the day, c, is the same for all arms of a
+A value of a series is theta + c + e. The common effect of a day, c, is the same for all arms of a
 kind, for example by the temperature of a hall. It is estimated by median polish (Tukey 1977) and
-subtracted. The part e has the variance s^2 + t^2: s is the standard deviation of the bag's
+subtracted. The error e has the variance s^2 + t^2: s is the standard deviation of the bag's
 estimate, and t the additional scatter between bags. The scatter follows from the median of squared
-differences of neighbours, which a step or slow trend does not change. Three further properties are
-estimated from all arms of a kind:
+differences of successive values, which a step or slow trend does not change. Three further
+properties are estimated from all arms of a kind:
 
 - Arms differ in their scatter. The variance of an arm is shrunk towards that of all arms, the
   more these agree (Smyth 2004).
-- Scatter is correlated over days. Steps and trends of healthy arms then exceed the prediction
-  from differences of neighbours. Their factor is the median of their squares, divided by that of
-  chi-squared (genomic control; Devlin and Roeder 1999), which only needs most arms to be healthy.
+- Scatter is correlated over days. Steps and trends of healthy arms are then larger than expected
+  from differences of successive values. The inflation factor is the median of the squared steps or
+  trends over that of chi-squared (genomic control; Devlin and Roeder 1999). It only needs most
+  arms to be healthy.
 - Few series determine these factors only roughly; uncertain factors are shrunk towards one.
 
 A bag that differs from the median of its neighbours by more than noise is an outlier, not a
@@ -31,6 +32,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Literal, NamedTuple
 
 from armid_ros.changes.statistic import MEDIAN_SQUARE, tail, two_means
@@ -42,19 +44,21 @@ Kind = Literal['step', 'trend']
 
 #: Smallest number of bags of a tested series.
 _MIN_BAGS = 4
-#: Smallest number of arms of a kind for a comparison of arms, or of those with a bag on a day for
-#: an effect of that day.
+#: Smallest number of arms of a kind for a comparison of arms; smallest number of arms with bags of
+#: a day for the common effect of that day.
 _MIN_ARMS = 8
 #: Prior degrees of freedom of the variances of arms if these do not differ.
 _MAX_FREEDOM = 1e6
 #: Mean length of a month [days].
 MONTH = 365.25 / 12.0
+#: Second derivative of the logarithm of the gamma function.
+_trigamma = partial(special.polygamma, 1)
 
 
 @dataclass(frozen=True, eq=False)
 class ParameterHistory:
     """
-    A parameter of an arm over time.
+    Estimates of a parameter of an arm over time.
 
     Attributes
     ----------
@@ -65,7 +69,7 @@ class ParameterHistory:
     days : ndarray, shape (K,)
         Times of the bags, increasing [days since the epoch].
     values, std : ndarray, shape (K,)
-        Estimates and their stated standard deviations.
+        Estimates from the bags, and their standard deviations.
 
     """
 
@@ -79,26 +83,26 @@ class ParameterHistory:
 
     @property
     def parameter(self) -> tuple[str, str]:
-        """Name and joint of the parameter, as in the results."""
+        """Name and joint of the parameter."""
         return self.name, self.joint
 
 
 @dataclass(frozen=True)
 class Spread:
     """
-    Variation of a parameter between bags that exceeds its stated uncertainty.
+    Scatter of a parameter between bags, in addition to the standard deviations of its estimates.
 
     Attributes
     ----------
     std : float
-        Standard deviation between bags.
+        Additional standard deviation between bags.
     freedom : float
         Degrees of freedom of `std`.
     prior_freedom : float
         Prior degrees of freedom of the variances of arms; large if arms do not differ.
     steps, trends : float
-        Ratios of the steps and trends of healthy arms to those predicted from differences of
-        neighbours, in standard deviations.
+        Inflation factors: steps and trends of healthy arms over those expected from differences
+        of successive values.
 
     """
 
@@ -112,7 +116,7 @@ class Spread:
 @dataclass(frozen=True)
 class HistoryChange:
     """
-    The largest step of a series, or its trend.
+    Largest step of a series of estimates, or trend of the series.
 
     Attributes
     ----------
@@ -143,7 +147,7 @@ class HistoryChange:
 @dataclass(frozen=True)
 class Judged:
     """
-    Significance of the changes of one arm over time.
+    Changes of the parameters of one arm over time, with their significance.
 
     Attributes
     ----------
@@ -173,8 +177,8 @@ def judge(
     Parameters
     ----------
     kinds : sequence of (sequence of ParameterHistory, mapping)
-        For each kind of arm: the series of all parameters of all arms, without effects of days,
-        and their spreads; see ``without_days`` and ``spreads``.
+        For each kind of arm: the series of all parameters of all arms, without common effects of
+        days, and their scatter; see ``without_days`` and ``spreads``.
 
     Returns
     -------
@@ -199,7 +203,7 @@ def judge(
 
 
 def named(judged: Judged, alpha: float) -> tuple[HistoryChange, ...]:
-    """Return the significant changes of an arm at a false discovery rate alpha."""
+    """Return the changes of an arm that are significant at a false discovery rate alpha."""
     if judged.adjusted > alpha or not judged.changes:
         return ()
     limit = alpha * judged.p / judged.adjusted / len(judged.changes)
@@ -207,13 +211,13 @@ def named(judged: Judged, alpha: float) -> tuple[HistoryChange, ...]:
 
 
 def wear(series: ParameterHistory, spread: Spread) -> tuple[float, float]:
-    """Return the slope of a history per month, and its standard deviation."""
+    """Return the slope of a series of estimates per month, and its standard deviation."""
     slope, std, _ = _line(series.days, series.values, 1.0 / _variances(series, spread)[0])
     return slope * MONTH, std * spread.trends * MONTH
 
 
 def spreads(series: Sequence[ParameterHistory]) -> dict[tuple[str, str], Spread]:
-    """Return the spread of each parameter beyond its stated uncertainty."""
+    """Return the scatter between bags of each parameter, by name and joint."""
     found = {parameter: _spread(group) for parameter, group in _by_parameter(series).items()}
     for name in dict.fromkeys(one.name for one in series):  # of all joints together
         group = [one for one in series if one.name == name]
@@ -226,21 +230,39 @@ def spreads(series: Sequence[ParameterHistory]) -> dict[tuple[str, str], Spread]
 
 def without_days(series: Sequence[ParameterHistory]) -> list[ParameterHistory]:
     """
-    Remove from the histories what all arms have in common on each day, such as the temperature.
+    Return series without the deviation that all arms share on each day, such as by temperature.
 
-    The effect is proportional to the size of the parameter, as for friction that falls with
-    temperature. Days on which few siblings have bags are unchanged.
+    The shared deviation is proportional to the size of the parameter, as for friction that falls
+    with temperature. It is found by a median polish. Days on which few arms have bags are
+    unchanged.
 
     """
     changed: dict[int, ParameterHistory] = {}
     for group in _by_parameter(series).values():
-        for one, values in zip(group, _polished(group), strict=True):
-            changed[id(one)] = replace(one, values=values)
+        days = np.concatenate([np.floor(one.days) for one in group])
+        arm = np.repeat(np.arange(len(group)), [len(one.days) for one in group])
+        values = np.concatenate([one.values for one in group])
+        _, day = np.unique(days, return_inverse=True)
+        arms_of_day = np.bincount(np.unique(np.stack([day, arm]), axis=1)[0])
+        arms, dates = np.arange(len(group)), np.arange(len(arms_of_day))
+        level = ndimage.median(values, arm, arms)
+        middle = float(np.median(level))
+        same_sign = bool(np.all(level * middle > 0.0))
+        share = level / middle if same_sign else np.ones(len(level))
+        common = np.zeros(len(arms_of_day))
+        for _ in range(4):
+            common = ndimage.median((values - level[arm]) / share[arm], day, dates)
+            common[arms_of_day < _MIN_ARMS] = 0.0
+            level = ndimage.median(values - share[arm] * common[day], arm, arms)
+        rest = values - share[arm] * common[day]
+        ends = np.cumsum([len(one.days) for one in group])[:-1]
+        for one, own in zip(group, np.split(rest, ends), strict=True):
+            changed[id(one)] = replace(one, values=own)
     return [changed[id(one)] for one in series]
 
 
 def _largest_change(series: ParameterHistory, spread: Spread) -> HistoryChange:
-    """Return the largest step of a series, or its trend if the trend explains it equally well."""
+    """Return the trend of a series if it explains the series as well, else its largest step."""
     split, count = _splits(series, spread), len(series.values)
     scores, trend = split.scores / spread.steps, split.trend / spread.trends
     best = int(np.argmax(scores))
@@ -255,12 +277,13 @@ def _largest_change(series: ParameterHistory, spread: Spread) -> HistoryChange:
 
 
 def _p(score: float, freedom: float, tried: int) -> float:
+    """Return the p-value of a score in standard deviations, the largest of several scores."""
     # lower bound of the p-value, which underflows for larger scores
     return min(1.0, tried * max(float(tail(score**2, 1, freedom)), 1e-300))
 
 
 class _Splits(NamedTuple):
-    """Means before and after every possible step of a series, and its straight line."""
+    """Means before and after each possible step of a series, and its straight line."""
 
     low: FloatArray  # (K - 1,)
     high: FloatArray
@@ -274,7 +297,7 @@ class _Splits(NamedTuple):
 
 
 def _splits(series: ParameterHistory, spread: Spread) -> _Splits:
-    """Return the steps and the trend of a series, in standard deviations of neighbours."""
+    """Return possible steps and the trend of a series, in standard deviations of its scatter."""
     variance, freedom = _variances(series, spread)
     std = np.sqrt(variance)
     # outliers are clipped to three standard deviations around the median of five bags
@@ -300,29 +323,8 @@ def _by_parameter(
     return groups
 
 
-def _polished(group: Sequence[ParameterHistory]) -> list[FloatArray]:
-    """Return values minus the common deviation of each day, found by a median polish."""
-    days = np.concatenate([np.floor(one.days) for one in group])
-    arm = np.repeat(np.arange(len(group)), [len(one.days) for one in group])
-    values = np.concatenate([one.values for one in group])
-    _, day = np.unique(days, return_inverse=True)
-    arms_of_day = np.bincount(np.unique(np.stack([day, arm]), axis=1)[0], minlength=day.max() + 1)
-    arms, dates = np.arange(len(group)), np.arange(len(arms_of_day))
-    level = ndimage.median(values, arm, arms)
-    middle = float(np.median(level))
-    same_sign = bool(np.all(level * middle > 0.0))
-    share = level / middle if same_sign else np.ones(len(level))
-    common = np.zeros(len(arms_of_day))
-    for _ in range(4):
-        common = ndimage.median((values - level[arm]) / share[arm], day, dates)
-        common[arms_of_day < _MIN_ARMS] = 0.0
-        level = ndimage.median(values - share[arm] * common[day], arm, arms)
-    rest = values - share[arm] * common[day]
-    return np.split(rest, np.cumsum([len(one.days) for one in group])[:-1])
-
-
 def _spread(group: Sequence[ParameterHistory]) -> Spread:
-    """Solve median(d^2 / (s_k^2 + s_k+1^2 + 2 t^2)) = median of chi^2 for t."""
+    """Return the scatter t between bags, from median(d^2 / (s_k^2 + s_k+1^2 + 2 t^2)) = chi^2."""
     squares = np.concatenate([np.diff(one.values) ** 2 for one in group])
     stated = np.concatenate([one.std[1:] ** 2 + one.std[:-1] ** 2 for one in group])
     # degrees of freedom of a variance from the median of n squares
@@ -347,8 +349,8 @@ def _prior_freedom(
     Return the prior degrees of freedom of the variances of arms (empirical Bayes).
 
     The logarithms of variance ratios have the variance trigamma(d_a / 2) + trigamma(d_0 / 2). The
-    degrees d_a are those of one series, and the equation is solved for d_0. Only scatter beyond
-    one standard error is a difference between arms.
+    degrees of freedom of one series are d_a, and the equation is solved for d_0. Only scatter
+    beyond one standard error is a difference between arms.
 
     """
     tested = [one for one in group if len(one.values) >= _MIN_BAGS]
@@ -358,42 +360,31 @@ def _prior_freedom(
     own = [_trigamma(0.5 * _freedom(len(one.values))) for one in tested]
     # relative standard error of a variance from the median of n absolute deviations
     sure = 1.0 - 2.33 / np.sqrt(len(logs))
-    beyond = sure * _robust_scale(logs) ** 2 - float(np.mean(own))
-    return _inverse_trigamma(beyond)
+    scale = float(stats.median_abs_deviation(logs, scale='normal'))
+    beyond = sure * scale**2 - float(np.mean(own))
+    if beyond <= _trigamma(0.5 * _MAX_FREEDOM):
+        return _MAX_FREEDOM
+    if beyond >= _trigamma(0.5):
+        return 1.0
+    ends = 0.5, 0.5 * _MAX_FREEDOM
+    return 2.0 * float(optimize.brentq(lambda half: _trigamma(half) - beyond, *ends))
 
 
 def _ratio(series: ParameterHistory, spread: Spread) -> float:
-    """Return the variance of a history divided by the usual variance."""
+    """Return the variance of a series divided by the usual variance."""
     stated = series.std[1:] ** 2 + series.std[:-1] ** 2 + 2.0 * spread.std**2
     squares = np.diff(series.values) ** 2 / np.maximum(stated, 1e-300)
     return max(float(np.median(squares)) / MEDIAN_SQUARE, 1e-100)
 
 
 def _freedom(bags: int) -> float:
-    """Return the degrees of freedom of a history's variance, from the median of squares."""
+    """Return the degrees of freedom of a series' variance, from the median of squares."""
     # a line through simulated series of white noise; right to 6 % from 4 to 80 bags
     return 0.8 + 0.31 * bags
 
 
-def _robust_scale(values: FloatArray) -> float:
-    return 1.4826 * float(np.median(np.abs(values - np.median(values))))
-
-
-def _trigamma(x: float) -> float:
-    return float(special.polygamma(1, x))
-
-
-def _inverse_trigamma(value: float) -> float:
-    """Return 2 x with trigamma(x) = value, between 1 and `_MAX_FREEDOM`."""
-    if value <= _trigamma(0.5 * _MAX_FREEDOM):
-        return _MAX_FREEDOM
-    if value >= _trigamma(0.5):
-        return 1.0
-    return 2.0 * float(optimize.brentq(lambda x: _trigamma(x) - value, 0.5, 0.5 * _MAX_FREEDOM))
-
-
 def _variances(series: ParameterHistory, spread: Spread) -> tuple[FloatArray, float]:
-    """Return the variance of every value, shape (K,), and its degrees of freedom."""
+    """Return the variance of each value of a series, (K,), and its degrees of freedom."""
     usual = np.maximum(series.std**2 + spread.std**2, 1e-300)
     if len(series.values) < _MIN_BAGS or spread.prior_freedom >= _MAX_FREEDOM:
         return usual, spread.freedom
@@ -406,7 +397,7 @@ def _variances(series: ParameterHistory, spread: Spread) -> tuple[FloatArray, fl
 def _lasting(
     group: Sequence[ParameterHistory], found: dict[tuple[str, str], Spread]
 ) -> tuple[float, float]:
-    """Return the factors `steps` and `trends` of a `Spread`, each at least 1."""
+    """Return the inflation factors of steps and of trends, each at least 1."""
     steps, trends = [], []
     for one in group:
         if len(one.values) < _MIN_BAGS:
@@ -427,7 +418,7 @@ def _lasting(
 
 
 def _line(days: FloatArray, x: FloatArray, weights: FloatArray) -> tuple[float, float, float]:
-    """Fit a weighted straight line; return slope, its standard deviation, and start value."""
+    """Return slope, its standard deviation, and start value of a weighted straight line."""
     total = weights.sum()
     middle, mean = weights @ days / total, weights @ x / total
     deviation = days - middle

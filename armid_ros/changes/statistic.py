@@ -19,7 +19,7 @@ def quadratic_form(
     score: FloatArray, information: FloatArray, tolerance: float
 ) -> tuple[FloatArray, npt.NDArray[np.intp]]:
     """
-    Return s^T S^+ s, and the rank of S.
+    Return the quadratic form s^T S^+ s of scores s with covariance S, and the rank of S.
 
     Parameters
     ----------
@@ -51,7 +51,7 @@ def tail(
     square: npt.ArrayLike, rank: npt.ArrayLike, freedom: npt.ArrayLike = np.inf
 ) -> FloatArray:
     """
-    Return the p value of a quadratic form if nothing changed.
+    Return the p-value of a quadratic form under the hypothesis that nothing changed.
 
     Parameters
     ----------
@@ -60,7 +60,7 @@ def tail(
     rank : array_like
         Degrees of freedom of the quadratic form.
     freedom : array_like
-        Degrees of freedom of the noise; infinite where its size is known: chi-square.
+        Degrees of freedom of the noise variance; infinite where the variance is known.
 
     """
     known = np.isfinite(freedom)
@@ -70,7 +70,7 @@ def tail(
 
 
 def limits(chance: float, rank: FloatArray, freedom: FloatArray) -> FloatArray:
-    """Return the thresholds that quadratic forms exceed with a given false alarm probability."""
+    """Return thresholds that quadratic forms without a change exceed with a given probability."""
     # Fisher's distribution by the beta distribution, as scipy.stats takes ten times as long
     share = special.betaincinv(0.5 * freedom, 0.5 * rank, chance)
     return np.asarray(freedom * (1.0 - share) / share)
@@ -78,7 +78,7 @@ def limits(chance: float, rank: FloatArray, freedom: FloatArray) -> FloatArray:
 
 def two_means(x: FloatArray, weights: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     """
-    Return the means of a series before and after each possible change point.
+    Return the weighted means of a series before and after each possible change point.
 
     Parameters
     ----------
@@ -100,7 +100,7 @@ def two_means(x: FloatArray, weights: FloatArray) -> tuple[FloatArray, FloatArra
 
 
 def beyond_chance(chances: Sequence[float] | FloatArray, allowed: float) -> list[bool]:
-    """Return the changes that are significant at a family-wise error rate (Holm 1979)."""
+    """Return which p-values are significant at an allowed family-wise error rate (Holm 1979)."""
     beyond = [False] * len(chances)
     for tried, index in enumerate(np.argsort(chances)):
         if chances[index] > allowed / (len(chances) - tried):
