@@ -1,12 +1,12 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Least squares of torques, constrained to physically consistent parameters.
+Least squares of torques, constrained to physically consistent links.
 
 The constraints are part of the fit. A projection of an unconstrained estimate on the nearest
-consistent parameters would increase the torque error. Parameters that
-the data do not determine come from the description. Its weight is chosen by cross-validation with
-blocks of the training data.
+consistent parameters would increase the torque error. Parameters that the data do not determine
+come from the description. The weight of the description is chosen by cross-validation with blocks
+of the training data.
 
 """
 
@@ -34,8 +34,8 @@ from armid_ros.robots.robot import PER_LINK
 import numpy as np
 import scipy.linalg
 
-#: Relative size of a pseudo-inertia in any direction, up to which it is at the limit of physical
-#: consistency; relative distance to a wall of a box, up to which it is at the wall.
+#: Ratio of a pseudo-inertia to its prior in some direction below which a link is at the limit of
+#: physical consistency; relative distance below which a link is at a wall of its box.
 _ACTIVE_SHARE = 1e-3
 #: Thickness of a link over its length, below which a described inertia is doubtful.
 THINNEST = 0.05
@@ -44,14 +44,14 @@ THINNEST = 0.05
 @dataclass(frozen=True)
 class PhysicalSettings:
     """
-    Prior knowledge of masses and shapes, in addition to the recordings.
+    Known masses and shapes of links, as constraints of a physically consistent fit.
 
     Attributes
     ----------
     total_mass : float or None
         Total mass of the moving links [kg], from a scale for example.
     boxes : mapping of str to (sequence of float, sequence of float)
-        Joint, and two corners [m], in the joint frame, of a box that contains the link.
+        Box that contains the link of a joint: two corners in the joint frame [m].
     mass_range : float or None
         Largest ratio between the mass of a link and the described one, above 1.
 
@@ -62,12 +62,15 @@ class PhysicalSettings:
     mass_range: float | None = None
 
     def __post_init__(self) -> None:
-        """Check the values."""
+        """Raise an error for a mass, range or box that no link can have."""
         if self.total_mass is not None and not 0.0 < self.total_mass < np.inf:
-            raise IdentificationError(f'the total mass, {self.total_mass} kg, has to be positive')
+            raise IdentificationError(
+                f'the total mass of the links, {self.total_mass} kg, has to be positive'
+            )
         if self.mass_range is not None and not 1.0 < self.mass_range < np.inf:
             raise IdentificationError(
-                f'the mass range, {self.mass_range:g}, has to be a factor above 1'
+                f'the largest ratio of a mass to the described mass, {self.mass_range:g}, has to '
+                'be a finite factor above 1'
             )
         for joint, (lower, upper) in self.boxes.items():
             if len(lower) != 3 or len(upper) != 3 or not np.all(np.less(lower, upper)):
@@ -80,14 +83,14 @@ class PhysicalSettings:
 @dataclass(frozen=True)
 class PhysicalCertificate:
     """
-    Evidence of physical consistency, and increase of the torque error by the constraints.
+    Evidence that fitted links are physically consistent, and cost of the constraints.
 
     Attributes
     ----------
     links : tuple of Consistency
-        Eigenvalues of every pseudo-inertia, mass, centre, principal moments.
+        Eigenvalues of the pseudo-inertia, mass, centre and principal moments of each link.
     shares : ndarray, shape (n,)
-        Smallest size of each pseudo-inertia relative to the prior's, over all directions.
+        Smallest ratio of each pseudo-inertia to its prior, over all directions.
     at_bound : tuple of ParameterName
         Effect parameters at their bounds.
     at_wall : tuple of str
@@ -97,7 +100,7 @@ class PhysicalCertificate:
     weight : float
         Weight of the prior.
     tried : tuple of (float, float)
-        Compared weights, with held-out errors relative to those of unconstrained fits.
+        Compared weights of the prior, with held-out errors relative to unconstrained fits.
     misfit_ratio : float
         Weighted error on the training data, relative to the unconstrained fit's.
     notes : tuple of str
@@ -125,12 +128,12 @@ class PhysicalCertificate:
 
     @property
     def held_out_ratio(self) -> float:
-        """Error on held-out blocks with the chosen weight, relative to unconstrained fits."""
+        """Torque error on held-out blocks with the chosen weight, over that of free fits."""
         return dict(self.tried)[self.weight]
 
     @property
     def cost(self) -> float:
-        """Relative increase of training or held-out error by the constraints, the larger one."""
+        """Relative increase of the torque error by the constraints, in training or held out."""
         return max(self.misfit_ratio, self.held_out_ratio) - 1.0
 
     @property
@@ -141,7 +144,7 @@ class PhysicalCertificate:
 
     @property
     def activity(self) -> tuple[str, ...]:
-        """Return notes on active constraints and their cost; empty if none is active."""
+        """Notes on constraints that change the fit, and on their cost; empty if none does."""
         notes = []
         # held-out torque error, relative to an unconstrained fit, above which the constraints do
         # not fit the arm
@@ -169,7 +172,7 @@ class PhysicalCertificate:
         return tuple(notes)
 
     def sentences(self) -> tuple[str, ...]:
-        """Return the findings as sentences."""
+        """Return sentences on consistency, cost of the constraints, and assumptions."""
         least = min(self.links, key=lambda link: float(link.eigenvalues[0]))
         verdict = 'every link is a body' if self.consistent else 'not every link is a body'
         return (
@@ -183,7 +186,7 @@ class PhysicalCertificate:
         )
 
     def document(self) -> dict[str, Any]:
-        """Return the certificate as a document."""
+        """Return the certificate as written to identification.json."""
         return {
             'consistent': self.consistent,
             'links': [
@@ -223,9 +226,9 @@ def fit_to_bodies(
     Parameters
     ----------
     arm : ArmModel
-        Arm as described, the prior of the links.
+        Model as described, the prior of the links.
     free : FittedValues
-        The fit without constraints.
+        Fit without constraints.
     recordings : sequence of Recording
         Training data.
     used : Conditioning
@@ -233,12 +236,12 @@ def fit_to_bodies(
     method : {'ols', 'wls', 'irls'}
         See ``solve``.
     settings : PhysicalSettings
-        Further knowledge of masses and shapes.
+        Known masses and shapes.
 
     Returns
     -------
     fit : FittedValues
-        Fit with physically consistent values; its covariance is that of the data alone.
+        Fit with physically consistent links; the covariance is that of the data alone.
     certificate : PhysicalCertificate
         Evidence of physical consistency.
 
@@ -262,10 +265,10 @@ def fit_to_bodies(
 def _bodies(
     arm: ArmModel, fit: FittedValues, settings: PhysicalSettings
 ) -> tuple[FittedValues, PhysicalCertificate]:
-    """Fit physically consistent standard parameters to a linear problem."""
+    """Fit physically consistent links to the linear problem of a fit."""
     base, problem, weights = fit.base, fit.problem, fit.solution.weights
     program, notes = physical_program(arm, base, settings)
-    # products of the weighted rows of blocks of successive samples, which are left out in turn
+    # normal equations of blocks of successive samples, which are left out in turn
     n_blocks = 5
     ends = np.cumsum([len(part) for part in np.array_split(weights, n_blocks)])[:-1]
     columns, target = weighted_rows(problem, weights)
@@ -320,7 +323,7 @@ def _bodies(
 
 
 def _walls_reached(parameters: FloatArray, box: Box) -> list[str]:
-    """Return which limits of its box a link with ten inertial parameters reaches."""
+    """Return the limits of its box that a link reaches, given its ten inertial parameters."""
     width = box[1] - box[0]
     largest = np.concatenate([width, width, 0.25 * width**2]) * parameters[0]
     near = box_conditions(box) @ parameters < _ACTIVE_SHARE * largest
@@ -329,7 +332,7 @@ def _walls_reached(parameters: FloatArray, box: Box) -> list[str]:
 
 
 def far_from_described(robot: Robot, masses: FloatArray) -> tuple[str, ...]:
-    """Return a note on links whose mass, (n,) [kg], is far from the description, or none."""
+    """Return a note on links whose mass, (n,) [kg], is far from the description, or nothing."""
     # ratio of a mass to the described one above which a note is given
     heavy = 3.0
     described = robot.rigid_parameters[::PER_LINK]
@@ -341,15 +344,15 @@ def far_from_described(robot: Robot, masses: FloatArray) -> tuple[str, ...]:
     if not named:
         return ()
     return (
-        f'masses more than {heavy:g} times off the description: {"; ".join(named)}; correct the '
-        'masses, or add missing parts, such as rotors, springs or a load',
+        f'masses that differ more than {heavy:g} times from the description: {"; ".join(named)}; '
+        'correct the description, or add missing parts, such as rotors, springs or a load',
     )
 
 
 def physical_program(
     arm: ArmModel, base: BaseParameters, settings: PhysicalSettings
 ) -> tuple[PhysicalProgram, tuple[str, ...]]:
-    """Return the constraints on the parameters of an arm, and the assumptions made."""
+    """Return the convex program of a physically consistent fit, and assumptions of its prior."""
     prior, notes = bodily_prior(arm)
     ends = [effect.bounds() for effect in arm.effects]
     lower, upper = (np.concatenate([np.empty(0), *(b[k] for b in ends)]) for k in (0, 1))
@@ -365,16 +368,16 @@ def physical_program(
 
 def bodily_prior(arm: ArmModel) -> tuple[FloatArray, tuple[str, ...]]:
     """
-    Return standard parameters of the description, with physical values for impossible links.
+    Return the described standard parameters, with physically consistent values for each link.
 
-    A link without mass becomes a ball with the mean mass of the other links. If a link is a point,
-    is thinner than a twentieth of its length or has impossible moments, the prior has the second
-    moments of a housing of 0.1 m in diameter at least.
+    A link without mass becomes a ball with the mean mass of the other links. A link may be a
+    point, thinner than a twentieth of its length, or have impossible moments. Its second moments
+    are then at least those of a housing of 0.1 m in diameter.
 
     Returns
     -------
     theta : ndarray, shape (P,)
-        Standard parameters, those of every link positive definite.
+        Standard parameters; the pseudo-inertia of each link is positive definite.
     notes : tuple of str
         Assumptions on links.
 
@@ -417,8 +420,8 @@ def _held_out_errors(
     blocks: FloatArray,
     counts: FloatArray,
 ) -> tuple[tuple[float, float], ...]:
-    """Return the candidate weights with held-out errors, relative to unconstrained fits."""
-    # weights of the divergence that are compared. The fit term is a mean square of about one.
+    """Return weights of the prior with held-out torque errors relative to unconstrained fits."""
+    # compared weights of the divergence. The term of the torques is a mean square of about one.
     candidates = tuple(float(w) for w in 10.0 ** np.arange(-7.0, 0.5))
     free = 0.0
     squares = dict.fromkeys(candidates, 0.0)
@@ -434,6 +437,6 @@ def _held_out_errors(
 
 
 def _misfit(products: FloatArray, values: FloatArray) -> float:
-    """Return the norm of the residual, given products of columns and target."""
+    """Return the norm of the residual, given products of columns and target, (r + 1, r + 1)."""
     ends = np.append(values, -1.0)
     return float(np.sqrt(max(ends @ products @ ends, 0.0)))

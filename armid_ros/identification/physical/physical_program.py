@@ -6,8 +6,8 @@ Convex program of a physically consistent fit.
     minimise  |A theta - z|^2 / (2 N)  +  sum over links of  (w D(P || P0) + c (m / m0 - 1)^2 / 2)
 
 over standard parameters theta with every link's pseudo-inertia P positive definite, effects
-within their bounds, and given limits of masses and shapes. D is the divergence of the
-log-determinant,
+within their bounds, and known limits of masses and shapes. P0 and m0 are the prior pseudo-inertia
+and mass of a link. D is the divergence of the log-determinant,
 
     D(P || P0) = log det P0 - log det P + tr(P0^-1 P) - 4,
 
@@ -45,7 +45,7 @@ Box = tuple[FloatArray, FloatArray]
 @dataclass(frozen=True)
 class PhysicalProgram:
     """
-    Conic program of the constraints and priors, for any data and weight of the prior.
+    Convex program with constraints and prior of a physically consistent fit, for any data.
 
     Attributes
     ----------
@@ -58,9 +58,9 @@ class PhysicalProgram:
     total_mass : float or None
         Mass of all links together [kg].
     boxes : mapping of int to (ndarray, ndarray)
-        Link (0 is the first), and two corners, in the joint frame, of a box that contains it [m].
+        Box that contains a link (0 is the first): two corners in the joint frame [m].
     mass_range : float or None
-        Largest ratio between a mass and that of the prior.
+        Largest ratio between the mass of a link and its prior mass.
 
     """
 
@@ -101,8 +101,8 @@ class PhysicalProgram:
             If no parameters satisfy the constraints.
 
         """
-        # weight c of the prior of a mass: a mass three times as large must reduce the squares by
-        # 0.2 %
+        # weight c of the prior mass of a link: a mass three times as large must reduce the squared
+        # residual by 0.2 %
         mass_weight = 1e-3
         rank, size, rigid = self.base.rank, len(self.prior), len(self.prior) - len(self.lower)
         information = self.base.grouping.T @ (products[:rank, :rank] / count) @ self.base.grouping
@@ -138,9 +138,8 @@ class PhysicalProgram:
         ).solve()
         if str(solution.status) not in ('Solved', 'AlmostSolved'):
             raise IdentificationError(
-                'no physically consistent parameters were found, as the solver ended with '
-                f'{solution.status}; check whether the total mass and the boxes of the links '
-                'contradict each other'
+                f'no physically consistent links fit: the solver ended with {solution.status}; '
+                'check whether the total mass and the boxes of the links contradict each other'
             )
         theta = origin + change @ np.array(solution.x[:size])
         theta[rigid:] = np.clip(theta[rigid:], self.lower, self.upper)
@@ -148,6 +147,7 @@ class PhysicalProgram:
 
     @cached_property
     def _whitened_links(self) -> FloatArray:
+        """Linear map from symmetric matrices to inertial parameters, (10 n, 10 n)."""
         blocks = []
         for link in range(self.n_links):
             values = self.prior[PER_LINK * link : PER_LINK * (link + 1)]
@@ -163,7 +163,7 @@ class PhysicalProgram:
     def _constraints(
         self, change: FloatArray, origin: FloatArray
     ) -> tuple[sparse.csc_matrix, FloatArray, list[Any]]:
-        """Return A, b and the cones K of b - A x in K."""
+        """Return the constraints b - A x in K: matrix A, vector b and cones K."""
         blocks: list[sparse.spmatrix] = []
         offsets: list[FloatArray] = []
         cones: list[Any] = []
@@ -171,7 +171,7 @@ class PhysicalProgram:
         rigid = len(self.prior) - len(self.lower)
 
         def linear(cone: Any, normal: FloatArray, offset: FloatArray) -> None:
-            """Constrain normal @ theta + offset to a cone with one dimension per row."""
+            """Add the constraint that normal @ theta + offset is in a cone of that dimension."""
             if len(normal):
                 side = sparse.vstack([empty] * len(normal))
                 blocks.append(sparse.hstack([-sparse.csr_matrix(normal @ change), side]))
@@ -202,7 +202,7 @@ class PhysicalProgram:
     def _add_log_determinant(
         self, link: int, blocks: list[Any], offsets: list[FloatArray], cones: list[Any]
     ) -> None:
-        """Bound the logarithms u by sum u <= log det X, with the whitened matrix X of a link."""
+        """Add the constraints sum u <= log det X for the whitened pseudo-inertia X of a link."""
         # X >= Z diag(Z)^-1 Z' for a lower triangle Z, and u <= log of its diagonal (Ben-Tal and
         # Nemirovski 2001, section 4.2).
         size = len(self.prior)
@@ -225,15 +225,15 @@ class PhysicalProgram:
 
 def box_conditions(box: Box) -> FloatArray:
     """
-    Return rows whose products with the parameters are positive for a link inside a box.
+    Return linear conditions on the ten inertial parameters of a link inside a box.
 
-    The centre of mass and all mass are between the corners: along every axis, the integral of (x
-    - lower) (upper - x) dm is not negative.
+    The centre of mass and all mass are between the corners: along every axis, the integral of
+    (x - lower) (upper - x) dm is not negative.
 
     Returns
     -------
     ndarray, shape (9, 10)
-        Rows to multiply the ten parameters by.
+        Matrix whose product with the inertial parameters is not negative.
 
     """
     lower, upper = box
@@ -252,5 +252,5 @@ def box_conditions(box: Box) -> FloatArray:
 
 
 def _packed(i: int, j: int) -> int:
-    """Return the index of an entry of the upper triangle with stacked columns."""
+    """Return the index of entry (i, j) of an upper triangle whose columns are stacked."""
     return j * (j + 1) // 2 + i
