@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Lookup of joints by name, and merging of streams with different joints."""
+"""Order of joints in a message, and merging of joint states that several senders publish."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from armid_ros.motion import FloatArray
 import numpy as np
 import numpy.typing as npt
 
-#: Longest gap of a sender that is interpolated, in its periods.
+#: Longest gap of a sender that is interpolated, in sampling periods of the sender.
 _MAX_GAP_PERIODS = 10.0
 
 Moment = tuple[float, FloatArray]
@@ -21,13 +21,14 @@ Moment = tuple[float, FloatArray]
 
 @dataclass
 class _Part:
-    """Joints that one sender sends, and its samples that are still needed, shape (s, k)."""
+    """Joints of one sender, and its samples, each (s, k), that are not yet merged."""
 
     joints: tuple[int, ...]
     samples: deque[Moment] = field(default_factory=lambda: deque(maxlen=1000))
     period: float = np.inf
 
     def take(self, t: float, values: FloatArray) -> None:
+        """Add a sample of the sender; a stamp that goes back clears the earlier samples."""
         if self.samples:
             step = t - self.samples[-1][0]
             if step == 0.0:  # noqa: RUF069 - equal stamps differ by zero
@@ -40,12 +41,8 @@ class _Part:
                 self.period = step
         self.samples.append((t, values))
 
-    def reaches(self, t: float) -> bool:
-        """Return whether the sender has samples up to a time."""
-        return bool(self.samples) and self.samples[-1][0] >= t
-
     def at(self, t: float) -> FloatArray | None:
-        """Return the sender's values interpolated at a time; None if no sample is near."""
+        """Return the signals of the sender interpolated at a time; None inside a long gap."""
         while len(self.samples) > 1 and self.samples[1][0] <= t:
             self.samples.popleft()
         first, values = self.samples[0]
@@ -59,11 +56,11 @@ class _Part:
 
 class JointMerger:
     """
-    Merge samples of several senders with different joints, at the times of one sender.
+    Merger of joint states that several senders publish, each with different joints.
 
-    The sender of the first joint defines the times; other signals are interpolated linearly
-    between their stamps of the same clock. A joint with two senders is taken from the sender that
-    came first.
+    The sender of the first joint defines the times of the merged samples; signals of other senders
+    are interpolated linearly between their stamps of the same clock. A joint with two senders is
+    taken from the sender that came first.
 
     Parameters
     ----------
@@ -78,27 +75,27 @@ class JointMerger:
 
     @property
     def missing(self) -> tuple[int, ...]:
-        """Joints that no sender has sent so far."""
+        """Indices of the joints that no sender has sent so far."""
         sent = {joint for part in self._parts for joint in part}
         return tuple(k for k in range(self._n_joints) if k not in sent)
 
     def take(self, joints: tuple[int, ...], t: float, values: FloatArray) -> list[Moment]:
         """
-        Add a sample of some joints; return the samples of all joints that are complete with it.
+        Add a sample of some joints; return the merged samples that it completes.
 
         Parameters
         ----------
         joints : tuple of int
             Indices of the k joints.
         t : float
-            Stamp [s].
+            Time stamp [s].
         values : ndarray, shape (s, k)
             Signals of these joints.
 
         Returns
         -------
         list of (float, ndarray of shape (s, n))
-            Stamps and signals of all joints, oldest first.
+            Time stamps and signals of all n joints, oldest first.
 
         """
         self._parts.setdefault(joints, _Part(joints)).take(t, values)
@@ -113,7 +110,8 @@ class JointMerger:
                 known.update(part.joints)
         first, *others = sorted(found, key=lambda part: min(part.joints))
         complete = []
-        while first.samples and all(part.reaches(first.samples[0][0]) for part in others):
+        newest = min((part.samples[-1][0] for part in others), default=np.inf)
+        while first.samples and first.samples[0][0] <= newest:
             t, values = first.samples.popleft()
             rest = [part.at(t) for part in others]
             merged = np.empty((len(values), self._n_joints))
@@ -128,7 +126,7 @@ class JointMerger:
 
 def joint_places(joints: Sequence[str], names: Sequence[str]) -> npt.NDArray[np.intp]:
     """
-    Return the positions of given joints among the names of a message.
+    Return the indices of given joints among the joint names of a message.
 
     Parameters
     ----------
@@ -151,10 +149,10 @@ def joint_places(joints: Sequence[str], names: Sequence[str]) -> npt.NDArray[np.
     missing = [joint for joint in joints if joint not in names]
     if missing:
         raise RecordingError(
-            f'joint states do not contain {", ".join(missing)}; they name '
-            f'{", ".join(names) or "no joints"}'
+            f'the joint states have no joint {", ".join(missing)}; their joints are '
+            f'{", ".join(names) or "none"}'
         )
     twice = [joint for joint in joints if list(names).count(joint) > 1]
     if twice:
-        raise RecordingError(f'joint states name {", ".join(twice)} twice')
+        raise RecordingError(f'the joint states contain joint {", ".join(twice)} twice')
     return np.array([list(names).index(joint) for joint in joints], dtype=np.intp)

@@ -4,25 +4,25 @@
 Detection of damaged samples in a stream of joint states.
 
 One damaged sample of a torque or an encoder can bias an estimate more than thousands of good
-samples correct. Every sample is predicted by the straight line through the two before it; for a
-smooth signal, the prediction includes the curvature. A sample too far from the prediction is held
-until the next ones arrive. If the next samples return to the line and do not continue from the
-held sample, the held sample is damaged and left out. Otherwise the motion has changed, and all
+samples correct. Each sample is predicted by the straight line through the two samples before it;
+for a smooth signal, the prediction includes the curvature. A sample too far from the prediction is
+held until the next samples arrive. If the next samples return to the line and do not continue from
+the held sample, the held sample is damaged and left out. Otherwise the motion has changed, and all
 samples are used. A real change is therefore never lost, however large it is.
 
-Positions are continuous. A position that steps and continues from there means that a clock was set
-or an encoder zeroed, and a new stretch begins (``StreamSample.begins``). A torque may jump and
-return, for example when free play is crossed. The usual range of the torque distinguishes such
+Positions are continuous. A position that steps and continues from the new value means that a clock
+was set or an encoder zeroed, and a new stretch begins (``StreamSample.begins``). A torque may jump
+and return, for example when free play is crossed. The usual range of the torque distinguishes such
 pulses from damage. A stream leaves them out unreported, as the range is known too late; a
 recording keeps them.
 
 The largest allowed error is the largest of three. The first is the usual prediction error in the
-noisiest part of the last minute, times the normal quantile for one false alarm in
+noisiest window of the last minute, times the normal quantile for one false alarm in
 `false_alarm_time`. The second is the resolution, the smallest step of a signal, times the same
 quantile. The third is the negligible error (``floor``): the error of one sample that changes an
-estimate as much as noise does. Across a gap, errors are larger: those of an acceleration grow with
-the square of time, those of noise hardly. The errors of a signal reveal which of the two
-dominates: successive errors of white noise have the correlation -2/3, those of an acceleration 1.
+estimate as much as noise does. Across a gap, errors are larger: errors by an acceleration grow
+with the square of time, errors by noise hardly. Successive errors show which of the two dominates:
+their correlation is -2/3 for white noise and 1 for an acceleration.
 
 """
 
@@ -56,15 +56,15 @@ N_FIRST = 20
 
 class SpikeGate:
     """
-    Gate that passes on the undamaged joint states of a stream.
+    Gate that passes the undamaged joint states of a stream and leaves out damaged joint states.
 
     Parameters
     ----------
     prismatic : array_like of bool, shape (n,)
         Whether each joint is prismatic; the angles of the others may jump by full turns.
     signals : str
-        Signals of a sample, each for all joints: q for positions, which never step; v for
-        velocities; t for torques, which may jump and return; as in 'qt'. They are m in all.
+        Signals of a sample, each for all joints, as in 'qt': q for positions, which never step; v
+        for velocities; t for torques, which may jump and return. A sample has m signals.
     torque_limit : array_like, shape (n,), optional
         Largest torque of each joint [N m or N], infinite where unknown.
     false_alarm_time : float
@@ -73,10 +73,10 @@ class SpikeGate:
     Attributes
     ----------
     spikes : Counter of int
-        Samples left out as damaged, by the signal with the largest error.
+        Number of samples left out as damaged, by the signal with the largest error.
     rejected : Counter of str
-        Samples left out, by reason: spike; pulse, possibly a real one; stamp, a wrong time stamp;
-        erratic, without continuity to earlier or later samples; out_of_order.
+        Number of samples left out, by reason: spike; pulse, possibly a real pulse; stamp, a wrong
+        time stamp; erratic, without continuity to earlier or later samples; out_of_order.
     left_out : list of Excursion
         Samples that the last call to `take` left out as spike, pulse or erratic.
     lowest, highest : ndarray, shape (m,)
@@ -102,8 +102,9 @@ class SpikeGate:
         limit = np.where(np.isfinite(limit), limit, finite.min() if len(finite) else 0.0)
         scale = np.where(self._pulsing, np.tile(limit, len(signals)), 1.0)
         # Best resolution of a position [rad or m], of a velocity (per second), and of a torque as
-        # a share of its limit: an encoder of 22 bits, a torque sensor of 17. A simulation without
-        # noise and an arm at rest have less noise; limits from that noise would reject valid data.
+        # a share of its limit: an encoder of 22 bits, a torque sensor of 17 bits. A simulation
+        # without noise and an arm at rest have less noise. Limits from that noise would reject
+        # valid data.
         finest = {'q': 1e-6, 'v': 1e-5, 't': 1e-5}
         # second derivative of each signal when an arm at rest begins to move, in these units per
         # second squared: 2 rad/s^2, a jerk of 50 rad/s^3, and a torque at its limit at 1 Hz
@@ -128,16 +129,16 @@ class SpikeGate:
 
     def take(self, t: float, x: FloatArray, floor: FloatArray | float = 0.0) -> list[StreamSample]:
         """
-        Add a sample, and return the samples that are now known to be good, oldest first.
+        Add a sample; return the samples that are now known to be undamaged, oldest first.
 
         Parameters
         ----------
         t : float
-            Stamp [s].
+            Time stamp [s].
         x : ndarray, shape (m,)
-            Finite numbers.
+            Measured signals, finite numbers.
         floor : ndarray, shape (m,), or float
-            Negligible error of a sample.
+            Negligible error of each signal.
 
         """
         self.left_out, self._floor = [], floor
@@ -156,7 +157,7 @@ class SpikeGate:
         return good + self._take(StreamSample(t, x))
 
     def _take(self, sample: StreamSample) -> list[StreamSample]:
-        """Process a sample whose stamp agrees with the next one."""
+        """Process a sample whose time stamp agrees with the next sample; see `take`."""
         if self._reference:
             self._last = self._reference[1].x
         if self._last is not None:
@@ -171,10 +172,10 @@ class SpikeGate:
 
     def settle(self) -> bool:
         """
-        Update the usual errors if a window is almost full; return whether it was.
+        Update the usual prediction errors if a window is almost full; return whether it was.
 
-        Otherwise `take` does so with the sample that completes the window. A stream calls this
-        with a sample that needs no other work.
+        Otherwise `take` updates them with the sample that completes the window. A stream calls
+        `settle` after a sample that needs little other work.
 
         """
         return self._level.settle(self._period, WINDOW - 4)
@@ -186,14 +187,14 @@ class SpikeGate:
         curvature: FloatArray | float = 0.0,
     ) -> None:
         """
-        Begin within a recording whose usual errors are known.
+        Begin inside a recording whose usual prediction errors are known.
 
         Parameters
         ----------
         model : ErrorModel
-            Usual errors of the recording.
+            Usual prediction errors of the recording.
         reference : sequence of StreamSample
-            The two good samples before; none at the begin of a stretch.
+            The two undamaged samples before; none at the begin of a stretch.
         curvature : ndarray, shape (m,)
             Prediction error of the last known sample, scaled to one period.
 
@@ -205,7 +206,7 @@ class SpikeGate:
 
     def possible(self, excursion: Excursion, lowest: FloatArray, highest: FloatArray) -> bool:
         """
-        Return whether an excursion of a signal is physically possible.
+        Return whether an excursion is physically possible, a pulse of torque and no damage.
 
         A position cannot jump and return. A torque can exceed its usual range, from `lowest` to
         `highest`, when free play is crossed, but by no more than the width of that range: an
@@ -223,7 +224,7 @@ class SpikeGate:
         reference: Sequence[StreamSample] = (),
         curvature: FloatArray | float = 0.0,
     ) -> None:
-        """Begin a new stretch with some samples, and keep the usual errors."""
+        """Begin a new stretch with some samples, and keep the usual prediction errors."""
         self._first, self._reference = first, tuple(reference)
         self._curvature = curvature
         self._pending: list[StreamSample] = []
@@ -235,12 +236,12 @@ class SpikeGate:
 
     @property
     def _tail(self) -> StreamSample | None:
-        """Return the newest sample that is undamaged, as far as is known."""
+        """Return the newest sample that is not known to be damaged."""
         latest = self._pending or self._first or self._reference
         return latest[-1] if latest else None
 
     def _in_time(self, sample: StreamSample) -> bool:
-        """Return whether a stamp continues the stream; two other stamps begin a new stretch."""
+        """Return whether a time stamp continues the stream; two others begin a new stretch."""
         tail, stray, self._jumped = self._tail, self._jumped, None
         dt = 0.0 if tail is None else sample.t - tail.t
         longest = MAX_GAP * self._period
@@ -261,7 +262,7 @@ class SpikeGate:
         return False
 
     def _begin(self) -> list[StreamSample]:
-        """Measure noise and period of the first samples, and check these samples."""
+        """Measure noise and period of the first samples; return those that are undamaged."""
         raw, self._first = self._first or [], None
         first = all_unwrapped(raw, self._turn)
         self._period = float(np.median(np.diff([s.t for s in first])))
@@ -284,7 +285,7 @@ class SpikeGate:
         return good
 
     def _judge(self, sample: StreamSample) -> list[StreamSample]:
-        """Classify another sample; return the samples that are now known to be good."""
+        """Compare a sample with its prediction; return samples now known to be undamaged."""
         if self._first is not None:  # the earlier samples were erratic
             self._first.append(sample)
             return []
@@ -292,7 +293,11 @@ class SpikeGate:
         # a smooth signal keeps its curvature
         curvature = self._level.model.correlation * self._curvature * innovation.acceleration
         judged = innovation._replace(error=innovation.error - curvature)
-        if not self._pending and self._surely_in_line(judged):
+        # Limits grow with `noise` and `acceleration`, and in proportion if both grow alike. They
+        # are at least the limits over one period times the smaller factor: a fast test.
+        growth = min(innovation.noise, innovation.acceleration)
+        least = np.maximum(growth * self._level.model.limits_of_a_period, self._floor)
+        if not self._pending and (np.abs(judged.error) <= least).all():
             return self._accept([sample], innovation)
         ratio = self._ratio_to_limit(judged)
         if not self._pending:
@@ -321,7 +326,7 @@ class SpikeGate:
         return []
 
     def _release(self) -> list[StreamSample]:
-        """Pass on samples that were held back and are valid; check them for damage again."""
+        """Return held samples that are valid, after another check for damage."""
         held, self._pending = self._pending, []
         innovations = self._lines_through(held)
         steady = ~self._pulsing
@@ -339,7 +344,7 @@ class SpikeGate:
         return good
 
     def _continues(self, sample: StreamSample, ratio: FloatArray) -> bool:
-        """Return whether a sample continues the held samples, by the old slope or a new one."""
+        """Return whether a sample continues the held samples, with the old or a new slope."""
         last = self._pending[-1]
         before = self._pending[-2] if len(self._pending) > 1 else self._reference[1]
         first, second = self._reference
@@ -354,7 +359,7 @@ class SpikeGate:
         return False
 
     def _stepped(self) -> bool:
-        """Return whether a continuous signal has stepped between known and held samples."""
+        """Return whether a position has stepped between undamaged and held samples."""
         # The lines before and after a step do not intersect in between. The lines before and
         # after a collision do.
         ahead = innovation_of(self._reference, self._pending[0], self._period)
@@ -374,18 +379,10 @@ class SpikeGate:
         limit = np.maximum(self._limits(innovation), 1e-300)
         return np.asarray(np.abs(innovation.error) / limit)
 
-    def _surely_in_line(self, innovation: Innovation) -> bool:
-        """Return whether a sample is within a lower bound of its limits, a fast test."""
-        # Limits grow with `noise` and `acceleration`, and in proportion if both grow alike. They
-        # are at least the limits over one period times the smaller factor.
-        growth = min(innovation.noise, innovation.acceleration)
-        limits = np.maximum(growth * self._level.model.limits_of_a_period, self._floor)
-        return bool((np.abs(innovation.error) <= limits).all())
-
     def _accept(
         self, samples: list[StreamSample], innovation: Innovation | None = None
     ) -> list[StreamSample]:
-        """Pass samples on, and update the noise estimate with them."""
+        """Return undamaged samples, after updating the usual prediction errors with them."""
         self._pending = []
         for sample in samples:
             one = innovation or innovation_of(self._reference, sample, self._period)
@@ -398,18 +395,18 @@ class SpikeGate:
         return samples
 
     def _lines_through(self, samples: Sequence[StreamSample]) -> list[Innovation]:
-        """Return the error of each sample against the line through the two previous samples."""
+        """Return the prediction error of each sample by the two samples before it."""
         pairs = range(len(samples) - 2)
         return [innovation_of(samples[k : k + 2], samples[k + 2], self._period) for k in pairs]
 
     def _leave_out_ahead(self, samples: Sequence[StreamSample], innovation: Innovation) -> None:
-        """Drop the samples before the first samples that are in line."""
+        """Leave out the samples before the first sample that is in line with the next."""
         if samples:
             ratio, limit = self._ratio_to_limit(innovation), self._limits(innovation)
             self._leave_out(Excursion(tuple(samples), ratio, limit))
 
     def _leave_out(self, excursion: Excursion, erratic: bool = False) -> None:
-        """Count dropped samples by reason."""
+        """Leave out the samples of an excursion, and count them by reason."""
         self.left_out.append(excursion)
         count = len(excursion.samples)
         if erratic:

@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Prediction of a sample of a stream by the straight line through the two before it.
+Prediction of a sample of a stream by the straight line through the two samples before it.
 
 The usual prediction errors are the noise of a stream and the resolution of its signals. One
 sample in a hundred completes a window of errors. All windows take the same computing time, as a
@@ -24,13 +24,13 @@ from scipy import special
 _NOISE_CORRELATION = -2.0 / 3.0
 #: Number of predictions in a window, whose usual error is computed together.
 WINDOW = 100
-#: Largest number of successive damaged samples, and of periods in a gap; a longer deviation is
+#: Largest number of successive damaged samples, and of periods in a gap. A longer excursion is
 #: real, and a longer gap begins a new stretch.
 MAX_GAP = 10
 #: Mean time between two good samples that are left out by error, in normal noise [s].
 FALSE_ALARM_TIME = 360_000.0
 
-#: Growth factor of errors over other times, of one sample or of each, shape (N, 1).
+#: Factor by which prediction errors exceed those over one period: a number, or (N, 1).
 Factor = float | FloatArray
 Time = TypeVar('Time', float, FloatArray)
 
@@ -38,12 +38,12 @@ Time = TypeVar('Time', float, FloatArray)
 @dataclass(frozen=True, eq=False)
 class StreamSample:
     """
-    Sample of a stream.
+    Measured signals of all joints at one time.
 
     Attributes
     ----------
     t : float
-        Stamp [s].
+        Time stamp [s].
     x : ndarray, shape (m,)
         Measured signals.
     begins : bool
@@ -59,7 +59,7 @@ class StreamSample:
 @dataclass(frozen=True, eq=False)
 class Excursion:
     """
-    Samples off the predicted line, to which later samples return.
+    Successive samples off the predicted line, to which later samples return.
 
     Attributes
     ----------
@@ -80,18 +80,18 @@ class Excursion:
 @dataclass(frozen=True, eq=False)
 class ErrorModel:
     """
-    Prediction errors that undamaged samples of a stream usually have.
+    Usual prediction errors of undamaged samples of a stream.
 
     Attributes
     ----------
     period : float
         Sampling period [s].
     size : ndarray, shape (m,)
-        Standard deviation of the errors over a period, in the noisiest window.
+        Standard deviation of the prediction errors over one period, in the noisiest window.
     white : ndarray, shape (m,)
         Share of white noise in the squared errors.
     quantile : float
-        Limit of noise in standard deviations.
+        Largest allowed error by noise, in standard deviations.
 
     """
 
@@ -101,21 +101,21 @@ class ErrorModel:
     quantile: float
 
     def growth(self, noise: Factor, acceleration: Factor) -> FloatArray:
-        """Return by which factor errors grow over other times, shape (m,) or (N, m)."""
+        """Return the growth of errors, (m,) or (N, m), from their growth by either cause."""
         squares = acceleration**2
         return np.asarray(np.sqrt(squares + self.white * (noise**2 - squares)))
 
     @cached_property
     def correlation(self) -> FloatArray:
-        """Correlation of successive errors, 0 for noise, shape (m,)."""
+        """Correlation of successive errors, 0 for white noise and 1 for acceleration, (m,)."""
         return np.clip(1.0 - (1.0 - _NOISE_CORRELATION) * self.white, 0.0, 1.0)
 
     def limits(self, noise: Factor, acceleration: Factor) -> FloatArray:
         """
-        Return the largest allowed prediction errors over other times, shape (m,) or (N, m).
+        Return the largest allowed prediction errors for growth factors, shape (m,) or (N, m).
 
-        The acceleration of an arm is bounded, unlike noise, which has tails. So the limit of a
-        smooth signal is a small multiple of its usual error, not a quantile of the normal
+        The acceleration of an arm is bounded, unlike noise, which has tails. The limit of a smooth
+        signal is therefore a small multiple of its usual error, not a quantile of the normal
         distribution.
 
         """
@@ -126,21 +126,20 @@ class ErrorModel:
 
     @cached_property
     def limits_of_a_period(self) -> FloatArray:
-        """Largest allowed prediction errors over a period, shape (m,)."""
+        """Largest allowed prediction errors over one period, shape (m,)."""
         return self.limits(1.0, 1.0)
 
 
 class Innovation(NamedTuple):
     """
-    Error with which one sample was predicted.
+    Prediction error of one sample.
 
     Attributes
     ----------
     error : ndarray, shape (m,)
         Measured minus predicted signals.
     noise, acceleration : float
-        Growth of the errors by noise, and by an acceleration, over this time relative to one
-        period.
+        Factors by which errors by noise, and by an acceleration, exceed those over one period.
 
     """
 
@@ -150,7 +149,7 @@ class Innovation(NamedTuple):
 
 
 def growth_over(step: Time, ahead: Time, period: float) -> tuple[Time, Time]:
-    """Return the growth of errors by noise and by acceleration over a time after two samples."""
+    """Return factors of errors by noise and by acceleration for prediction over times [s]."""
     ratio = ahead / step
     noise: Time = ((1.0 + (1.0 + ratio) ** 2 + ratio**2) / 6.0) ** 0.5
     return noise, 0.5 * ahead * (ahead + step) / period**2
@@ -159,7 +158,7 @@ def growth_over(step: Time, ahead: Time, period: float) -> tuple[Time, Time]:
 def innovation_of(
     reference: Sequence[StreamSample], sample: StreamSample, period: float
 ) -> Innovation:
-    """Return the error with which a straight line through two samples predicts another one."""
+    """Return the error of predicting a sample by the straight line through two earlier samples."""
     before, last = reference
     step, ahead = last.t - before.t, sample.t - last.t
     error = sample.x - last.x - ahead / step * (last.x - before.x)
@@ -167,7 +166,7 @@ def innovation_of(
 
 
 def unwrapped(x: FloatArray, last: FloatArray, turn: FloatArray) -> FloatArray:
-    """Undo a jump by full turns, by which drivers keep positions within +-pi."""
+    """Return positions without the jump by full turns with which drivers keep them in +-pi."""
     if float(np.abs(x - last).max()) <= np.pi:
         return x
     turns = np.rint(np.divide(x - last, turn, where=turn > 0.0, out=np.zeros_like(x)))
@@ -175,7 +174,7 @@ def unwrapped(x: FloatArray, last: FloatArray, turn: FloatArray) -> FloatArray:
 
 
 def all_unwrapped(samples: Sequence[StreamSample], turn: FloatArray) -> list[StreamSample]:
-    """Return samples without the jumps by full turns between them."""
+    """Return successive samples without jumps of their positions by full turns."""
     found = [samples[0]]
     for sample in samples[1:]:
         found.append(replace(sample, x=unwrapped(sample.x, found[-1].x, turn)))
@@ -183,15 +182,15 @@ def all_unwrapped(samples: Sequence[StreamSample], turn: FloatArray) -> list[Str
 
 
 def quantile(period: float, count: int, false_alarm_time: float = FALSE_ALARM_TIME) -> float:
-    """Return the limit of the errors of `count` signals, in standard deviations of noise."""
+    """Return the limit that noise of `count` signals seldom exceeds, in standard deviations."""
     return float(-special.ndtri(min(period / false_alarm_time / count, 0.5) / 2.0))
 
 
 def robust_scale(innovations: FloatArray, share: float = 0.95) -> FloatArray:
     """
-    Return the standard deviation of errors, (k, m), from the quantile of a share of them.
+    Return the standard deviation of errors, (k, m), from a quantile of their size.
 
-    The other errors may be friction steps, or damage.
+    Larger errors may be friction steps, or damage.
 
     """
     place = share * (len(innovations) - 1)
@@ -204,7 +203,7 @@ def robust_scale(innovations: FloatArray, share: float = 0.95) -> FloatArray:
 
 
 def share_of_noise(innovations: FloatArray, size: FloatArray) -> FloatArray:
-    """Return the share of white noise in the squares of successive errors of shape (k, m)."""
+    """Return the share of white noise in the squares of successive errors, (k, m)."""
     most = 3.0 * size  # larger errors are limited
     errors = np.minimum(np.maximum(innovations, -most), most)
     squares = np.einsum('k...,k...->...', errors, errors)
@@ -216,7 +215,7 @@ def share_of_noise(innovations: FloatArray, size: FloatArray) -> FloatArray:
 
 class NoiseLevel:
     """
-    Estimator of the usual prediction error, from undamaged samples.
+    Estimator of the usual prediction errors of a stream, from undamaged samples.
 
     Parameters
     ----------
@@ -230,7 +229,7 @@ class NoiseLevel:
     Attributes
     ----------
     model : ErrorModel
-        Usual error in the noisiest window that is kept; at least the resolution.
+        Usual prediction errors in the noisiest window of the last minute; at least the resolution.
 
     """
 
@@ -245,19 +244,19 @@ class NoiseLevel:
         self._window: list[tuple[Innovation, FloatArray]] = []
 
     def set(self, model: ErrorModel) -> None:
-        """Set the usual prediction error."""
+        """Replace the usual prediction errors by those of a model."""
         self.forget()
         self._remember(model.size, model.white)
         self.model = model
 
     def forget(self) -> None:
-        """Clear the measured noise; the next `begin` measures it again."""
+        """Clear the measured noise; the next call of `begin` measures it again."""
         self._sizes[:] = 0.0
         self._seen = 0
 
     def begin(self, innovations: Sequence[Innovation], moves: FloatArray, period: float) -> None:
         """
-        Measure the usual errors of the first samples, some of which may be damaged.
+        Measure the usual prediction errors of the first samples, which may include damaged ones.
 
         `moves`, (k, m), are the differences between successive samples; the period is in s.
 
@@ -272,11 +271,11 @@ class NoiseLevel:
             self._use(period, size, share_of_noise(errors, np.maximum(size, self._least(period))))
 
     def learn(self, innovation: Innovation, move: FloatArray) -> None:
-        """Add the prediction error of an undamaged sample, and its change, shape (m,)."""
+        """Add the prediction error of an undamaged sample, and its change of signals, (m,)."""
         self._window.append((innovation, move))
 
     def settle(self, period: float, count: int = WINDOW) -> bool:
-        """Update the usual error if enough errors are known; return whether they were."""
+        """Update the usual prediction errors if a window is full; return whether it was."""
         if len(self._window) < count:
             return False
         innovations, moves = zip(*self._window, strict=True)
@@ -292,23 +291,24 @@ class NoiseLevel:
         return True
 
     def _use(self, period: float, size: FloatArray, white: FloatArray) -> None:
-        """Set the usual error, at least the resolution."""
+        """Set the usual prediction errors of a window, at least the resolution."""
         allowed = quantile(period, len(size), self._false_alarm_time)
         self.model = ErrorModel(period, np.maximum(size, self._least(period)), white, allowed)
 
     def _remember(self, size: FloatArray, white: FloatArray) -> None:
+        """Store the usual prediction errors of a window, in place of the oldest window."""
         place = self._seen % len(self._sizes)
         self._sizes[place], self._shares[place] = size, white
         self._seen += 1
 
     def add_steps(self, moves: FloatArray) -> None:
-        """Estimate the resolution from changes between samples, shape (k, m)."""
+        """Update the resolution of each signal with changes between samples, (k, m)."""
         sizes = np.abs(moves)
         if ((sizes > 0.0) & (sizes < self._min_steps[-1])).any():  # seldom after the first samples
             self._min_steps = smallest_steps(np.concatenate([self._min_steps, sizes]))
 
     def _least(self, period: float) -> FloatArray:
-        """Return the smallest step of every signal, at least the finest and that of an onset."""
+        """Return the smallest relevant error of each signal: resolution, or onset of motion."""
         # A fast signal has no small steps, but its resolution causes prediction errors.
         step = np.where(np.isfinite(self._min_steps[-1]), self._min_steps[-1], 0.0)
         least = np.maximum(self._finest, self._onset * period**2)
@@ -316,7 +316,7 @@ class NoiseLevel:
 
 
 def smallest_steps(steps: FloatArray) -> FloatArray:
-    """Return the three smallest nonzero steps of every signal, shape (3, m)."""
+    """Return the three smallest nonzero steps of each signal, shape (3, m)."""
     none = np.full((3, steps.shape[1]), np.inf)
     steps = np.concatenate([none, np.where(steps > 0.0, steps, np.inf)])
     return np.partition(steps, 2, axis=0)[:3]
