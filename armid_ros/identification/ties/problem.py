@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Regression of springs between two machines: torques, columns, and effects of noise."""
+"""Regression of the stiffness of springs between two machines: torques, columns and noise."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ _COMMON = ('motion_lags', 'torque_lags', 'torque_noise', 'described', 'precision
 @dataclass(frozen=True)
 class InteractionProblem:
     """
-    Regression tau = known + columns theta, with derivatives by the motion of both machines.
+    Regression tau = known + columns theta, with the noise of torques and of both motions.
 
     Attributes
     ----------
@@ -50,14 +50,14 @@ class InteractionProblem:
     known_by_motion : ndarray, shape (N, n, 3 J)
         Derivatives of `known` by position, velocity, acceleration of all J = n + m joints.
     columns_by_motion : ndarray, shape (N, n, P, 3 J)
-        Derivatives of `columns` by the same.
+        Derivatives of `columns` by the same quantities.
     motion_lags : ndarray, shape (1 + L, 3 J, 3 J)
         Covariances of errors of the motion by noisy angles, between a sample and itself or each
-        of the L next ones; L is 0 if errors are independent.
+        of the L next samples; L is 0 if errors are independent.
     torque_lags : ndarray, shape (1 + L,)
-        Correlations of the noise of torques between the same samples.
+        Correlations of the noise of torques between these samples.
     torque_noise : ndarray, shape (n,)
-        Smallest standard deviation of these (filtered) torques [N m].
+        Smallest standard deviation of the noise of filtered torques [N m].
     segments : tuple of str
         Names of the springs.
     spring_joints : tuple of str
@@ -65,10 +65,10 @@ class InteractionProblem:
     rigid : tuple of ParameterName
         Free combinations of inertias.
     described : ndarray, shape (P,)
-        Prior parameters by the description of the machine; zero without a prior.
+        Prior parameters from the description of the machine; zero without a prior.
     precision : ndarray, shape (P, P)
-        Precision of the prior. Values of columns that are hardly more than noise would grow
-        without it, as any value explains the torques.
+        Precision of the prior. Without a prior, the parameters of columns that are hardly more
+        than noise would grow, as any value explains the torques.
     rms_extension : float
         Root mean square extension of the springs [m].
 
@@ -90,23 +90,23 @@ class InteractionProblem:
     rms_extension: float
 
     def __post_init__(self) -> None:
-        """Freeze the arrays."""
+        """Make the arrays read-only."""
         for name in (*STACKED, *_COMMON):
             object.__setattr__(self, name, read_only(getattr(self, name)))
 
     @property
     def motion_noise(self) -> FloatArray:
-        """Covariance of the motion errors of a sample due to noisy angles, shape (3 J, 3 J)."""
+        """Covariance of the errors of a sample's motion by noisy angles, shape (3 J, 3 J)."""
         return np.asarray(self.motion_lags[0])
 
     @property
     def position_noise(self) -> FloatArray:
-        """Return the standard deviation of the angles of both machines, shape (J,) [rad]."""
+        """Standard deviation of the noise of the angles of both machines, shape (J,) [rad]."""
         variance = np.diag(self.motion_noise)
         return np.asarray(np.sqrt(variance[: len(variance) // 3]))
 
     def with_springs(self, kept: npt.NDArray[np.intp]) -> InteractionProblem:
-        """Return the problem with only some of its springs."""
+        """Return the problem with the springs of given indices."""
         columns = [*kept.tolist(), *range(len(self.segments), self.columns.shape[2])]
         return replace(
             self,
@@ -119,16 +119,16 @@ class InteractionProblem:
         )
 
     def residual(self, theta: FloatArray) -> FloatArray:
-        """Return the residual torques, shape (N, n) [N m]."""
+        """Return the residual torques for parameters, (P,), shape (N, n) [N m]."""
         return np.asarray(self.tau - self.known - self.columns @ theta)
 
     def sensitivity(self, theta: FloatArray) -> FloatArray:
-        """Return the derivative of the model by the motion, shape (N, n, 3 J)."""
+        """Return the derivatives of the modelled torques by the motion, shape (N, n, 3 J)."""
         spring = np.einsum('nipj,p->nij', self.columns_by_motion, theta)
         return np.asarray(self.known_by_motion + spring)
 
     def deviation(self, theta: FloatArray) -> FloatArray:
-        """Return the root mean square of residuals that are only noise, shape (n,) [N m]."""
+        """Return the root mean square residual of each joint by noise alone, (n,) [N m]."""
         by_motion = self.sensitivity(theta)
         angles = np.sum(by_motion @ self.motion_noise * by_motion, axis=2)
         return np.asarray(np.sqrt(np.mean(angles, axis=0) + self.torque_noise**2))
@@ -146,7 +146,7 @@ def interaction_problem(
     slack: float | FloatArray = 0.0,
 ) -> InteractionProblem:
     """
-    Set up the regression on motions of both machines.
+    Return the regression of spring stiffness on motions of both machines.
 
     Parameters
     ----------
@@ -155,8 +155,8 @@ def interaction_problem(
     motion, other_motion : Motion
         Motions of both machines on one time base; ``motion`` with torques.
     noise : tuple of two array_like
-        Standard deviation of the angles of both machines, a number or (n + m,) [rad], and the
-        smallest one of the torques, a number or (n,) [N m].
+        Standard deviation of the noise of the angles of both machines, a number or (n + m,) [rad],
+        and smallest standard deviation of the noise of torques, a number or (n,) [N m].
     used : Conditioning, optional
         Filters that were applied to the positions, and that decimate torques and columns. By
         default, every sample counts and the angles are not filtered.
@@ -175,10 +175,10 @@ def interaction_problem(
     """
     robot, other, ties = machines.robot, machines.other, machines.ties
     if motion.tau is None:
-        raise IdentificationError(f'{robot.name}: its motion has no torques to find the stiffness')
+        raise IdentificationError(f'{robot.name}: its motion has no torques to identify springs')
     if len(motion) != len(other_motion) or np.max(np.abs(motion.t - other_motion.t)) > 1e-6:
         raise IdentificationError(
-            f'{robot.name} and {other.name}: their motions have to be on one time base'
+            f'the motions of {robot.name} and {other.name} have to be on one time base'
         )
     kept = np.array(decimated_samples(len(motion), used) if used else range(len(motion)))
     slow, far = motion.select(kept), other_motion.select(kept)
@@ -227,7 +227,7 @@ def interaction_problem(
 def _free_inertias(
     robot: Robot, motion: Motion, springs: FloatArray, names: Sequence[str]
 ) -> tuple[FloatArray, BaseParameters]:
-    """Return the inertial columns that are identifiable with the springs, and their grouping."""
+    """Return the inertial columns that the motion identifies, and their base parameters."""
     # remainder of a column, as a share of it, below which it is a combination of the others
     tolerance = 1e-6
     body = regressor(robot, motion)
@@ -239,21 +239,21 @@ def _free_inertias(
     scaled = w / np.where(scale > 0.0, scale, 1.0)
     left = np.abs(np.diag(np.linalg.qr(scaled, mode='r')))[base.rank :]
     if len(left) and left.min() < tolerance:
-        which = names[int(np.argmin(left))] if len(names) > 1 else 'the springs'
+        spring = names[int(np.argmin(left))] if len(names) > 1 else 'all springs'
         raise IdentificationError(
-            f'{which}: its stiffness cannot be distinguished from weight '
-            'and inertia along this motion; keep the inertias known, or record more motion'
+            f'the stiffness of {spring} cannot be distinguished from weight and inertia along '
+            'this motion; keep the inertias known, or record more motion'
         )
     return body[:, :, base.independent], base
 
 
 def _passed(used: Conditioning | None) -> tuple[FloatArray, FloatArray]:
-    """Return the covariances of filtered white noise of positions and of torques, over lags."""
+    """Return covariances over lags of filtered white noise: of the motion, and of torques."""
     # number of samples over which errors are correlated after filtering
     n_lags = 6
-    # covariances of position, velocity, acceleration of a row with itself and with later rows,
-    # shape (1 + lags, 3, 3), and of torques, (1 + lags,). Columns change slowly compared with
-    # the filter of the decimation, so they do not affect the noise that passes it
+    # Covariances of position, velocity, acceleration of a sample with itself and with later
+    # samples, (1 + lags, 3, 3), and of torques, (1 + lags,). Columns change slowly compared with
+    # the filter of the decimation, so they do not affect the noise that passes it.
     if used is None:
         return np.diag([1.0, 0.0, 0.0])[np.newaxis], np.ones(1)
     w = np.linspace(0.0, np.pi, 8001)
@@ -270,7 +270,7 @@ def _passed(used: Conditioning | None) -> tuple[FloatArray, FloatArray]:
 
 
 def _regressor_by_motion(robot: Robot, motion: Motion, kept: npt.NDArray[np.intp]) -> FloatArray:
-    """Return the derivatives of some rigid columns, shape (N, n, P, 3, n)."""
+    """Return the derivatives of chosen rigid columns by the motion, shape (N, n, P, 3, n)."""
     h = 1e-5  # step of the central differences [rad or m]
     n = motion.n_joints
     result = np.empty((len(motion), n, len(kept), 3, n))
@@ -284,7 +284,7 @@ def _regressor_by_motion(robot: Robot, motion: Motion, kept: npt.NDArray[np.intp
 
 
 def _placed(by_own: FloatArray, count: int) -> FloatArray:
-    """Extend derivatives by one machine's motion, (..., 3, n), by zeros to (..., 3 J)."""
+    """Return derivatives by one machine's motion, (..., 3, n), with zeros for the other's."""
     result = np.zeros((*by_own.shape[:-1], count))
     result[..., : by_own.shape[-1]] = by_own
     return result.reshape((*by_own.shape[:-2], 3 * count))

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Regression of springs between two machines from recordings of both."""
+"""Regression of the stiffness of springs between two machines, from recordings of both."""
 
 from __future__ import annotations
 
@@ -42,11 +42,11 @@ def recorded_interaction_problem(
     slack: float | FloatArray = 0.0,
 ) -> InteractionProblem:
     """
-    Set up the regression on recordings, with the noise of their angles.
+    Return the regression of spring stiffness on recordings of both machines.
 
-    The angles of the other machine are interpolated at the stamps of the first. Both are filtered,
-    and torques and columns are decimated, as in any identification. White noise of the angles is
-    computed from differences of high order; a known share of it passes the filters.
+    The angles of the other machine are interpolated at the stamps of the first machine. Both are
+    filtered, and torques and columns are decimated, as in any identification. White noise of the
+    angles is computed from differences of high order; a known share passes the filters.
 
     Parameters
     ----------
@@ -64,7 +64,7 @@ def recorded_interaction_problem(
 
     """
     if recording.tau is None:
-        raise IdentificationError(f'{recording.source}: {recording.topic} has no effort')
+        raise IdentificationError(f'{recording.source}: topic {recording.topic} has no effort')
     together = recorded_together(recording, other_recording, machines.other, machines.ties)
     settings = SignalSettings()
     both = _one_machine(together)
@@ -85,7 +85,7 @@ def together_interaction_problem(
     rest: Callable[[Motion], FloatArray] | None = None,
 ) -> InteractionProblem:
     """
-    Set up the regression on a recording that has the motion of the other machine.
+    Return the regression of spring stiffness on a recording with the other machine's motion.
 
     Parameters
     ----------
@@ -98,7 +98,7 @@ def together_interaction_problem(
     inertias, separate, slack
         See `interaction_problem`.
     rest : callable, optional
-        Function that returns the torque of other effects along a motion, such as friction, shape
+        Function of a motion that returns the torque of other effects, such as friction, shape
         (N, n) [N m].
 
     Raises
@@ -139,7 +139,7 @@ def together_interaction_problem(
 
 def stacked(problems: Sequence[InteractionProblem]) -> InteractionProblem:
     """
-    Concatenate the problems of stretches or recordings.
+    Return one regression with the samples of several stretches or recordings.
 
     Raises
     ------
@@ -148,13 +148,13 @@ def stacked(problems: Sequence[InteractionProblem]) -> InteractionProblem:
 
     """
     if any(part.rigid != problems[0].rigid for part in problems):
-        raise IdentificationError('a stretch between gaps moves too little for free inertias')
+        raise IdentificationError('a stretch between two gaps moves too little for free inertias')
     joined = {name: np.concatenate([getattr(part, name) for part in problems]) for name in STACKED}
     return replace(problems[0], **joined)  # type: ignore[arg-type]
 
 
 def _one_machine(recording: Recording) -> Recording:
-    """Return a recording with the joints of its partner, without torques of the partner."""
+    """Return a recording with the joints of both machines; torques of the other are zero."""
     assert recording.partner is not None and recording.tau is not None
     far = recording.partner.q
     return replace(
@@ -174,19 +174,19 @@ def band_of_motion(
     margin: float = 2.0,
 ) -> Conditioning:
     """
-    Return filters with the band of the motion, except where settings define them.
+    Return filters whose band is reduced to that of the motion, unless settings define it.
 
     Parameters
     ----------
     recordings : sequence of Recording
         Recordings to be filtered.
     used : Conditioning
-        Filters whose band is reduced.
+        Filters with the largest band.
     settings : SignalSettings
-        Settings given by the user.
+        Cut-off and decimation given by the user.
     margin : float
-        Pass band over the band of the motion. The noise of accelerations grows with its power of
-        2.5.
+        Cut-off over the band of the motion. The noise of accelerations grows with the power of
+        2.5 of the cut-off.
 
     """
     if settings.cutoff_hz is None:
@@ -217,7 +217,7 @@ def _white(signals: FloatArray) -> FloatArray:
 @dataclass(frozen=True)
 class SensorNoise:
     """
-    Effect of white sensor noise on the torques of an arm that is tied to another machine.
+    Noise of the torques of an arm that springs connect to another machine.
 
     With springs, the noise of angles dominates. It is known far better from the angles themselves
     than from the difference of two periods of some seconds.
@@ -238,8 +238,8 @@ class SensorNoise:
     used: Conditioning
 
     def floor(self, arm: ArmModel) -> FloatArray:
-        """Return the standard deviation of the noise of a row, ties included, shape (n,) [N m]."""
-        problem = self._taut  # with springs without slack
+        """Return the standard deviation of the noise of filtered torques, shape (n,) [N m]."""
+        problem = self._taut
         stiffness = dict.fromkeys(problem.spring_joints, 0.0)
         slack = dict.fromkeys(problem.spring_joints, 0.0)
         for effect, values in zip(arm.effects, arm.values, strict=True):
@@ -258,4 +258,5 @@ class SensorNoise:
 
     @cached_property
     def _taut(self) -> InteractionProblem:
+        """Regression with springs without slack."""
         return together_interaction_problem(self.robot, self.recording, self.used, separate=True)

@@ -3,13 +3,13 @@
 """
 Stiffness of springs between two machines, from torques of one and joint angles of both.
 
-tau = Y pi + sum_s k_s J_s^T D_s is linear in k, but D, the vector between the ends of a spring,
-is a small difference of measured angles. Noise of the angles makes J^T D too long on average, so
-k is too small, by several per cent at 0.1 deg. The noise x of a motion changes the torque by G x,
-where G is the derivative of the model by the motion. Residuals then have the covariance
-S = var(tau) + G var(x) G^T, which also depends on k. The k that minimises sum r^T S^-1 r is
-consistent (generalised total least squares). The columns are computed at the most likely motion,
-given the residuals.
+The torque tau = Y pi + sum_s k_s J_s^T D_s is linear in the stiffness k. The vector D between the
+ends of a spring is a small difference of measured angles. Noise of the angles makes J^T D too long
+on average, so k is too small, by several per cent at 0.1 deg. The noise x of a motion changes the
+torque by G x, where G is the derivative of the model by the motion. Residuals r then have the
+covariance S = var(tau) + G var(x) G^T, which also depends on k. The stiffness that minimises
+sum r^T S^-1 r is consistent (generalised total least squares). The columns are computed at the
+most likely motion, given the residuals.
 Source: Van Huffel and Vandewalle 1991; the leg pair's equations (16), (18), (23), (25).
 
 """
@@ -27,31 +27,31 @@ from armid_ros.motion import FloatArray, read_only
 import numpy as np
 from scipy.optimize import minimize
 
-#: Smallest z-score of an existing stiffness: a false one has a probability of 3e-5.
+#: Smallest z-score of a spring that exists; without a spring, it has a probability of 3e-5.
 MIN_Z_SCORE = 4.0
 
 
 @dataclass(frozen=True)
 class Interaction:
     """
-    Estimated springs between two machines.
+    Estimated stiffness of springs between two machines.
 
     Attributes
     ----------
     estimate : Estimate
         Stiffnesses, then free combinations of inertias.
     uncorrected : ndarray, shape (P,)
-        Least-squares estimate of these, with the bias of noisy angles.
+        Least-squares estimate of the same parameters, with the bias by noisy angles.
     segments : tuple of str
-        Names of the springs; a single 'all' if they have one stiffness.
+        Names of the springs; a single 'all' if all have the same stiffness.
     torque_noise : ndarray, shape (n,)
         Standard deviation of the torques, as given or as estimated [N m].
     position_noise : ndarray, shape (n + m,)
-        Standard deviation of the angles of both machines, as corrected for [rad].
+        Standard deviation of the noise of both machines' angles, which is corrected for [rad].
     residual : ndarray, shape (N, n)
         Residual of the torques [N m].
     misfit : float
-        Sum of weighted squared residuals; expected is one per degree of freedom.
+        Sum of weighted squared residuals; the expected value is the degrees of freedom.
 
     """
 
@@ -75,23 +75,23 @@ class Interaction:
 
     @property
     def bias(self) -> FloatArray:
-        """Return the bias of least squares by noisy angles, shape (S,) [N/m]."""
+        """Bias of the least-squares stiffnesses by noisy angles, shape (S,) [N/m]."""
         return np.asarray(self.uncorrected[: len(self.segments)] - self.stiffness)
 
     def interval(self, confidence: float = 0.95) -> FloatArray:
-        """Return lower and upper ends of confidence intervals, shape (S, 2) [N/m]."""
+        """Return the confidence interval of each stiffness, shape (S, 2) [N/m]."""
         return self.estimate.interval(confidence)[: len(self.segments)]
 
 
 def identify_interaction(problem: InteractionProblem) -> Interaction:
     """
-    Estimate stiffnesses and unknown inertias without the bias due to noise of the angles.
+    Estimate stiffnesses and free inertias without the bias by noisy angles.
 
     Parameters
     ----------
     problem : InteractionProblem
-        Torques, columns and their derivatives: see ``interaction_problem``. Residuals larger than
-        its noise widen the intervals.
+        Torques, columns and noise; see ``interaction_problem``. Residuals larger than the noise
+        widen the intervals.
 
     Raises
     ------
@@ -100,7 +100,7 @@ def identify_interaction(problem: InteractionProblem) -> Interaction:
 
     """
     uncorrected = _least_squares(problem, problem.columns)
-    # initial value: one stiffness for all springs by least squares, which noise affects little
+    # start: the same stiffness for all springs by least squares, which noise affects little
     count = len(problem.segments)
     together = problem.columns[:, :, :count].sum(axis=2, keepdims=True)
     columns = np.concatenate([together, problem.columns[:, :, count:]], axis=2)
@@ -130,18 +130,19 @@ def identify_interaction(problem: InteractionProblem) -> Interaction:
 def _most_likely(
     problem: InteractionProblem, theta: FloatArray, variance: FloatArray
 ) -> FloatArray:
-    """Return the most likely theta, from a start near it, by a quasi-Newton method (BFGS)."""
+    """Return the most likely parameters, near a start, by a quasi-Newton method (BFGS)."""
     # largest gradient, in standard deviations, at the end of the iteration
     converged = 1e-3
-    # where noise dominates a column, the loss is much flatter than by the information, and
-    # Gauss-Newton steps oscillate; BFGS learns the curvature from the gradients, beginning with
-    # the information
+    # Where noise dominates a column, the information overestimates the curvature of the loss, and
+    # Gauss-Newton steps oscillate. BFGS begins with the information and learns the curvature from
+    # the gradients.
     information = _gauss_newton(problem, theta, variance).information
     size = np.sqrt(np.diag(information))
     root = np.linalg.cholesky(information / np.outer(size, size))
     unit = np.linalg.inv(root).T / size[:, np.newaxis]  # directions of one standard deviation
 
     def half_loss(z: FloatArray) -> tuple[float, FloatArray]:
+        """Return half of the loss and its gradient, z standard deviations from the start."""
         here = theta + unit @ z
         step = _gauss_newton(problem, here, variance)
         away = here - problem.described
@@ -157,31 +158,34 @@ def _most_likely(
     )
     if not np.max(np.abs(found.jac)) < 10.0 * converged:
         raise IdentificationError(
-            'the stiffness does not converge: the angles are too noisy for extensions of '
-            f'{1e3 * problem.rms_extension:.2g} mm; filter them, or move more'
+            'the stiffness of the springs does not converge: the angles are too noisy for '
+            f'extensions of {1e3 * problem.rms_extension:.2g} mm; filter them more, or move more'
         )
     return np.asarray(theta + unit @ found.x)
 
 
 def _least_squares(problem: InteractionProblem, columns: FloatArray) -> FloatArray:
+    """Return the least-squares parameters; raise an error for a spring that never stretches."""
     w = columns.reshape(-1, columns.shape[2])
     scale = np.linalg.norm(w, axis=0)
     springs = scale[: columns.shape[2] - len(problem.rigid)]
     # the spring is not extended if its RMS torque per stiffness [m^2] is smaller
     if not np.all(springs > 1e-9 * np.sqrt(len(w))):
         name = problem.segments[int(np.argmin(springs))]
-        raise IdentificationError(f'{name}: a spring that never stretches is not identifiable')
+        raise IdentificationError(
+            f'spring {name} never stretches, so its stiffness is not identifiable'
+        )
     y = problem.tau - problem.known
     return np.asarray(np.linalg.lstsq(w / scale, y.ravel(), rcond=None)[0] / scale)
 
 
 class _Step(NamedTuple):
-    """A linearisation: columns (N, n, P), and `pull`, S^-1 times the residuals (N, n)."""
+    """Linear problem at the most likely motion, with residuals weighted by their covariance S."""
 
-    gradient: FloatArray  # negative gradient of half the loss
-    information: FloatArray
-    columns: FloatArray
-    pull: FloatArray
+    gradient: FloatArray  # negative gradient of half the loss, (P,)
+    information: FloatArray  # (P, P)
+    columns: FloatArray  # (N, n, P)
+    weighted: FloatArray  # S^-1 times the residuals, (N, n)
     misfit: float
 
 
@@ -190,18 +194,19 @@ def _gauss_newton(problem: InteractionProblem, theta: FloatArray, variance: Floa
     by_motion = problem.sensitivity(theta)
     covariance = _noise(problem, by_motion, variance)
     residual = problem.residual(theta)
-    pull = np.linalg.solve(covariance, residual[..., np.newaxis])[..., 0]
-    correction = np.einsum('nij,ni->nj', by_motion @ problem.motion_noise, pull)
+    weighted = np.linalg.solve(covariance, residual[..., np.newaxis])[..., 0]
+    correction = np.einsum('nij,ni->nj', by_motion @ problem.motion_noise, weighted)
     columns = problem.columns + np.einsum('nipj,nj->nip', problem.columns_by_motion, correction)
     information = np.einsum('nip,niq->pq', columns, np.linalg.solve(covariance, columns))
     information += problem.precision
-    gradient = np.einsum('nip,ni->p', columns, pull)
+    gradient = np.einsum('nip,ni->p', columns, weighted)
     gradient += problem.precision @ (problem.described - theta)
-    return _Step(gradient, information, columns, np.asarray(pull), float(np.sum(residual * pull)))
+    misfit = float(np.sum(residual * weighted))
+    return _Step(gradient, information, columns, np.asarray(weighted), misfit)
 
 
 def _noise(problem: InteractionProblem, by_motion: FloatArray, variance: FloatArray) -> FloatArray:
-    """Return S, the covariance of the residuals of every sample, shape (N, n, n)."""
+    """Return the covariance S of the residuals of each sample, shape (N, n, n)."""
     covariance = by_motion @ problem.motion_noise @ by_motion.transpose(0, 2, 1)
     return np.asarray(covariance + np.diag(variance))
 
@@ -213,7 +218,7 @@ def _covariance(
     step: _Step,
     excess: float,
 ) -> FloatArray:
-    """Return the covariance of the parameters at the solution, H^-1 B H^-1."""
+    """Return the sandwich covariance of the parameters at the solution, H^-1 B H^-1, (P, P)."""
     # B is the covariance of the scores. Filters correlate neighbouring samples by a known
     # amount. If scores vary more, as with coloured noise, standard deviations are increased.
     # Independent poses have B = H.
@@ -226,7 +231,7 @@ def _covariance(
     by_motion = problem.sensitivity(theta)
     weighted = np.linalg.solve(_noise(problem, by_motion, variance), step.columns)
     moved = np.einsum('nij,nip->npj', by_motion, weighted)
-    scores = np.einsum('nip,ni->np', step.columns, step.pull)
+    scores = np.einsum('nip,ni->np', step.columns, step.weighted)
     known = information
     lags = len(problem.torque_lags)
     for lag in range(1, lags):
