@@ -15,9 +15,11 @@ from armid_ros.identification.fitting.identifiability import (
     base_spread,
     determined,
     excited,
+    excludes_zero,
     near_deviation,
+    NOT_SHOWN,
+    Reason,
     Unidentified,
-    unidentified,
 )
 from armid_ros.identification.fitting.instruments import fit_by_instruments
 from armid_ros.identification.fitting.least_squares import Estimator, ESTIMATORS, Method
@@ -177,8 +179,25 @@ class Identification:
 
     @property
     def unidentified(self) -> tuple[Unidentified, ...]:
-        """Return the parameters that the data do not identify, with reasons."""
-        return unidentified(self.theory, self.base, self.estimate)
+        """Standard and base parameters that the data do not identify, with reasons."""
+        theory, base, estimate = self.theory, self.base, self.estimate
+        found = [
+            Unidentified(name, 'no motion of this arm shows it')
+            for name, shown in zip(theory.standard, np.any(theory.grouping, axis=0), strict=True)
+            if not shown
+        ]
+        grouped, kept = np.any(base.grouping, axis=0), set(base.independent.tolist())
+        for name, column in zip(theory.parameters, theory.independent.tolist(), strict=True):
+            if column not in kept:
+                together: Reason = 'this motion shows it only together with others'
+                found.append(Unidentified(name, together if grouped[column] else NOT_SHOWN))
+        clear = excludes_zero(estimate.values, estimate.std)
+        found += [
+            Unidentified(name, 'not distinguishable from zero')
+            for name, sure in zip(estimate.parameters, clear, strict=True)
+            if not sure
+        ]
+        return tuple(found)
 
     def predict(self, recordings: Sequence[Recording]) -> tuple[Fit, ...]:
         """Predict the torques of other recordings, filtered like the training data; see `Fit`."""

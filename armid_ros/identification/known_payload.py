@@ -4,9 +4,9 @@
 Estimation of drive gains from a known payload.
 
 A common factor of all efforts cannot be distinguished from the same factor of all masses. A
-payload of known mass in some recordings makes both identifiable. Each joint measures k (Y pi + p),
-where p is the torque of the payload. The gain k is therefore the coefficient of p in the
-regression of the effort on the columns of Y and p.
+payload of known mass in some recordings makes both identifiable. The effort of each joint is
+k (Y pi + p), where p is the torque of the payload. The gain k is therefore the coefficient of p in
+the regression of the effort on the columns of Y and p.
 
 """
 
@@ -33,7 +33,7 @@ from scipy.stats import t as student
 @dataclass(frozen=True)
 class DriveGains:
     """
-    Drive gains: measured effort over the torque of the drive.
+    Gain of each drive: measured effort over the torque of the drive.
 
     Attributes
     ----------
@@ -42,7 +42,7 @@ class DriveGains:
     values, std : ndarray, shape (n,)
         Gains and their standard deviations; 1 and infinite if the payload does not determine them.
     half_width : ndarray, shape (n,)
-        Half of the 95 % interval.
+        Half of the 95 % confidence interval.
 
     """
 
@@ -52,7 +52,7 @@ class DriveGains:
     half_width: FloatArray
 
     def document(self) -> list[dict[str, object]]:
-        """Return the gains for identification.json; null if not identified."""
+        """Return the gains as written to identification.json; null if not identified."""
         numbers = zip(
             *(array.tolist() for array in (self.values, self.std, self.half_width)), strict=True
         )
@@ -64,7 +64,7 @@ class DriveGains:
         ]
 
     def sentences(self) -> tuple[str, ...]:
-        """Return the gains as sentences."""
+        """Return a sentence on each gain, and on the model that results."""
         sure = np.isfinite(self.std)
         lines = [
             f'drive gain of {joint}: {gain:.4g} ({gain - width:.4g} to {gain + width:.4g}, 95 %)'
@@ -78,8 +78,8 @@ class DriveGains:
             lines.append(f'drive gain not determined, taken as 1: {", ".join(unknown)}')
         scale = ','.join(f'{1.0 / gain:.4g}' for gain in self.values)
         lines.append(
-            'the model is that of efforts divided by these gains; for other recordings of these '
-            f'drives: --effort-scale {scale}'
+            'the model is fitted to efforts divided by these gains; for other recordings of these '
+            f'drives, give --effort-scale {scale}'
         )
         return tuple(lines)
 
@@ -88,12 +88,12 @@ def payloads_of(
     texts: Sequence[str], recordings: Sequence[Recording], robot: Robot
 ) -> Mapping[str, Robot]:
     """
-    Return the robot with its payload for each recording with a payload, by source.
+    Return the robot with its payload, by the path of each recording with a payload.
 
     Raises
     ------
     IdentificationError
-        If a text is malformed, or names no recording or link.
+        If a text is no payload as in `parse_payload`, or names no recording or link.
 
     """
     found: dict[str, Robot] = {}
@@ -103,8 +103,8 @@ def payloads_of(
         named = [source for source, bag in bags.items() if name in (str(bag), bag.name, bag.stem)]
         if len(named) != 1:
             raise IdentificationError(
-                f"--payload '{text}' has to name one recording, not {len(named)}; the recordings "
-                f'are {", ".join(map(str, bags.values()))}'
+                f"--payload '{text}' names {len(named)} recordings, but has to name 1 of "
+                f'{", ".join(map(str, bags.values()))}'
             )
         found[named[0]] = with_payload(found.get(named[0], robot), link, payload)
     return found
@@ -112,14 +112,14 @@ def payloads_of(
 
 def parse_payload(text: str) -> tuple[str, str, pin.Inertia]:
     """
-    Parse a payload, 'BAG=KG@LINK' or 'BAG=KG@LINK:X,Y,Z'.
+    Return recording, link and payload of a text 'BAG=KG@LINK' or 'BAG=KG@LINK:X,Y,Z'.
 
     Returns
     -------
     bag, link : str
-        The recording and the link that carries it.
+        Name of the recording, and link that carries the payload.
     payload : pinocchio.Inertia
-        A point mass in the frame of the link.
+        Point mass in the frame of the link.
 
     Raises
     ------
@@ -145,13 +145,13 @@ def parse_payload(text: str) -> tuple[str, str, pin.Inertia]:
 
 
 def with_payload(robot: Robot, link: str, payload: pin.Inertia) -> Robot:
-    """Return a robot with a payload on a link; IdentificationError if it has no such link."""
+    """Return the robot model whose link carries a payload; raise an error for no such link."""
     frames = {f.name: f for f in robot.model.frames if f.type == pin.FrameType.BODY}
     frame = frames.get(link)
     if frame is None or frame.parentJoint == 0:
         links = [name for name, one in frames.items() if one.parentJoint > 0]
         raise IdentificationError(
-            f"--payload: no joint moves a link '{link}'; links are {', '.join(links)}"
+            f"--payload: no joint moves a link '{link}'; moving links are {', '.join(links)}"
             f'{meant(link, links)}'
         )
     parameters = robot.rigid_parameters.reshape(-1, 10).copy()
@@ -167,7 +167,7 @@ def drive_gains(
     rng: np.random.Generator,
 ) -> DriveGains:
     """
-    Estimate the gain of each drive.
+    Estimate the gain of each drive from recordings with and without a known payload.
 
     Parameters
     ----------
@@ -176,7 +176,7 @@ def drive_gains(
     recordings : sequence of Recording
         Data with efforts, where some recordings differ in their payload.
     loaded : mapping of str to Robot
-        The robot with its payload, by the source of the recording.
+        Robot with its payload, by the path of the recording.
     signals : SignalSettings
         Filtering.
     rng : numpy.random.Generator
@@ -219,10 +219,10 @@ def drive_gains(
 def _gain(
     columns: FloatArray, known: FloatArray, tau: FloatArray, blocks: FloatArray
 ) -> tuple[float, float, float]:
-    """Return the drive gain, its standard deviation, and its 95 % half-width."""
+    """Return the gain of a drive, its standard deviation, and half of its 95 % interval."""
     scale = np.linalg.norm(columns, axis=0)
     columns = columns[:, scale > 0.0] / scale[scale > 0.0]
-    # the coefficient is that of the column's residual after the other columns (Frisch, Waugh)
+    # regression of the effort's residual on that of the payload's torque (Frisch and Waugh)
     column, target = residual_of_fit(np.column_stack([known, tau]), columns).T
     size = float(column @ column)
     # the joint's own columns explain the torque of the payload
@@ -246,7 +246,7 @@ def corrected(
     gains: DriveGains,
     signals: SignalSettings,
 ) -> list[Recording]:
-    """Return recordings with the torque of the arm alone: efforts over gains minus payload."""
+    """Return recordings with the torque of the bare arm: efforts over gains, without payload."""
     result = []
     for recording in recordings:
         assert recording.tau is not None

@@ -1,10 +1,10 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-The document identification.json, and the recordings that it names.
+Content of identification.json, and the recordings that it names.
 
 These recordings are the baseline of a diagnosis. The file has the size and a digest of each
-recording, as another one may later have the same path.
+recording, as another recording may later have the same path.
 
 """
 
@@ -42,18 +42,18 @@ def identification_document(
     grade: Grade | None = None,
 ) -> dict[str, Any]:
     """
-    Return an identification as the document that identification.json holds.
+    Return the content of identification.json.
 
     Parameters
     ----------
     result : Identification
-        The identification.
+        Model, estimate and fit.
     robot : str
         Shipped name or path of the description.
     validation : mapping of str to sequence of Fit
-        Predictions of recordings that were not used for fitting, by recording.
+        Predictions of held-out recordings, by the path of the recording.
     verification : Verification, optional
-        Further tests of the identification.
+        Tests of encoder noise and forward simulation.
     grade : Grade, optional
         Grade of the identification.
 
@@ -113,7 +113,7 @@ def identification_document(
 
 def kinematics_digest(robot: Robot) -> str:
     """
-    Return a digest of the joints of a description, in hexadecimal.
+    Return a hexadecimal digest of the kinematics of a robot, equal for all its descriptions.
 
     The digest covers names, kinds, axes and placements of joints, and names of links, to a
     micrometre. It does not cover masses and gravity, which may be corrected later.
@@ -145,7 +145,7 @@ def write_document(path: str | Path, document: Mapping[str, Any]) -> None:
 
 
 def with_contents(document: Mapping[str, Any]) -> dict[str, Any]:
-    """Return identification.json with sizes and digests of existing recordings."""
+    """Return the content of identification.json with size and digest of each recording."""
     there = [(name, Path(name)) for name in _names(document)]
     rows = [{'bag': name, **_content(path)} for name, path in there if path.exists()]
     return {**document, 'recordings': rows}
@@ -153,13 +153,13 @@ def with_contents(document: Mapping[str, Any]) -> dict[str, Any]:
 
 def identified_from(path: str | Path) -> tuple[Path, ...]:
     """
-    Return the existing recordings of an identification, held-out ones included.
+    Return the existing recordings of an identification, held-out recordings included.
 
     Parameters
     ----------
     path : str or Path
         Path of model.yaml; the identification.json in its folder names the recordings. Relative
-        paths start in the working directory, in that folder, or in its parent.
+        paths start in the working directory, in that folder, or in the parent of that folder.
 
     Raises
     ------
@@ -172,30 +172,31 @@ def identified_from(path: str | Path) -> tuple[Path, ...]:
 
 def require_as_identified(path: str | Path) -> None:
     """
-    Raise an error if recordings changed since the identification.
+    Raise an error if a recording of a model has changed since the identification.
 
     Parameters
     ----------
     path : str or Path
-        Path of model.yaml. Recordings without size and digest in the file are not checked.
+        Path of model.yaml. Recordings without size and digest in identification.json are not
+        checked.
 
     Raises
     ------
     ModelError
-        With the recording and the remedy.
+        If a recording has changed; the message contains the remedy.
 
     """
-    for place, known in _found(Path(path)).items():
-        if known is not None and _content(place) != known:
+    for recording, known in _found(Path(path)).items():
+        if known is not None and _content(recording) != known:
             raise ModelError(
-                f'{place}: has changed since {path} was identified from it. Give the baseline '
-                f'(--baseline), diagnose without one '
-                '(--no-baseline), or identify the arm again'
+                f'{recording}: this recording has changed since {path} was identified from it. '
+                'Give the baseline (--baseline), diagnose without a baseline (--no-baseline), or '
+                'identify the arm again'
             )
 
 
 def _content(path: Path) -> dict[str, Any]:
-    """Return the size of a file or folder [bytes], and a hash of both ends of its files."""
+    """Return size [bytes] and digest of a recording, from both ends of each file."""
     inside = sorted(path.rglob('*')) if path.is_dir() else [path]
     digest, total = hashlib.sha256(), 0
     end = 1 << 20  # bytes; enough for the time stamps at the beginning and the index at the end
@@ -213,7 +214,7 @@ def _content(path: Path) -> dict[str, Any]:
 
 
 def _found(model: Path) -> dict[Path, dict[str, Any] | None]:
-    """Return the existing recordings of a model, with their digests if known."""
+    """Return the existing recordings of a model.yaml, with size and digest if known."""
     file = model.with_name('identification.json')
     if not is_file(file):
         return {}
@@ -233,12 +234,13 @@ def _found(model: Path) -> dict[Path, dict[str, Any] | None]:
 
 
 def _names(document: Mapping[str, Any]) -> list[str]:
-    """Return the recordings that a document names, held-out ones last."""
+    """Return the paths of recordings in identification.json, training data first."""
     validation = (row['bag'] for row in document.get('validation', []))
     return [str(name) for name in (*document['training']['bags'], *validation) if name]
 
 
 def _noise(result: Identification, noise: NoiseCheck) -> dict[str, Any]:
+    """Return the test of encoder noise as written to identification.json."""
     return {
         'statistic': noise.statistic,
         'degrees_of_freedom': noise.freedom,
@@ -251,6 +253,7 @@ def _noise(result: Identification, noise: NoiseCheck) -> dict[str, Any]:
 
 
 def _score(result: Identification, fits: Sequence[Fit]) -> dict[str, Any]:
+    """Return the torque errors of fits as written to identification.json."""
     score = Score.of(fits)
     return {
         'relative_error_percent': score.relative_error_percent,
@@ -260,4 +263,5 @@ def _score(result: Identification, fits: Sequence[Fit]) -> dict[str, Any]:
 
 
 def _by_joint(result: Identification, values: FloatArray) -> dict[str, float]:
+    """Return the value of each joint by its name."""
     return dict(zip(result.arm.robot.joints, values.tolist(), strict=True))

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Identified parameters in a file: identification.json, or model.yaml with fewer details."""
+"""Identified parameters in a file: identification.json, or model.yaml without covariances."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ _SCHEMAS = (SCHEMA, MODEL)
 @dataclass(frozen=True)
 class KnownFit:
     """
-    Torque error and grade of a model, from its file.
+    Torque error and grade of a model, from its identification.json.
 
     Attributes
     ----------
@@ -45,7 +45,7 @@ class KnownFit:
     misfit : Misfit
         Residual of each joint; empty if unknown.
     recordings : int
-        Number of recordings with this residual, at least one.
+        Number of recordings that the residual comes from, at least one.
 
     """
 
@@ -56,14 +56,14 @@ class KnownFit:
 
     @property
     def unusable(self) -> bool:
-        """Whether the model is graded unusable, so that it does not describe the arm."""
+        """Whether the grade of the model is unusable: it does not describe the arm."""
         return self.grade == 'unusable'
 
 
 @dataclass(frozen=True)
 class ParameterFile:
     """
-    Parameters of an arm, from a file.
+    Identified parameters of an arm with their uncertainty, from a file.
 
     Attributes
     ----------
@@ -72,20 +72,20 @@ class ParameterFile:
     robot : str
         Name of the robot in the file.
     values : mapping of ParameterName to (float, float)
-        Value and standard deviation of every parameter that was identified on its own.
+        Value and standard deviation of each identified parameter.
     error_percent : float or None
         Relative torque error on held-out data, or on training data where there is none.
     covariance : ndarray, shape (P, P), or None
         Covariance of the values in their order; None in model.yaml.
     terms : mapping of ParameterName to (mapping of str to float)
-        Factors of the standard parameters in each value, if the file has them.
+        Factors of the standard parameters in each value, if known.
     joints : tuple of str
-        Joints of the robot, if the file has them.
+        Joints of the robot, if known.
     kinematics : str
-        Digest that is equal for descriptions of one robot; empty if the file does not have it.
+        Digest of the joints, equal for all descriptions of a robot; empty if unknown.
     scatter : ndarray, shape (K, P)
         Jackknife changes of the values without each of K recordings, whose sum of squares is a
-        variance; K is zero if the file does not have them.
+        variance; K is zero if unknown.
     not_shown : frozenset of (name, joint)
         Parameters that the motion did not identify.
     fit : KnownFit or None
@@ -106,27 +106,28 @@ class ParameterFile:
     fit: KnownFit | None = None
 
     def covariance_of(self, names: Sequence[ParameterName]) -> FloatArray:
-        """Return the covariance of some values."""
+        """Return the covariance of the values of given parameters, shape (p, p)."""
         assert self.covariance is not None
         chosen = self._positions(names)
         return np.asarray(self.covariance[np.ix_(chosen, chosen)])
 
     def scatter_of(self, names: Sequence[ParameterName]) -> FloatArray:
-        """Return the jackknife changes of some values, shape (K, p)."""
+        """Return the jackknife changes of the values of given parameters, shape (K, p)."""
         if not len(self.scatter):
             return np.zeros((0, len(names)))
         return np.asarray(self.scatter[:, self._positions(names)])
 
     def _positions(self, names: Sequence[ParameterName]) -> list[int]:
+        """Return the indices of given parameters in the covariance."""
         order = {name: position for position, name in enumerate(self.values)}
         return [order[name] for name in names]
 
     def information(self, parameters: Sequence[ParameterName]) -> FloatArray | None:
         """
-        Return the information matrix of the P standard parameters of a model, (P, P).
+        Return the information matrix of P standard parameters of a model, (P, P).
 
-        It is zero in directions that the values do not determine, such as those of effects that
-        the file does not have. None if the file has no covariance.
+        The matrix is zero in directions that the values do not determine, such as effects that the
+        file does not have. None if the file has no covariance.
 
         """
         if self.covariance is None or len(self.terms) < len(self.values):
@@ -137,10 +138,10 @@ class ParameterFile:
 
     def regrouped_as(self, other: ParameterFile) -> ParameterFile:
         """
-        Return values of the parameters, and values of another grouping that follow from them.
+        Return these parameters and the base parameters of another file that follow from them.
 
-        A motion with less excitation groups more parameters. Its values are combinations of the
-        values of a richer motion.
+        A motion with less excitation groups more standard parameters. Its base parameters are
+        combinations of the base parameters of a motion with more excitation.
 
         """
         names = [name for name in other.terms if name not in self.values]
@@ -171,7 +172,7 @@ class ParameterFile:
 
 def read_parameters(path: str | Path) -> ParameterFile:
     """
-    Read identified parameters.
+    Read identified parameters from a file.
 
     Parameters
     ----------
@@ -181,7 +182,7 @@ def read_parameters(path: str | Path) -> ParameterFile:
     Raises
     ------
     ModelError
-        With the file and the mistake in it.
+        If the file cannot be read; the message names the file and the mistake.
 
     """
     path = Path(path)
@@ -190,8 +191,8 @@ def read_parameters(path: str | Path) -> ParameterFile:
         found = [file for file in kept if is_file(file)]
         if not found:
             raise ModelError(
-                f'{path}: neither identification.json nor model.yaml is in it; '
-                'name the folder that armid identify wrote'
+                f'{path}: this folder has neither identification.json nor model.yaml; '
+                'give the folder that armid identify wrote'
             )
         path = found[0]
     text = read_text(path, ModelError)
@@ -202,7 +203,7 @@ def read_parameters(path: str | Path) -> ParameterFile:
             reason = ' '.join(str(error).split())
             raise ModelError(f'this file is neither JSON nor YAML: {reason}') from error
         if not isinstance(document, dict) or document.get('schema') not in _SCHEMAS:
-            raise ModelError(f"its 'schema' has to be {' or '.join(_SCHEMAS)}")
+            raise ModelError(f"the key 'schema' has to be {' or '.join(_SCHEMAS)}")
         document = checked_model(text) if document['schema'] == MODEL else document
         read = parameters_of(str(path), document)
     if document['schema'] != MODEL:
@@ -211,9 +212,9 @@ def read_parameters(path: str | Path) -> ParameterFile:
 
 
 def _identification_of(path: Path, model: Mapping[str, Any]) -> ParameterFile | None:
-    """Read the identification.json in the folder of a model.yaml if it belongs to it."""
-    # identification.json has the base parameters of the model and their covariance. It belongs
-    # to the model if the model reproduces the value of every base parameter.
+    """Read the identification.json in the folder of a model.yaml; None if of another model."""
+    # identification.json has the base parameters of the model and their covariance. It is of this
+    # model if the model reproduces the value of every base parameter.
     file = path.with_name('identification.json')
     if not is_file(file):
         return None
@@ -241,7 +242,7 @@ def _identification_of(path: Path, model: Mapping[str, Any]) -> ParameterFile | 
 
 def read_misfit(path: str | Path, arm: ArmModel) -> Misfit | None:
     """
-    Read the residual of a model at its identification; None if unknown.
+    Read the misfit of a model: the residual on its training data; None if unknown.
 
     Parameters
     ----------
@@ -253,7 +254,7 @@ def read_misfit(path: str | Path, arm: ArmModel) -> Misfit | None:
     Raises
     ------
     ModelError
-        With the file and the mistake in it.
+        If a file cannot be read; the message names the file and the mistake.
 
     """
     misfit, file = load_misfit(path), Path(path).with_name('identification.json')
@@ -266,7 +267,7 @@ def read_misfit(path: str | Path, arm: ArmModel) -> Misfit | None:
 
 def parameters_of(source: str, document: dict[str, Any]) -> ParameterFile:
     """
-    Return the parameters of a document of identification.json or model.yaml.
+    Return the parameters in the content of an identification.json or model.yaml.
 
     Raises
     ------
@@ -282,15 +283,15 @@ def parameters_of(source: str, document: dict[str, Any]) -> ParameterFile:
         if 'unit' not in row:
             raise ValueError(f"parameter '{row['name']}' of joint '{row['joint']}' has no unit")
         name = ParameterName(str(row['name']), str(row['joint']), str(row['unit']))
-        which = f'{name.name} of joint {name.joint}'
+        parameter = f'{name.name} of joint {name.joint}'
         if name in values:
-            raise ValueError(f'{which} is given twice')
-        value = finite(row['value'], which)
+            raise ValueError(f'{parameter} is given twice')
+        value = finite(row['value'], parameter)
         if row.get('std') is None:
             continue
-        values[name] = value, finite(row['std'], f'the std of {which}')
+        values[name] = value, finite(row['std'], f'the std of {parameter}')
         if values[name][1] < 0.0:
-            raise ValueError(f'the std of {which} is negative: {row["std"]:g}')
+            raise ValueError(f'the std of {parameter} is negative: {row["std"]:g}')
     covariance = _covariance(document.get('covariance'), len(values))
     grouping = [
         {str(term): finite(factor, f'the factor of {term}') for term, factor in row.items()}
@@ -304,7 +305,7 @@ def parameters_of(source: str, document: dict[str, Any]) -> ParameterFile:
         error = finite(score['relative_error_percent'], 'relative_error_percent')
     scatter = [[finite(v, 'a scatter') for v in row] for row in document.get('scatter', ())]
     if any(len(row) != len(values) for row in scatter):
-        raise ValueError(f'each row of the scatter has to have {len(values)} values')
+        raise ValueError(f"each row of the key 'scatter' has to have {len(values)} values")
     about = document.get('description', {})
     return ParameterFile(
         source,
@@ -326,12 +327,13 @@ def parameters_of(source: str, document: dict[str, Any]) -> ParameterFile:
 
 
 def _matrix(rows: Sequence[Mapping[str, float]], keys: Sequence[str]) -> FloatArray:
+    """Return the values of given keys in each mapping, zero where missing, as a matrix."""
     return np.array([[row.get(key, 0.0) for key in keys] for row in rows])
 
 
 def known_fit(document: Mapping[str, Any]) -> KnownFit | None:
     """
-    Read the fit from identification.json; None if absent.
+    Return torque error and grade from the content of identification.json; None if absent.
 
     Raises
     ------
@@ -356,7 +358,7 @@ def known_fit(document: Mapping[str, Any]) -> KnownFit | None:
 
 
 def _covariance(rows: list[list[float]] | None, size: int) -> FloatArray | None:
-    """Return the symmetric matrix of a lower triangle."""
+    """Return the covariance matrix of a lower triangle with `size` rows; None without rows."""
     if rows is None:
         return None
     if [len(row) for row in rows] != list(range(1, size + 1)):

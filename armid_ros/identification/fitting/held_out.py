@@ -169,7 +169,19 @@ def cutoff_of_torques(
     # smallest gain, as a share of the error, for which a cut-off is lowered. Jitter and backlash
     # increase the error by a third or more on every tested machine.
     min_gain = 0.1
-    recordings = _windows(recordings, 2 * _MAX_ROWS * used.decimation)
+    # windows evenly spread over long recordings; at 1 kHz, a filter of 1 Hz removes a tenth of
+    # each window at its ends
+    n_windows, most = 8, 2 * _MAX_ROWS * used.decimation
+    total = sum(len(recording) for recording in recordings)
+    if total > most:
+        begins = np.linspace(0, total - most // n_windows, n_windows).astype(int)
+        windows, before = [], 0
+        for recording in recordings:
+            ends = np.stack([begins, begins + most // n_windows]) - before
+            inside = np.clip(ends, 0, len(recording)).T
+            windows += [recording.select(slice(*pair)) for pair in inside if np.ptp(pair) > 1]
+            before += len(recording)
+        recordings = windows
     tried: dict[float, list[list[Regression]]] = {}
     good = [used.cutoff_hz]
     cutoff, rows = used.cutoff_hz, 0
@@ -196,22 +208,6 @@ def cutoff_of_torques(
             break
         cutoff *= 0.5
     return replace(used, cutoff_hz=max(good))
-
-
-def _windows(recordings: Sequence[Recording], samples: int) -> list[Recording]:
-    """Return evenly spread windows of recordings, with about `samples` samples in total."""
-    # number of windows; at 1 kHz, a filter of 1 Hz removes a tenth of each window at its ends
-    n_windows = 8
-    total, size = sum(len(recording) for recording in recordings), samples // n_windows
-    if total <= samples:
-        return list(recordings)
-    begins = np.linspace(0, total - size, n_windows).astype(int)
-    result, before = [], 0
-    for recording in recordings:
-        inside = np.clip(np.stack([begins, begins + size]) - before, 0, len(recording))
-        result += [recording.select(slice(*ends)) for ends in inside.T if np.ptp(ends) > 1]
-        before += len(recording)
-    return result
 
 
 def _losses(

@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 from armid_ros.arm import ArmModel
-from armid_ros.estimate import Estimate, ParameterName
+from armid_ros.estimate import ParameterName
 from armid_ros.identification.fitting.least_squares import (
     factored,
     Method,
@@ -68,47 +68,6 @@ class Unidentified:
 def excludes_zero(values: npt.ArrayLike, std: npt.ArrayLike) -> npt.NDArray[np.bool_]:
     """Return for each estimate whether its 95 % confidence interval excludes zero."""
     return np.asarray(np.abs(values) > HALF_WIDTH * np.asarray(std, dtype=float))
-
-
-def unidentified(
-    theory: BaseParameters, base: BaseParameters, estimate: Estimate
-) -> tuple[Unidentified, ...]:
-    """
-    Return the parameters that the data of an identification do not determine, with reasons.
-
-    Parameters
-    ----------
-    theory : BaseParameters
-        Base parameters that are identifiable in some motion.
-    base : BaseParameters
-        Base parameters that the data identify.
-    estimate : Estimate
-        Estimate of the base parameters.
-
-    """
-    seen = np.any(base.grouping, axis=0)
-    found = [
-        Unidentified(name, 'no motion of this arm shows it')
-        for name, shown in zip(theory.standard, np.any(theory.grouping, axis=0), strict=True)
-        if not shown
-    ]
-    kept = set(base.independent.tolist())
-    for name, column in zip(theory.parameters, theory.independent, strict=True):
-        if column not in kept:
-            together = bool(seen[column])
-            found.append(
-                Unidentified(
-                    name,
-                    'this motion shows it only together with others' if together else NOT_SHOWN,
-                )
-            )
-    clear = excludes_zero(estimate.values, estimate.std)
-    found += [
-        Unidentified(name, 'not distinguishable from zero')
-        for name, sure in zip(estimate.parameters, clear, strict=True)
-        if not sure
-    ]
-    return tuple(found)
 
 
 def excited(

@@ -37,12 +37,7 @@ from armid_ros.identification.fitting.nonlinear import (
     unidentifiable_directions,
 )
 from armid_ros.identification.rows.regression import Regression, weighted_rows
-from armid_ros.identification.rows.signals import (
-    Conditioning,
-    even_positions,
-    mean_spectrum,
-    unbroken,
-)
+from armid_ros.identification.rows.signals import Conditioning, position_noise, unbroken
 from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording
 import numpy as np
@@ -319,17 +314,3 @@ def check_noise(
         bias_std=scale * np.std(biases, axis=0, ddof=1) / np.sqrt(repeats),
         std=std,
     )
-
-
-def position_noise(recording: Recording) -> FloatArray:
-    """
-    Return the standard deviation of the white noise of recorded positions, (n,) [rad or m].
-
-    The noise follows from the upper end of the spectrum. Jumps across gaps are no noise.
-
-    """
-    rate = 1.0 / recording.period
-    frequency, power = mean_spectrum(even_positions(recording), rate, detrend='linear')
-    # share of the sampling rate above which the spectrum of positions is noise
-    level = np.mean(power[frequency > 0.3 * rate], axis=0)
-    return np.asarray(np.sqrt(level * 0.5 * rate))

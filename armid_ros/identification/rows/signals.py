@@ -145,16 +145,12 @@ def conditioning(recordings: Sequence[Recording], settings: SignalSettings) -> C
     cutoff, decimation = settings.cutoff_hz, settings.decimation
     if cutoff is None or decimation is None:
         # where the spectrum of each position falls to its noise, which is white at the sensor
-        crossings = []
+        crossings, parts = [], []
         for recording in recordings:
-            frequency, power, floor = _position_spectrum(recording)
+            stretches, frequency, power, floor = _position_spectrum(recording)
             above = power > NOISE_MARGIN * floor
             crossings.append(np.array([frequency[np.argmin(column)] for column in above.T]))
-        parts = [
-            (q, end)
-            for recording, end in zip(recordings, crossings, strict=True)
-            for q in _unbroken_positions(recording, rate)
-        ]
+            parts += [(q, crossings[-1]) for q in stretches]
         band = MODEL_BANDS * _motion_band(parts, rate)
         # Largest cut-off of positions over the band of torque and regressor. The Butterworth
         # filter, applied in both directions, changes that band by at most 5^-8, which is below
@@ -189,7 +185,7 @@ def velocity_error(recording: Recording, used: Conditioning) -> FloatArray:
         Standard deviation [rad/s or m/s].
 
     """
-    frequency, power, floor = _position_spectrum(recording)
+    _, frequency, power, floor = _position_spectrum(recording)
     lost = (frequency[:, np.newaxis] > used.cutoff_hz) & (power > NOISE_MARGIN * floor)
     lacking = np.sum(frequency[:, np.newaxis] ** 2 * (power - floor), axis=0, where=lost)
     noise = floor * used.cutoff_hz**3 / 3.0
@@ -317,11 +313,15 @@ def _even(t: FloatArray, period: float, *signals: FloatArray) -> tuple[FloatArra
     return grid, *(CubicSpline(t, one)(grid) for one in signals)
 
 
-def even_positions(recording: Recording) -> list[FloatArray]:
-    """Return the positions of each stretch without a gap at even times, each (K, n)."""
+def position_noise(recording: Recording) -> FloatArray:
+    """Return the standard deviation of the white noise of positions, shape (n,) [rad or m]."""
     rate = 1.0 / recording.period
     parts = [part for part in unbroken(recording, rate) if len(part) >= _MIN_SAMPLES]
-    return [_even(recording.t[part], 1.0 / rate, recording.q[part])[1] for part in parts]
+    stretches = [_even(recording.t[part], 1.0 / rate, recording.q[part])[1] for part in parts]
+    frequency, power = mean_spectrum(stretches, rate, detrend='linear')
+    # share of the sampling rate above which the spectrum of positions is noise
+    level = np.mean(power[frequency > 0.3 * rate], axis=0)
+    return np.asarray(np.sqrt(level * 0.5 * rate))
 
 
 def _differentiated(
@@ -368,12 +368,6 @@ def _central_difference(x: FloatArray, step: float) -> FloatArray:
     """Return the derivative of samples along the first axis, with an error of fourth order."""
     weights = np.array([1.0, -8.0, 0.0, 8.0, -1.0]) / (12.0 * step)
     return np.asarray(correlate1d(x, weights, axis=0, mode='nearest'))
-
-
-def _unbroken_positions(recording: Recording, rate: float) -> list[FloatArray]:
-    """Return the positions of each stretch without a gap, or of all samples if all are short."""
-    parts = [part for part in unbroken(recording, rate) if len(part) >= _MIN_SAMPLES]
-    return [recording.q[part] for part in parts] or [recording.q]
 
 
 def _motion_band(stretches: Sequence[tuple[FloatArray, npt.ArrayLike]], rate: float) -> float:
@@ -440,9 +434,13 @@ def mean_spectrum(
     return spectra[0][0], power
 
 
-def _position_spectrum(recording: Recording) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return frequencies, (K,), power, (K, n), and white noise, (n,), of positions per Hz."""
+def _position_spectrum(
+    recording: Recording,
+) -> tuple[list[FloatArray], FloatArray, FloatArray, FloatArray]:
+    """Return gap-free positions, frequencies (K,), power (K, n) and white noise (n,) per Hz."""
     rate = 1.0 / recording.period
-    frequency, power = mean_spectrum(_unbroken_positions(recording, rate), rate)
+    parts = [part for part in unbroken(recording, rate) if len(part) >= _MIN_SAMPLES]
+    stretches = [recording.q[part] for part in parts] or [recording.q]
+    frequency, power = mean_spectrum(stretches, rate)
     upper = frequency > 0.3 * rate  # the upper 40 % of the spectrum contain no motion
-    return frequency, power, np.median(power[upper], axis=0)
+    return stretches, frequency, power, np.median(power[upper], axis=0)
