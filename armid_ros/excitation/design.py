@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Design of an excitation: the trajectory with the most information on the parameters."""
+"""Search for the excitation that carries the most information on the parameters of an arm."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ Progress = Callable[[float, float], None]
 @dataclass(frozen=True)
 class Design:
     """
-    A designed excitation and its predicted information.
+    A designed excitation, with the information that its recording is predicted to carry.
 
     Attributes
     ----------
@@ -63,13 +63,15 @@ class Design:
     stopped: str = ''
 
     def robot_limits_used(self, arm: ArmModel) -> dict[str, FloatArray]:
-        """Return the used share of the limits of the robot, without the reserves of the design."""
-        whole = replace(self, limits=Limits.of(arm.robot, speed=1.0, reserve=False))
-        return whole.limits_used(arm)
+        """Return the share of each full limit of the robot that is used, as `limits_used`."""
+        full = Limits.of(arm.robot, speed=1.0, reserve=False)
+        return replace(self, limits=full).limits_used(arm)
 
     def limits_used(self, arm: ArmModel) -> dict[str, FloatArray]:
         """
-        Return the used share of each limit; motions to and from the trajectory do not count.
+        Return the share of each limit of the design that the excitation uses at its peak.
+
+        Transfers to and from the excitation do not count.
 
         Parameters
         ----------
@@ -106,7 +108,7 @@ def design(
     progress: Progress = lambda done, cost: None,
 ) -> Design:
     """
-    Find the trajectory with the most information on the parameters.
+    Find the feasible trajectory with the most information on the parameters of an arm.
 
     Parameters
     ----------
@@ -164,7 +166,7 @@ def design(
 
 def placed(problem: DesignProblem, trajectory: FourierTrajectory) -> Excitation:
     """
-    Return a run from rest to rest along a trajectory, within all limits.
+    Return an excitation that runs a trajectory from rest to rest within all limits.
 
     The run enters the trajectory at the point with the smallest use of limits in the run-in. The
     run-in is extended until it keeps all limits.
@@ -212,7 +214,7 @@ def evaluate(
     stopped: str = '',
 ) -> Design:
     """
-    Return the design of a given run, or of a trajectory with the settings of a problem.
+    Return a given excitation or trajectory as a design, with its information and cost.
 
     Parameters
     ----------

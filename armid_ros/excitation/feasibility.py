@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Feasible trajectories: check, random trajectories, and motion templates.
+Check of trajectories against limits and clearance, and random feasible trajectories.
 
 Position, velocity, acceleration and torque are sampled densely. A bound on the increase between
 two samples is added. The clearance is proven for every interval.
@@ -27,7 +27,7 @@ _CHECK_SAMPLES = 200
 
 
 class Faults(tuple[Violation | Approach, ...]):
-    """Reasons against a trajectory: exceeded limits, and bodies too close to each other."""
+    """Faults of a trajectory: the limits that it exceeds, and the bodies that come too close."""
 
     __slots__ = ()
 
@@ -43,7 +43,9 @@ def trajectory_faults(
     clearance: ClearanceModel | None,
 ) -> Faults:
     """
-    Return the faults of a periodic trajectory, at and between all samples.
+    Return the limits that a periodic trajectory exceeds, and the first two bodies too close.
+
+    The check holds at and between all samples.
 
     Parameters
     ----------
@@ -71,9 +73,9 @@ def trajectory_faults(
 
 def excitation_faults(arm: ArmModel, limits: Limits, excitation: Excitation) -> Faults:
     """
-    Return the exceeded limits of run-in and run-out, which follow the path of the trajectory.
+    Return the limits that the run-in and the run-out of an excitation exceed.
 
-    `trajectory_faults` proves the clearance of this path.
+    Both follow the path of the trajectory, whose clearance `trajectory_faults` proves.
 
     """
     step = excitation.trajectory.period / (_CHECK_SAMPLES * excitation.trajectory.harmonics)
@@ -93,7 +95,7 @@ def _violations(arm: ArmModel, limits: Limits, motion: Motion) -> tuple[Violatio
 
 
 def _outward(values: FloatArray) -> FloatArray:
-    """Enlarge samples about their mean by a bound on the error between two samples."""
+    """Return samples moved away from their mean by a bound on the peaks between samples."""
     # the bound is h^2 M / 8 for second derivatives below M, estimated from second differences.
     # Nothing is added where dry friction makes the second differences jump
     bend = np.zeros_like(values)
@@ -142,7 +144,7 @@ def random_feasible(
     Raises
     ------
     TrajectoryError
-        If no solution was found; the message names the joint and its limit, or the bodies.
+        If no trajectory was found; the message names the joint and its limit, or the bodies.
 
     """
     for _ in range(60):
@@ -174,7 +176,7 @@ def feasible_pose(
     Raises
     ------
     TrajectoryError
-        If no solution was found; the message names the joint and its limit, or the bodies.
+        If no pose was found; the message names the joint and its limit, or the bodies.
 
     """
     lower, upper = limits.position_range()
@@ -200,7 +202,7 @@ def feasible_pose(
         nearest = clearance.closest(motion.select(np.array([best])))
         assert nearest is not None  # without pairs the clearance is infinite
         raise TrajectoryError(
-            f'no pose keeps a clearance of {clearance.margin:g} m; in the best one '
+            f'no pose keeps a clearance of {clearance.margin:g} m; in the best pose '
             f'{nearest.first} and {nearest.second} are {nearest.distance:.4f} m apart'
         )
     return np.asarray(q[best])
@@ -241,7 +243,7 @@ def _shrunk(
     clearance: ClearanceModel | None,
     shrinks: int,
 ) -> FourierTrajectory | None:
-    """Reduce the amplitudes of a trajectory until it is feasible, a number of times at most."""
+    """Return a trajectory with amplitudes reduced until feasible; None after all reductions."""
 
     def clear(q: FloatArray) -> bool:
         if clearance is None:
@@ -265,7 +267,7 @@ CLEARANCE = 0.01
 @dataclass(frozen=True)
 class Template:
     """
-    Template of a motion of some joints, which is scaled to the limits.
+    Template of random motions of some or all joints at a share of the limits.
 
     Attributes
     ----------
@@ -298,7 +300,7 @@ class Template:
         self, arm: ArmModel, clearance: ClearanceModel, rng: np.random.Generator
     ) -> FourierTrajectory:
         """
-        Draw a motion that keeps all limits and the clearance.
+        Draw a random trajectory of the template that keeps all limits and the clearance.
 
         Raises
         ------
@@ -335,7 +337,7 @@ _WHOLE_ARM = (
 
 
 def templates(joints: Sequence[str]) -> tuple[Template, ...]:
-    """Return motions that identify effects on some joints; without joints, on the arm."""
+    """Return motion templates that identify effects on given joints, or on the whole arm."""
     chosen = list(_WHOLE_ARM)
     if joints:
         names, alone = ', '.join(joints), tuple(joints)

@@ -81,13 +81,13 @@ class FourierTrajectory:
 
     @classmethod
     def of(cls, joints: tuple[str, ...], period: float, x: FloatArray) -> FourierTrajectory:
-        """Return the trajectory with coefficients (q0, a, b), shape (n, 1 + 2 H)."""
+        """Return the trajectory of a coefficient matrix x = (q0, a, b), shape (n, 1 + 2 H)."""
         middle = (x.shape[1] + 1) // 2
         return cls(joints, period, x[:, 0], x[:, 1:middle], x[:, middle:])
 
     @property
     def coefficients(self) -> FloatArray:
-        """Return (q0, a, b), shape (n, 1 + 2 H)."""
+        """Return the coefficient matrix (q0, a, b) of all joints, shape (n, 1 + 2 H)."""
         return np.column_stack([self.q0, self.a, self.b])
 
     @property
@@ -102,12 +102,12 @@ class FourierTrajectory:
 
     @property
     def angular_frequency(self) -> float:
-        """Return the base frequency w [rad/s]."""
+        """Return the angular frequency w of the first harmonic [rad/s]."""
         return 2.0 * np.pi / self.period
 
     def motion(self, t: npt.ArrayLike) -> Motion:
         """
-        Evaluate the trajectory and its exact derivatives.
+        Evaluate position, velocity and acceleration of the trajectory.
 
         Parameters
         ----------
@@ -139,7 +139,7 @@ class FourierTrajectory:
         return self.motion(np.arange(-MARGIN, n_samples + MARGIN) * step)
 
     def shifted(self, time: float) -> FourierTrajectory:
-        """Return the same orbit with a later start, by a time [s]."""
+        """Return the trajectory that starts a time [s] later on the same periodic motion."""
         angle = self.angular_frequency * time * np.arange(1, self.harmonics + 1)
         cosine, sine = np.cos(angle), np.sin(angle)
         a = self.a * cosine + self.b * sine
@@ -151,12 +151,12 @@ class FourierTrajectory:
         return replace(self, a=self.a * factors, b=self.b * factors)
 
     def stretched(self, period: float) -> FourierTrajectory:
-        """Return the same path with another period [s]."""
+        """Return the trajectory along the same path with another period [s]."""
         ratio = self.period / period
         return replace(self, period=period, a=self.a * ratio, b=self.b * ratio)
 
     def acceleration_bound(self) -> FloatArray:
-        """Return a bound on the acceleration, shape (n,): the sum of its amplitudes."""
+        """Return an upper bound on the acceleration of each joint, shape (n,)."""
         k = self.angular_frequency * np.arange(1, self.harmonics + 1)
         return np.asarray((k * np.hypot(self.a, self.b)).sum(axis=1))
 
@@ -165,7 +165,7 @@ def fourier_basis(
     t: FloatArray, period: float, harmonics: int
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """
-    Evaluate the basis functions of the trajectory of a joint.
+    Evaluate the Fourier basis of the position, velocity and acceleration of a joint.
 
     Parameters
     ----------

@@ -21,7 +21,7 @@ import numpy as np
 @dataclass(frozen=True)
 class MotionGate:
     """
-    Conditions for every motion that is sent during a run.
+    Safety check of every motion before it is sent to the arm during a run.
 
     Attributes
     ----------
@@ -44,7 +44,7 @@ class MotionGate:
     @classmethod
     def of(cls, run: Run, planner: TransferPlanner) -> MotionGate:
         """
-        Check a run at all of its samples; return the gate for later motions.
+        Check all samples of a run, and return the gate that checks all later motions.
 
         Parameters
         ----------
@@ -82,7 +82,9 @@ class MotionGate:
         self, phase: float, duration: float, measured: FloatArray, velocity: FloatArray
     ) -> Motion:
         """
-        Return a stop along the path of the run; the whole path was checked before.
+        Return the motion that slows the arm down to rest along the path of the run.
+
+        The whole path was checked before.
 
         Parameters
         ----------
@@ -123,7 +125,7 @@ class MotionGate:
         self, set_point: FloatArray, speed: FloatArray, measured: FloatArray, largest: float
     ) -> Motion:
         """
-        Return the straight motion from the set point to the measured position.
+        Return the straight motion of the set point to the measured position of the arm.
 
         Parameters
         ----------
@@ -159,7 +161,7 @@ class MotionGate:
 
     def overload(self, effort: FloatArray, factor: float) -> str:
         """
-        Return a message if a joint exceeds its predicted effort; otherwise empty.
+        Return a message that names a joint beyond its predicted effort; empty if none is.
 
         Parameters
         ----------
@@ -180,7 +182,7 @@ class MotionGate:
         )
 
     def _time_of(self, step: FloatArray, speed: FloatArray) -> float:
-        """Return the duration of a small step within the limits from an initial speed [s]."""
+        """Return the time [s] that a small step from an initial speed needs within the limits."""
         velocity = np.where(np.isfinite(self.limits.velocity), self.limits.velocity, SLOW_VELOCITY)
         stopping = speed / self.limits.acceleration
         slowest = stopping + np.sqrt(stopping**2 + step / self.limits.acceleration)
@@ -197,7 +199,7 @@ _REST_TIME = 0.1
 @dataclass(frozen=True)
 class Ending:
     """
-    State of an ended run, until measurements show the arm at rest.
+    Supervision of the end of a run, until measurements show that the arm is at rest.
 
     Attributes
     ----------
@@ -230,7 +232,7 @@ class Ending:
     def stopped_again(
         self, monitor: PoseMonitor, now: float, tolerance: float, duration: float
     ) -> Motion | None:
-        """Return a new stop if the arm still moves along its path; otherwise None."""
+        """Return another stop motion if the arm still moves along its path; otherwise None."""
         phase = now - self.begun
         if self.last is None or now - self.sent < self.last.t[-1]:
             return None
@@ -250,7 +252,7 @@ class Ending:
         duration: float,
     ) -> tuple[Ending | None, Motion | None, str]:
         """
-        Check whether the arm is at rest, and return the next state.
+        Return the next supervision state, a motion to send, and a message to report.
 
         Parameters
         ----------
@@ -308,9 +310,9 @@ class Ending:
         if self.warned:
             return ending, stop, ''
         if self.last is None:
-            return ending, None, f'{self.reason}; {moving}, and this node does not move it'
+            return ending, None, f'{self.reason}; {moving}, and another client uses the controller'
         return (
             ending,
             stop,
-            (f'the arm still moves although it was stopped: {moving}; use the emergency stop'),
+            f'the arm still moves although it was stopped: {moving}; use the emergency stop',
         )

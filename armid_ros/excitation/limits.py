@@ -73,11 +73,11 @@ class Limits:
                     f'joint {joint}: no room between its position limits, '
                     f'{self.lower[j]:.6g} and {self.upper[j]:.6g} {self.unit("position", j)}'
                 )
-            for name in ('velocity', 'acceleration', 'torque'):
-                if not getattr(self, name)[j] > 0.0:
+            for quantity in ('velocity', 'acceleration', 'torque'):
+                limit = getattr(self, quantity)[j]
+                if not limit > 0.0:
                     raise TrajectoryError(
-                        f'joint {joint}: its {name} limit is {getattr(self, name)[j]:g}; '
-                        'it cannot move'
+                        f'joint {joint}: its {quantity} limit is {limit:g}; it cannot move'
                     )
 
     @classmethod
@@ -89,7 +89,7 @@ class Limits:
         reserve: bool = True,
     ) -> Limits:
         """
-        Return the limits of a robot, by default with a reserve.
+        Return the limits of a robot for runs of a speed class, by default with a reserve.
 
         Parameters
         ----------
@@ -158,7 +158,7 @@ def has_velocity_limit(robot: Robot) -> npt.NDArray[np.bool_]:
 @dataclass(frozen=True)
 class Violation:
     """
-    Largest excess of one limit of one joint.
+    Limit of a joint that a motion exceeds, at the time of the largest excess.
 
     Attributes
     ----------
@@ -309,7 +309,7 @@ def with_joint_limits(
 
 
 def with_acceleration_limit(robot: Robot, limit: FloatArray) -> Robot:
-    """Return a robot with given limits, (n,) [rad/s^2 or m/s^2], which only narrow others."""
+    """Return a robot with smaller acceleration limits, shape (n,) [rad/s^2 or m/s^2]."""
     limit = np.nan_to_num(limit, nan=np.inf)
     _require_narrower(robot, 'acceleration', limit, robot.acceleration_limit)
     return replace(robot, acceleration_limit=np.minimum(limit, robot.acceleration_limit))
@@ -335,7 +335,7 @@ def _require_narrower(
 
 
 def _with_file(robot: Robot, path: Path) -> Robot:
-    """Return a robot with the limits of a file."""
+    """Return a robot with the limits of a joint_limits.yaml of MoveIt."""
     names = ('velocity_limit', 'acceleration_limit', 'lower', 'upper')
     limits: dict[str, Any] = {name: np.array(getattr(robot, name)) for name in names}
     top, acceleration, lower, upper = limits.values()
@@ -371,8 +371,8 @@ def _with_file(robot: Robot, path: Path) -> Robot:
     return replace(robot, **limits)
 
 
-def _positive(value: Any, where: str) -> float:
-    number = finite(value, where)
+def _positive(value: Any, limit: str) -> float:
+    number = finite(value, limit)
     if number <= 0.0:
-        raise ValueError(f"{where} has to be a positive number, not '{value}'")
+        raise ValueError(f"{limit} has to be a positive number, not '{value}'")
     return number

@@ -34,7 +34,7 @@ class _State(NamedTuple):
 
 @dataclass
 class _Source:
-    """Joints of the arm in all messages with one list of names, their limits and recent states."""
+    """Sender of joint states: joints of the arm in its messages, limits and recent states."""
 
     columns: npt.NDArray[np.int_]
     joints: list[int]
@@ -47,7 +47,7 @@ class _Source:
 
 class PoseMonitor:
     """
-    Recursive filter of the joint states of one arm.
+    Filter that accepts only plausible joint states of one arm.
 
     A position is accepted if it is finite, within the position limits, newer than the last
     accepted one, and reachable from it at the velocity limit. Positions that contradict the last
@@ -85,7 +85,7 @@ class PoseMonitor:
 
     @property
     def pose(self) -> MeasuredPose:
-        """Return the last accepted positions."""
+        """Return the last accepted position of each joint."""
         q, seen, stamps = (np.array(values) for values in (self._q, self._seen, self._stamps))
         return MeasuredPose(self._joints, q, seen, stamps)
 
@@ -108,7 +108,7 @@ class PoseMonitor:
         now: float,
     ) -> None:
         """
-        Update the filter with a joint state.
+        Accept or reject the positions of a joint state message.
 
         Parameters
         ----------
@@ -136,7 +136,12 @@ class PoseMonitor:
         if fault:
             self._reject(fault, now)
             return
-        last = source.states[-1] if source.states else self._accepted(source, dq)
+        seen = max(self._seen[j] for j in source.joints)
+        last = (
+            source.states[-1]
+            if source.states
+            else _State(seen, 0, [self._q[j] for j in source.joints], dq)  # of other senders
+        )
         if stamp_ns == last.stamp_ns != 0 and last.q == q:
             return  # repeated message
         fault = self._unreachable(source, state, last)
@@ -145,7 +150,6 @@ class PoseMonitor:
             if source.rivals and self._unreachable(source, state, source.rivals[-1]):
                 source.rivals.clear()
             source.rivals.append(state)
-            seen = max(self._seen[j] for j in source.joints)
             if len(source.rivals) < MIN_AGREEING or seen >= source.rivals[0].arrived:
                 return
             source.states.clear()
@@ -166,13 +170,8 @@ class PoseMonitor:
         self._sources[names] = _Source(columns, joints.tolist(), *limits)
         return self._sources[names]
 
-    def _accepted(self, source: _Source, dq: list[float]) -> _State:
-        """Return the last accepted state of the joints of a source that is new."""
-        seen = max(self._seen[j] for j in source.joints)
-        return _State(seen, 0, [self._q[j] for j in source.joints], dq)
-
     def contradiction(self, now: float, count: int = MIN_AGREEING) -> str:
-        """Return why many positions of the last 0.5 s were rejected; empty if only few were."""
+        """Return the latest reason if the last 0.5 s have many rejections; otherwise empty."""
         recent = [
             fault for arrived, fault in self._rejections if now - arrived <= _REJECTION_WINDOW
         ]
@@ -194,7 +193,7 @@ class PoseMonitor:
 
     def unsteady(self, span: float, count: int = MIN_AGREEING) -> str | None:
         """
-        Return a message if the arm is not at rest.
+        Return a message that names a moving joint; empty if the arm is at rest.
 
         Parameters
         ----------
@@ -206,7 +205,7 @@ class PoseMonitor:
         Returns
         -------
         str or None
-            Empty: the arm is at rest. None: there are too few joint states to decide.
+            None: there are too few joint states to decide.
 
         """
         decided: set[int] = set()
@@ -245,7 +244,7 @@ class PoseMonitor:
         )
 
     def _unreachable(self, source: _Source, state: _State, last: _State) -> str:
-        """Return a message if a position is unreachable from the last, or its stamp is older."""
+        """Return a message if a new position is too far from the last, or its stamp is too old."""
         if state.stamp_ns and state.stamp_ns <= last.stamp_ns:
             back = (last.stamp_ns - state.stamp_ns) * 1e-9
             return (

@@ -101,7 +101,7 @@ class DesignSettings:
             ('target', self.target, TARGETS),
         ):
             if name not in known:
-                raise TrajectoryError(f"there is no {kind} '{name}'; there are {', '.join(known)}")
+                raise TrajectoryError(f"there is no {kind} '{name}'; choose {', '.join(known)}")
         if self.focus and self.criterion == 'T':
             raise TrajectoryError("focus is not available with criterion 'T', which has a rival")
         self._require_numbers()
@@ -109,14 +109,14 @@ class DesignSettings:
     def _require_numbers(self) -> None:
         """Raise a TrajectoryError for an impossible count, time or size."""
         for name in ('harmonics', 'n_periods', 'starts', 'candidates', 'iterations'):
-            if getattr(self, name) < 1:
-                raise TrajectoryError(f'{name} is {getattr(self, name)}, but has to be at least 1')
+            if (value := getattr(self, name)) < 1:
+                raise TrajectoryError(f'{name} is {value}, but has to be at least 1')
         for name in ('period', 'run_in', 'rate'):
-            if not 0.0 < getattr(self, name) < np.inf:
-                raise TrajectoryError(f'{name} is {getattr(self, name)}, but has to be positive')
+            if not 0.0 < (value := getattr(self, name)) < np.inf:
+                raise TrajectoryError(f'{name} is {value}, but has to be positive and finite')
         for name in ('time_budget', 'clearance', 'balance'):
-            if not getattr(self, name) >= 0.0:
-                raise TrajectoryError(f'{name} is {getattr(self, name)}, but cannot be negative')
+            if not (value := getattr(self, name)) >= 0.0:
+                raise TrajectoryError(f'{name} is {value}, but has to be 0 or more')
         duration = self.n_periods * self.period + 2.0 * self.run_in
         if not duration <= MAX_DURATION:
             raise TrajectoryError(
@@ -164,7 +164,7 @@ def whole_period(duration: float, n_periods: int, run_in: float, rate: float) ->
 @dataclass(frozen=True)
 class DesignProblem:
     """
-    A design problem, with all quantities that stay constant during the search.
+    Design problem of an excitation: arm, limits, parameters to identify, noise and cost.
 
     Attributes
     ----------
@@ -202,7 +202,7 @@ class DesignProblem:
         rival: ArmModel | None = None,
     ) -> DesignProblem:
         """
-        Derive limits, noise, base parameters and criterion.
+        Return the design problem of an arm: limits, noise, base parameters and criterion.
 
         Raises
         ------
@@ -239,7 +239,7 @@ class DesignProblem:
                 raise TrajectoryError(
                     f"focus: the arm has no effect '{name}'; it has {', '.join(names) or 'none'}"
                 )
-            focused = marked(whole, settings.focus)
+            focused = parameter_mask(whole, settings.focus)
             wanted = focused[base.independent]
         criterion = Criterion(settings.criterion, scale, wanted, values, settings.balance)
         problem = cls(whole, settings, limits, base, read_only(noise), read_only(scale), criterion)
@@ -263,12 +263,12 @@ class DesignProblem:
             )
 
     def columns(self, motion: Motion) -> FloatArray:
-        """Return the weighted columns of all parameters, shape (N n, P)."""
+        """Return the regressor of a motion with rows divided by their noise, shape (N n, P)."""
         columns = _target_columns(self.arm, self.settings.target, motion)
         return (columns / self.noise[:, np.newaxis]).reshape(-1, columns.shape[-1])
 
     def recorded(self, trajectory: FourierTrajectory, n_periods: int) -> Information:
-        """Return the information of a recording of some periods on the base parameters."""
+        """Return the information of a recorded trajectory on the base parameters."""
         # factor between the samples for the information and the samples of the search
         count, margin = 6 * self.settings.samples, MARGIN * trajectory.n_joints
         columns = self.columns(trajectory.with_margins(count))[margin:-margin]
@@ -296,7 +296,7 @@ class DesignProblem:
 
 
 def _target_columns(arm: ArmModel, target: str, motion: Motion) -> FloatArray:
-    """Return sensitivities (N, n, P); zero where a parameter is not in the target."""
+    """Return the regressor, shape (N, n, P); zero for parameters outside the target."""
     effects = arm.effect_columns(motion)
     if target == 'effects':
         rigid = np.zeros((*motion.q.shape, len(arm.robot.rigid_parameters)))
@@ -330,7 +330,7 @@ def torque_noise(arm: ArmModel, settings: DesignSettings) -> FloatArray:
 
 
 def _joined(arm: ArmModel, rival: ArmModel) -> ArmModel:
-    """Return the effects of the rival, followed by the effects that only the arm has."""
+    """Return the rival model with the effects that only the arm has added to it."""
     known = {(effect.name, effect.joints) for effect in rival.effects}
     joined = replace(rival, robot=arm.robot)
     for effect, values in zip(arm.effects, arm.values, strict=True):
@@ -339,8 +339,8 @@ def _joined(arm: ArmModel, rival: ArmModel) -> ArmModel:
     return joined
 
 
-def marked(arm: ArmModel, names: Collection[str]) -> npt.NDArray[np.bool_]:
+def parameter_mask(arm: ArmModel, names: Collection[str]) -> npt.NDArray[np.bool_]:
     """Return the mask of the parameters of the named effects, shape (P,)."""
-    marks = [np.zeros(len(arm.robot.rigid_parameters), dtype=bool)]
-    marks += [np.full(len(one.parameters(arm.robot)), one.name in names) for one in arm.effects]
-    return np.concatenate(marks)
+    rigid = np.zeros(len(arm.robot.rigid_parameters), dtype=bool)
+    named = [np.full(len(e.parameters(arm.robot)), e.name in names) for e in arm.effects]
+    return np.concatenate([rigid, *named])

@@ -43,12 +43,12 @@ class Run:
     rate: float
 
     def __post_init__(self) -> None:
-        """Check that transfers join the excitation without a jump; make them whole samples."""
+        """Check that transfers meet the excitation; round their durations up to whole samples."""
         ends = self.excitation.at([0.0, self.excitation.duration]).q
         for transfer, own, end in ((self.approach, -1, 0), (self.back, 0, 1)):
             # [rad or m]; rounding
             if transfer is not None and np.abs(transfer.q[own] - ends[end]).max() > 1e-9:
-                raise TrajectoryError('run: a transfer does not join the excitation')
+                raise TrajectoryError('run: a transfer and the excitation do not meet in a pose')
         for name in ('approach', 'back'):
             transfer = getattr(self, name)
             if transfer is not None:
@@ -64,17 +64,17 @@ class Run:
     def duration(self) -> float:
         """Duration from rest to rest [s]."""
         back = 0.0 if self.back is None else self.back.duration
-        return self.approach.duration + self._lasts + back
+        return self.approach.duration + self._excitation_duration + back
 
     @property
-    def _lasts(self) -> float:
+    def _excitation_duration(self) -> float:
         """Duration of the excitation in whole samples [s]."""
         return self.excitation.sampled_duration(self.rate)
 
     def at(self, t: npt.ArrayLike) -> Motion:
-        """Evaluate the run at times of shape (N,) [s]; at rest before its start and after it."""
+        """Evaluate the run at times, shape (N,) [s]; the arm rests before and after the run."""
         time = np.clip(np.asarray(t, dtype=float), 0.0, self.duration)
-        begin, lasts = self.approach.duration, self._lasts
+        begin, lasts = self.approach.duration, self._excitation_duration
         early = 0.5 * (lasts - self.excitation.duration)
         parts: list[tuple[Path, FloatArray]] = [
             (self.approach, time),
@@ -93,7 +93,7 @@ class Run:
         return Motion(self.joints, time, *states)
 
     def motion(self) -> Motion:
-        """Sample the whole run, from time 0 on."""
+        """Return samples of the whole run at its rate, from time 0 on."""
         t = np.arange(round(self.duration * self.rate) + 1) / self.rate
         return replace(self.at(t), t=t)
 
@@ -114,7 +114,7 @@ class Run:
         if away[j] > 0.001:  # [rad or m]
             raise TrajectoryError(
                 f"joint '{self.joints[j]}' would be {away[j]:.2g} rad or m off its path between "
-                f'{self.rate:g} waypoints per second: send more with rate, or take fewer harmonics'
+                f'{self.rate:g} waypoints per second: raise the rate, or take fewer harmonics'
             )
 
 

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The bodies of an arm, its floor and obstacles, and a summary of the checks of a run."""
+"""Bodies of an arm, floor and obstacles around it, and a summary of the checks of a run."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ class CollisionScene:
         progress: Callable[[float], None] | None = None,
     ) -> CollisionScene:
         """
-        Load the surroundings of a robot.
+        Return the bodies of a robot, its floor, and the obstacles of an environment file.
 
         Parameters
         ----------
@@ -93,7 +93,7 @@ class CollisionScene:
 
     @property
     def unchecked(self) -> tuple[str, ...]:
-        """Return the items that cannot be checked for any motion."""
+        """Return what a check of motions leaves out, such as a floor, mesh or limit not given."""
         robot = self.collision.robot
         found: list[str] = []
         if self.floor.height is None and not any(o.kind == 'plane' for o in self.obstacles):
@@ -168,7 +168,7 @@ _REMEDIES = {
 @dataclass(frozen=True)
 class Fitness:
     """
-    Results of the checks of a run.
+    Summary of the safety checks of a run.
 
     Attributes
     ----------
@@ -190,7 +190,7 @@ class Fitness:
 
     @property
     def word(self) -> str:
-        """Return the verdict: `FIT` only if everything was checked and no fault was found."""
+        """Return the verdict: fit to run, partly checked, or not to be run."""
         if self.nearest is not None and self.nearest.distance < 0.0:
             return UNFIT
         if self.floor.height is not None and self.lowest.height < self.floor.height:
@@ -199,7 +199,7 @@ class Fitness:
 
     @property
     def remedy(self) -> str:
-        """Return a sentence with the remedy for a run that is not fit; empty if it is fit."""
+        """Return what to do before the run; empty if the run is fit."""
         if self.word == UNFIT:
             return 'Do not run it. Design it with another --start or --seed, or more --clearance.'
         items = ' '.join(self.unchecked)
@@ -207,11 +207,11 @@ class Fitness:
         return f'Give {needed}, or check these items yourself before the run.' if needed else ''
 
     def __str__(self) -> str:
-        """Return the verdict, and sentences on the results and on the unchecked items."""
+        """Return the verdict with the reasons in one line."""
         return f'{self.word}: {" ".join(self.sentences())}'
 
     def sentences(self) -> list[str]:
-        """Return sentences on limits and unchecked items, and on distances, the worse first."""
+        """Return a sentence on limits and unchecked items, and a sentence on distances."""
         limits = 'No limit violated'
         if self.unchecked:
             limits += f'; not checked: {"; ".join(self.unchecked)}'
@@ -236,7 +236,7 @@ class Fitness:
 
 def fitness(motion: Motion, scene: CollisionScene) -> Fitness:
     """
-    Return the results of the checks of a run that was found to keep limits and clearance.
+    Return a summary of the safety checks of a run that keeps all limits and the clearance.
 
     Parameters
     ----------

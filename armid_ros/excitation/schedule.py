@@ -35,7 +35,7 @@ MAX_DURATION = 86400.0
 @dataclass(frozen=True)
 class Excitation:
     """
-    Rest, run-in, identical periods, run-out, rest.
+    Run along a trajectory: rest, run-in, identical periods, run-out, rest.
 
     Attributes
     ----------
@@ -78,7 +78,7 @@ class Excitation:
 
     def at(self, t: npt.ArrayLike) -> Motion:
         """
-        Evaluate the run and its exact derivatives.
+        Evaluate position, velocity and acceleration of the run.
 
         Parameters
         ----------
@@ -154,7 +154,7 @@ class Excitation:
 
     def motion(self, rate: float) -> Motion:
         """
-        Sample the run at a rate.
+        Return samples of the run at a constant rate.
 
         Parameters
         ----------
@@ -198,7 +198,7 @@ class Excitation:
 
 
 def _step(x: FloatArray) -> FloatArray:
-    """Evaluate the quintic from 0 to 1 with zero slope and curvature at both ends."""
+    """Evaluate the quintic step from 0 to 1, with zero slope and curvature at both ends."""
     return np.asarray(x**3 * (10.0 - 15.0 * x + 6.0 * x**2))
 
 

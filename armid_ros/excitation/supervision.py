@@ -59,7 +59,7 @@ class MeasuredPose:
 
     def updated(self, positions: npt.ArrayLike, stamp_ns: int, now: float) -> MeasuredPose:
         """
-        Return the pose updated with a message.
+        Return the pose with the new positions of a joint state message.
 
         Parameters
         ----------
@@ -158,7 +158,7 @@ def jump_fault(
 
 def slowed(path: Path, phase: float, duration: float, rate: float) -> Motion:
     """
-    Return a stop along a path that starts at a given time of the path.
+    Return the motion that slows down to rest along a path, from a given time of the path.
 
     Parameters
     ----------
@@ -194,7 +194,7 @@ def slowed(path: Path, phase: float, duration: float, rate: float) -> Motion:
 
 class Rehearsal:
     """
-    Results of a rehearsal.
+    Tracking errors and torques that are measured while an arm follows a path slowly.
 
     Parameters
     ----------
@@ -219,7 +219,7 @@ class Rehearsal:
 
     def add(self, phase: float, q: FloatArray, tau: FloatArray) -> None:
         """
-        Add a joint state to the rehearsal.
+        Add a measured joint state to the results.
 
         Parameters
         ----------
@@ -235,12 +235,12 @@ class Rehearsal:
         self._count, self._until = self._count + 1, max(self._until, phase)
 
     def predicted(self) -> FloatArray:
-        """Return the largest predicted torque so far, shape (n,)."""
+        """Return the largest predicted torque of each joint so far, shape (n,) [N m or N]."""
         wanted = self._path.at(np.linspace(0.0, self._until, 4000))
         return np.asarray(np.abs(self._arm.joint_torque(wanted)).max(axis=0))
 
     def report(self) -> tuple[str, tuple[str, ...]]:
-        """Return a summary so far, and a sentence on each joint with an unexpected torque."""
+        """Return a summary of the results, and a sentence on each joint of unexpected torque."""
         if not self._count:
             fault = 'no joint state was received during the rehearsal'
             return fault, (fault,)

@@ -21,7 +21,7 @@ import numpy.typing as npt
 
 @dataclass(frozen=True, eq=False)
 class Transfer(Reference):
-    """Straight lines in joint space from pose to pose, with a stop at each pose."""
+    """Motion on straight lines in joint space from pose to pose, with a stop at each pose."""
 
     def __post_init__(self) -> None:
         """Set velocity and acceleration of every pose to zero."""
@@ -30,15 +30,15 @@ class Transfer(Reference):
         super().__post_init__()
 
     def at(self, t: npt.ArrayLike) -> Motion:
-        """Evaluate the transfer at times (N,) [s]; at rest before its start and after its end."""
+        """Evaluate the transfer at times, (N,) [s]; the arm rests before and after it."""
         return self.sample(np.clip(np.asarray(t, dtype=float), 0.0, self.duration))
 
     def lasting(self, duration: float) -> Transfer:
-        """Return the same path with another duration [s]."""
+        """Return the transfer along the same path with another duration [s]."""
         return replace(self, t=self.t * (duration / self.duration))
 
     def reversed(self) -> Transfer:
-        """Return the reversed transfer."""
+        """Return the transfer in the opposite direction."""
         return replace(self, t=self.duration - self.t[::-1], q=self.q[::-1])
 
 
@@ -72,7 +72,7 @@ class TransferPlanner:
         self, start: FloatArray, goal: FloatArray, shortest: float = 0.0, seed: int = 0
     ) -> Transfer:
         """
-        Plan a transfer.
+        Plan a transfer from a start pose to a goal pose, around obstacles.
 
         Parameters
         ----------
@@ -143,11 +143,11 @@ class TransferPlanner:
 
     @property
     def zero_pose(self) -> FloatArray:
-        """Return the pose nearest to zero inside the position limits with reserve, (n,)."""
+        """Return the zero pose, clipped to the position limits with reserve, shape (n,)."""
         return self._as_start(self.arm.robot.zero_pose)
 
     def _as_start(self, q: FloatArray) -> FloatArray:
-        """Return poses, (..., n), moved inside the position limits with reserve."""
+        """Return poses, (..., n), clipped to the position limits with reserve."""
         limits = Limits.of(self.arm.robot)
         return np.clip(q, limits.lower, limits.upper)
 
@@ -171,24 +171,21 @@ class TransferPlanner:
             about = zero + distance * rng.uniform(-1.0, 1.0, (200, len(zero)))
             about = self._as_start(about)
             about = about[np.argsort(np.linalg.norm(about - zero, axis=1))]
-            for q in about:
-                if not self.fault(q):
-                    return self._simplified(q, zero)
+            q = next((pose for pose in about if not self.fault(pose)), None)
+            if q is None:
+                continue
+            for j in np.argsort(np.abs(q - zero)):  # zero for all joints for which it is allowed
+                other = q.copy()
+                other[j] = zero[j]
+                if not self.fault(other):
+                    q = other
+            rounded = np.where(q == zero, zero, np.round(q, 2))  # few decimals, to be typed
+            rounded = self._as_start(rounded)
+            return q if self.fault(rounded) else rounded
         raise TrajectoryError(
             f'{self.arm.robot.name}: the zero pose is not allowed ({reason}), and no allowed pose '
             'was found around it; give a start pose with --start'
         )
-
-    def _simplified(self, q: FloatArray, zero: FloatArray) -> FloatArray:
-        """Set joints to zero if the pose stays free, and round the other joints."""
-        for j in np.argsort(np.abs(q - zero)):
-            other = q.copy()
-            other[j] = zero[j]
-            if not self.fault(other):
-                q = other
-        rounded = np.where(q == zero, zero, np.round(q, 2))  # few decimals, for the command line
-        rounded = self._as_start(rounded)
-        return q if self.fault(rounded) else rounded
 
     def _overload(self, q: FloatArray) -> str:
         """Return a message if a joint cannot hold some of the poses, shape (N, n)."""
@@ -199,10 +196,11 @@ class TransferPlanner:
         worst = int(np.argmax(excess))
         if excess[worst] <= 0.0:
             return ''
+        unit = self.limits.unit('torque', worst)
         return (
             f'joint {self.limits.joints[worst]}: holding still takes '
-            f'{torque[:, worst].max():.4g} of {self.limits.torque[worst]:.4g} '
-            f'{self.limits.unit("torque", worst)}'
+            f'{torque[:, worst].max():.4g} {unit}, more than its limit of '
+            f'{self.limits.torque[worst]:.4g} {unit}'
         )
 
 

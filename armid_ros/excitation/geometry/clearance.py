@@ -27,7 +27,7 @@ IntArray = npt.NDArray[np.intp]
 @dataclass(frozen=True)
 class NearPairs:
     """
-    Pairs of bodies (m) that are close to each other in some of N poses.
+    The m pairs of bodies that are close to each other in some of N poses.
 
     Attributes
     ----------
@@ -75,7 +75,7 @@ class Approach:
 @dataclass(frozen=True)
 class ClearanceModel:
     """
-    Collision bodies, prepared for many queries.
+    Collision bodies of an arm, prepared for distances in many poses.
 
     Attributes
     ----------
@@ -112,7 +112,7 @@ class ClearanceModel:
 
     @classmethod
     def of(cls, collision: CollisionModel, margin: float = 0.0) -> ClearanceModel:
-        """Return the clearance model of a collision model, and the clearance to keep [m]."""
+        """Return the clearance model of bodies that have to keep a margin [m]."""
         robot, bodies = collision.robot, list(collision.geometry.geometryObjects)
         joints = np.array([int(body.parentJoint) - 1 for body in bodies], dtype=np.intp)
         spheres, planes = np.zeros((len(bodies), 4)), np.full((len(bodies), 4), np.nan)
@@ -150,7 +150,7 @@ class ClearanceModel:
         return cls(collision, margin, joints, spheres, planes, numbers, pairs, between, most)
 
     def watched(self, q: FloatArray, reach: float) -> ClearanceModel:
-        """Return the model with only the pairs that are closer than ``reach`` [m] in a pose."""
+        """Return the model of only the pairs closer than ``reach`` [m] in some pose q, (N, n)."""
         kept = np.unique(self.near(q, reach).pair)
         return replace(
             self,
@@ -161,12 +161,7 @@ class ClearanceModel:
         )
 
     def near(self, q: FloatArray, reach: float) -> NearPairs:
-        """
-        Return all pairs of bodies closer than ``reach`` [m] in poses of shape (N, n).
-
-        The result may contain pairs that are further apart.
-
-        """
+        """Return all pairs of bodies closer than ``reach`` [m] in poses of shape (N, n)."""
         frames = LinkFrames.of(self.collision.robot, q)
         sample, pair = np.nonzero(self._bound(frames) < reach)
         distance, normal, point = self._measure(q, sample, pair)
@@ -186,7 +181,7 @@ class ClearanceModel:
         return NearPairs(sample, pair, distance, by_q)
 
     def smallest(self, q: FloatArray, reach: float = np.inf) -> FloatArray:
-        """Return the smallest distance of each pose, shape (N,) [m]; at most ``reach``."""
+        """Return the smallest distance of two bodies in each pose, (N,) [m]; at most ``reach``."""
         frames = LinkFrames.of(self.collision.robot, q)
         sample, pair = np.nonzero(self._bound(frames) < reach)
         distance, _, _ = self._measure(q, sample, pair)
@@ -214,7 +209,7 @@ class ClearanceModel:
         times: FloatArray,
     ) -> Approach | None:
         """
-        Prove that all pairs keep the margin on a path, or return an approach below the margin.
+        Prove that all pairs keep the margin along a path, or return the closest approach found.
 
         On an interval, the distance of a pair is at least the mean of the distances at both ends,
         minus half the distance that the joints between the bodies can move them. An interval for

@@ -38,7 +38,7 @@ KINDS: Mapping[str, tuple[str, ...]] = {
 @dataclass(frozen=True)
 class Obstacle:
     """
-    A fixed obstacle.
+    A fixed obstacle near the arm: box, sphere, cylinder, mesh or plane.
 
     Attributes
     ----------
@@ -98,7 +98,7 @@ class Obstacle:
             raise TrajectoryError(f"obstacle '{self.name}': only a mesh has a file, and needs one")
 
     def geometry(self) -> coal.CollisionGeometry:
-        """Return the shape in the frame of the obstacle."""
+        """Return the collision shape of the obstacle, in the frame of the obstacle."""
         if self.kind == 'box':
             return coal.Box(*self.size)
         if self.kind == 'sphere':
@@ -172,14 +172,14 @@ def with_obstacles(collision: CollisionModel, obstacles: Sequence[Obstacle]) -> 
 
 
 def obstacles_alone(collision: CollisionModel, obstacles: Sequence[Obstacle]) -> CollisionModel:
-    """Return the bodies of ``with_obstacles``, checked only against the obstacles."""
+    """Return the bodies of ``with_obstacles``, with pairs of arm and obstacle only."""
     geometry = collision.geometry.copy()
     geometry.removeAllCollisionPairs()
     return with_obstacles(replace(collision, geometry=geometry), obstacles)
 
 
 def body_name(collision: CollisionModel, number: int) -> str:
-    """Return the name of the link or obstacle of a collision body, or of the joint of a link."""
+    """Return the name of a collision body for messages: its link, joint or obstacle."""
     body = collision.geometry.geometryObjects[number]
     frame = int(body.parentFrame)
     link = str(collision.robot.model.frames[frame].name)
@@ -199,7 +199,7 @@ _Shape = tuple[str, tuple[float, ...], pin.SE3]
 
 def load_environment(path: str | Path, robot: Robot | None = None) -> tuple[Obstacle, ...]:
     """
-    Read obstacles from a file.
+    Read obstacles from a list of obstacles or from a planning scene of MoveIt.
 
     Parameters
     ----------
@@ -224,7 +224,7 @@ def load_environment(path: str | Path, robot: Robot | None = None) -> tuple[Obst
             return _scene_obstacles(document, robot)
         # the obstacles of a list of mappings with the attributes of `Obstacle`
         if not isinstance(document, list):
-            raise TrajectoryError('has to be a list of obstacles, or a planning scene')
+            raise TrajectoryError('the file has to be a list of obstacles, or a planning scene')
         found: list[Obstacle] = []
         known = tuple(Obstacle.__dataclass_fields__)
         for number, entry in enumerate(document, 1):
@@ -247,7 +247,7 @@ def load_environment(path: str | Path, robot: Robot | None = None) -> tuple[Obst
 
 
 def _scene_obstacles(document: Mapping[str, Any], robot: Robot | None) -> tuple[Obstacle, ...]:
-    """Return the obstacles of a planning scene; errors name the collision object."""
+    """Return the obstacles of a MoveIt planning scene; errors name the collision object."""
     world = document.get('world', document)
     objects = world.get('collision_objects', [world] if 'primitives' in world else [])
     if not isinstance(objects, list):
@@ -268,16 +268,16 @@ def _scene_obstacles(document: Mapping[str, Any], robot: Robot | None) -> tuple[
                     )
                 )
         except (KeyError, TypeError, IndexError, ValueError, AttributeError) as error:
-            whole = '; print it with --full-length' if "'...'" in str(entry) else ''
+            hint = '; print it with --full-length' if "'...'" in str(entry) else ''
             raise TrajectoryError(
                 f"collision object '{name or number}' has a missing or wrong entry: "
-                f'{type(error).__name__} {error}{whole}'
+                f'{type(error).__name__} {error}{hint}'
             ) from error
     return tuple(found)
 
 
 def _shapes(entry: Mapping[str, Any], robot: Robot | None) -> Iterator[_Shape]:
-    """Yield the bodies of a collision object."""
+    """Yield kind, size and placement of each shape in a CollisionObject message."""
     base = _frame(str(entry['header']['frame_id']), robot) * _pose(entry.get('pose'))
     for primitive, pose in zip(entry['primitives'], entry['primitive_poses'], strict=True):
         # numbers of shape_msgs/SolidPrimitive; a cone becomes a cylinder
@@ -286,7 +286,7 @@ def _shapes(entry: Mapping[str, Any], robot: Robot | None) -> Iterator[_Shape]:
         )
         if not kind:
             raise TrajectoryError(
-                f'primitive {primitive["type"]} cannot be an obstacle; put a box around it'
+                f'a primitive of type {primitive["type"]} is not supported; replace it by a box'
             )
         size = tuple(float(value) for value in primitive['dimensions'])
         if kind == 'cylinder':
@@ -307,7 +307,7 @@ def _shapes(entry: Mapping[str, Any], robot: Robot | None) -> Iterator[_Shape]:
 
 
 def _frame(name: str, robot: Robot | None) -> pin.SE3:
-    """Return the placement of a fixed frame."""
+    """Return the placement in the base frame of a fixed frame with a given name."""
     if robot is None:
         return pin.SE3.Identity()
     model = robot.model

@@ -80,7 +80,7 @@ def link_heights(
     collision: CollisionModel, up: FloatArray, q: FloatArray, *, fixed: bool = False
 ) -> Iterator[tuple[str, FloatArray, FloatArray]]:
     """
-    Yield each link with its lowest and highest point in poses, q of shape (N, n).
+    Yield each link with the heights of its lowest and highest point in N poses, q (N, n).
 
     Yields
     ------
@@ -124,7 +124,7 @@ def vertical(gravity: FloatArray) -> FloatArray:
 
 
 def outline(shape: coal.CollisionGeometry) -> tuple[FloatArray, float]:
-    """Return points and a radius about their hull that contain a shape; None if unbounded."""
+    """Return points and a radius whose rounded hull holds a shape; no points if unbounded."""
     if isinstance(shape, coal.Convex):
         return np.array(shape.points()), 0.0
     if isinstance(shape, coal.Sphere):
@@ -194,7 +194,7 @@ def find_floor(
     collision: CollisionModel, given: str | None = None, surroundings: Sequence[Obstacle] = ()
 ) -> Floor:
     """
-    Return the floor of an arm.
+    Return the height and normal of the floor under an arm.
 
     Parameters
     ----------
@@ -245,7 +245,7 @@ def floor_obstacles(
     collision: CollisionModel, floor: Floor, margin: float
 ) -> tuple[Obstacle, ...]:
     """
-    Return the floor as an obstacle; empty without a floor.
+    Return the floor as an obstacle of the clearance check; empty without a floor.
 
     Links that are below the clearance in every pose, such as a turret on the base, are not
     checked against the floor.
@@ -286,7 +286,7 @@ def floor_obstacles(
 
 
 def _why_not_standing(collision: CollisionModel, up: FloatArray) -> str:
-    """Return why the base plane of an arm is not its floor; empty if it is."""
+    """Return why the base plane of an arm cannot be its floor; empty if it can."""
     normal = np.array([0.0, 0.0, 1.0])
     if up[2] < np.cos(np.pi / 4.0):
         return 'gravity does not pull it onto its base plane'

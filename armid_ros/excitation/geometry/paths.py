@@ -37,7 +37,7 @@ def find_path(
     rng: np.random.Generator,
 ) -> FloatArray:
     """
-    Find a path from pose to pose.
+    Find a collision-free path between two poses in joint space.
 
     Parameters
     ----------
@@ -97,7 +97,7 @@ def find_path(
 def clear_line(
     clearance: ClearanceModel | None, start: FloatArray, goal: FloatArray
 ) -> Approach | None:
-    """Prove that a straight line between two poses (n,) is clear, or return an approach."""
+    """Prove that a straight line of poses keeps the clearance, or return the closest approach."""
     if clearance is None:
         return None
     difference = goal - start
@@ -121,7 +121,7 @@ class _Tree:
     parents: list[int] = field(default_factory=lambda: [-1])
 
     def grow(self, target: FloatArray) -> int | None:
-        """Step towards a pose from the nearest pose of the tree; return the pose reached."""
+        """Step towards a pose from the nearest node; return the index of the new node, if any."""
         nearest = int(np.argmin([np.linalg.norm(target - q) for q in self.poses]))
         difference = target - self.poses[nearest]
         reach = float(np.abs(difference).max())
@@ -143,7 +143,7 @@ class _Tree:
         return None
 
     def branch(self, number: int) -> list[FloatArray]:
-        """Return the poses from one pose back to the root."""
+        """Return the poses from a node back to the root of the tree."""
         poses = []
         while number >= 0:
             poses.append(self.poses[number])

@@ -37,7 +37,7 @@ _MIN_EIGENVALUE = 1e-13
 @dataclass(frozen=True)
 class Information:
     """
-    Information of a motion on r parameters.
+    Information of a recorded motion on r parameters.
 
     Attributes
     ----------
@@ -89,7 +89,7 @@ class Information:
 @dataclass(frozen=True)
 class Criterion:
     """
-    Cost of an information matrix M, shape (r, r), to minimise.
+    Optimality criterion: cost of an information matrix M, shape (r, r), to minimise.
 
     All parameters outside the target are nuisance parameters, which are fitted too. The cost
     depends on the Schur complement S = M_ww - M_wn M_nn^+ M_nw of their block.

@@ -22,7 +22,7 @@ from dataclasses import replace
 from armid_ros.arm import TorqueSlope
 from armid_ros.excitation.fourier import fourier_basis, FourierTrajectory, MARGIN
 from armid_ros.excitation.geometry.clearance import ClearanceModel
-from armid_ros.excitation.problem import DesignProblem, marked
+from armid_ros.excitation.problem import DesignProblem, parameter_mask
 from armid_ros.model import regressor
 from armid_ros.motion import BlurredMotion, FloatArray, Motion
 import numpy as np
@@ -34,7 +34,7 @@ _STEP = 1e-7
 
 class Objective:
     """
-    Cost of a trajectory as a function of its coefficients X = (q0, a, b), shape (n, 1 + 2 H).
+    Design cost of a trajectory as a function of its coefficient matrix (q0, a, b).
 
     Parameters
     ----------
@@ -53,7 +53,7 @@ class Objective:
         # the direction of motion is smoothed below 5 % of the velocity limit
         self.width = 0.05 * np.where(np.isfinite(velocity), velocity, 1.0)
         arm = problem.arm
-        past = marked(arm, {one.name for one in arm.effects if not one.instantaneous})
+        past = parameter_mask(arm, {one.name for one in arm.effects if not one.instantaneous})
         # indices of the standard parameters among the columns; columns that depend on the past
         # come last
         self._order = np.argsort(np.argsort(past, kind='stable'))
@@ -79,7 +79,7 @@ class Objective:
         problem, settings = self.problem, self.problem.settings
         states = (basis @ x.T for basis in self.basis)
         motion = BlurredMotion(problem.limits.joints, self.t, *states, width=self.width)
-        state, past = self._by_state(motion), self._by_past(x)
+        state, past = self._state_columns(motion), self._past_columns(x)
         columns = np.concatenate(state + past, axis=2)
         order = self._order[problem.base.independent]
         inverse_noise = 1.0 / problem.noise[:, np.newaxis]
@@ -103,13 +103,14 @@ class Objective:
                 for index in np.ndindex(*x.shape):
                     moved = x.copy()
                     moved[index] += _STEP
-                    total[index] = (_weighted(self._by_past(moved), weights) - here).sum() / _STEP
+                    there = _weighted(self._past_columns(moved), weights)
+                    total[index] = (there - here).sum() / _STEP
             return by_state + total
 
         return cost, gradient
 
     def _state_gradient(self, motion: Motion, here: FloatArray, weights: FloatArray) -> FloatArray:
-        """Differentiate sum(weights * columns) by the coefficients, for columns of the state."""
+        """Differentiate sum(weights * columns) by the coefficients, for columns without memory."""
         count, n = motion.q.shape
         total = np.zeros((n, self.basis[0].shape[1]))
         state = np.array([motion.q, motion.dq, motion.ddq])
@@ -120,12 +121,12 @@ class Objective:
                 moved[argument, np.arange(len(joints)), :, joints] += _STEP
                 q, dq, ddq = moved.reshape(3, -1, n)
                 t = np.tile(motion.t, len(joints))
-                there = self._by_state(replace(motion, t=t, q=q, dq=dq, ddq=ddq))
+                there = self._state_columns(replace(motion, t=t, q=q, dq=dq, ddq=ddq))
                 total[joints] += (_weighted(there, weights) - here) @ basis / _STEP
         return total
 
-    def _by_state(self, motion: Motion) -> list[FloatArray]:
-        """Return the columns that depend only on the state: of the rigid body and of effects."""
+    def _state_columns(self, motion: Motion) -> list[FloatArray]:
+        """Return the regressor columns without memory: rigid body and instantaneous effects."""
         arm, target = self.problem.arm, self.problem.settings.target
         if target == 'effects':
             body = np.zeros((*motion.q.shape, len(arm.robot.rigid_parameters)))
@@ -134,8 +135,8 @@ class Objective:
             body = regressor(arm.body, motion.at_rest() if still else motion)
         return [body, *(arm.columns_of(e, motion) for e in arm.effects if e.instantaneous)]
 
-    def _by_past(self, x: FloatArray) -> list[FloatArray]:
-        """Return the columns of effects that depend on the past of the motion."""
+    def _past_columns(self, x: FloatArray) -> list[FloatArray]:
+        """Return the regressor columns of effects that depend on the past of the motion."""
         problem = self.problem
         effects = [effect for effect in problem.arm.effects if not effect.instantaneous]
         path = FourierTrajectory.of(problem.limits.joints, problem.settings.period, x)
@@ -165,7 +166,7 @@ Part = tuple[FloatArray, Callable[[], FloatArray]]
 
 class Constraints:
     """
-    Position, velocity, acceleration, torque and clearance as functions of the coefficients.
+    Limits and clearance as constraints on the coefficients of a trajectory.
 
     Parameters
     ----------
@@ -204,7 +205,7 @@ class Constraints:
 
     def value(self, x: FloatArray) -> Part:
         """
-        Return the constraints, and a function that computes their gradients.
+        Return the constraint values, and a function that computes their gradients.
 
         Parameters
         ----------
@@ -248,7 +249,7 @@ class Constraints:
         upper: FloatArray,
         unit: FloatArray,
     ) -> Part:
-        """Return constraints on quantities that depend on the coefficients of one joint only."""
+        """Return constraints on positions, velocities or accelerations, one for each joint."""
         values = basis @ x.T
         limited, totals, signed = self._between(values, lower, upper, unit)
 
@@ -283,7 +284,7 @@ class Constraints:
         return totals, gradients
 
     def _clear(self, motion: Motion) -> Part:
-        """Return one clearance constraint for every stretch of the period."""
+        """Return one clearance constraint for each of the equal parts of the period."""
         assert self.clearance is not None
         # unit of the constraint [m]; bodies that are 0.6 units beyond the margin are ignored. At a
         # sharpness of 60, their weight in the soft maximum is exp(-36)
@@ -310,7 +311,7 @@ class Constraints:
     def _between(
         self, values: FloatArray, lower: FloatArray, upper: FloatArray, unit: FloatArray
     ) -> tuple[npt.NDArray[np.intp], FloatArray, FloatArray]:
-        """Return the limited joints, their soft maxima, and the derivatives by the values."""
+        """Return joints with limits, their soft maximum excess, and its derivatives."""
         limited = np.flatnonzero(np.isfinite(lower) | np.isfinite(upper))
         signed = np.empty((len(limited), len(values)))
         totals = np.empty(len(limited))

@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-The search: local optimisation of the best random trajectories within all limits.
+Local optimisation of the best random trajectories within all limits.
 
 Several searches start. After every second round, the worse half ends, so the best searches get
 most of the computing time. The solver is SLSQP of SciPy, sequential quadratic
@@ -51,7 +51,7 @@ class _OutOfTime(Exception):
 
 class Search:
     """
-    Search that stores the best trajectory so far and can be stopped at any time.
+    Search for the best trajectory, which keeps the best so far if it is stopped.
 
     Parameters
     ----------
@@ -142,7 +142,7 @@ class Search:
         return cost
 
     def step(self) -> None:
-        """Count a step of the search, to report the progress."""
+        """Count a step of the search, report the progress, and end the search out of time."""
         self._steps += 1
         self._watch(min(self._steps / self._work, 1.0), self.cost)
         if time.process_time() - self._begun > self.problem.settings.time_budget:
@@ -179,7 +179,7 @@ class _Branch:
     cost: float = np.inf
 
     def __post_init__(self) -> None:
-        """Set the bounds of coefficients, in units of the value that alone reaches a limit."""
+        """Set the scales of the coefficients from the limits, and their bounds in these scales."""
         limits, settings = self.search.problem.limits, self.search.problem.settings
         low, high = limits.position_range()
         half = 0.5 * (high - low)[:, np.newaxis]
@@ -233,7 +233,7 @@ class _Branch:
             self.sharpness = _SHARPNESS[-1]
 
     def _solve(self, constraints: Constraints, iterations: int) -> tuple[FloatArray, int]:
-        """Return the solution of SLSQP, (n, 1 + 2 H) in units of the scale, and its step count."""
+        """Return the scaled coefficients that SLSQP finds, (n, 1 + 2 H), and its step count."""
         count, scale = 0, self.scale
         x = self.trajectory.coefficients / scale
 
@@ -279,8 +279,9 @@ class _Branch:
 def _made_feasible(
     problem: DesignProblem, clearance: ClearanceModel | None, trajectory: FourierTrajectory
 ) -> FourierTrajectory | None:
-    """Reduce amplitudes of joints that exceed limits, or of all joints if these are unknown."""
-    for _ in range(12):  # reductions of the amplitudes
+    """Return a trajectory with amplitudes reduced until feasible; None if never."""
+    # a joint beyond its own limits is reduced alone; torque and clearance reduce all joints
+    for _ in range(12):
         faults = trajectory_faults(problem.arm, problem.limits, trajectory, clearance)
         if not faults:
             return trajectory
