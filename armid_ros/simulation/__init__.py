@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-The simulated arm: a plant with stick-slip friction, a controller, drives and sensors.
+Simulated arm: plant with stick-slip friction, controller, drives and sensors.
 
 `simulate` records an arm that follows a reference. A `SimulatedArm` accepts trajectories
 while simulated time advances. `step` integrates one step of the plant. Joints are rigid unless the

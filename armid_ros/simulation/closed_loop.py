@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-The loop of controller, drives and plant, one controller update per step, and its compiled steps.
+Closed loop of controller, drives and plant, with one controller update per step.
 
 The kernel, `kernel.c`, computes steps without a change of friction modes and without joint
 stops, about fifty times as fast as `integrator.step`. `integrator.step` computes all
@@ -68,14 +68,14 @@ class _Plant(Structure):
 
 class CompiledLoop:
     """
-    A plant and its controller in the format of the kernel.
+    A plant and its controller in the data structures of the compiled kernel.
 
     Parameters
     ----------
     plant : Plant
         Plant of rigid joints without drives, hysteresis, load-dependent or coupled dry friction.
     feedback : LinearFeedback
-        The feedback law of its controller.
+        The feedback control law of its controller.
     body, nominal : BodyOfKernel
         Rigid bodies of the plant and of the feedback law.
 
@@ -123,7 +123,7 @@ class CompiledLoop:
 
     @classmethod
     def of(cls, plant: Plant, controller: Controller) -> CompiledLoop | None:
-        """Return the loop; None if the kernel does not support the plant or is not compiled."""
+        """Return the compiled loop; None if the kernel is missing or cannot compute the plant."""
         action, dry = plant.action, plant.contacts
         usual = plant.springs is None and action.drive is None and action.hysteresis is None
         usual = usual and plant.robot.mechanism is None
@@ -190,7 +190,7 @@ class CompiledLoop:
 
 class Trace(NamedTuple):
     """
-    States and torques during N steps.
+    Simulated states and torques at N successive steps.
 
     Attributes
     ----------
@@ -214,7 +214,7 @@ class Trace(NamedTuple):
 def command(
     plant: Plant, controller: Controller, state: State, targets: Motion, row: int
 ) -> FloatArray:
-    """Return the torque for a row of targets, within the limits of the drives, (n,) [N m]."""
+    """Return the controller torque for a row of targets, clipped to the limits, (n,) [N m]."""
     assert targets.tau is not None
     desired = targets.q[row], targets.dq[row], targets.ddq[row]
     q, dq = (state.q, state.dq) if state.rotors is None else plant.motors(state)[:2]
@@ -234,7 +234,7 @@ def run(
     fine: Plant | None = None,
 ) -> Trace:
     """
-    Simulate an arm that follows a reference.
+    Simulate the closed loop of plant and controller along a desired motion.
 
     Parameters
     ----------

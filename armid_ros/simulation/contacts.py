@@ -1,12 +1,12 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Dry friction and joint stops as complementarity conditions, and their exact solution.
+Dry friction and joint stops as complementarity conditions, solved exactly.
 
 An element is a source of dry friction, or a joint stop. It can hold a joint at rest. Over one
 step, the velocities of m elements are w = w_free - G f. G is symmetric and positive semidefinite:
 the Delassus matrix times the step. The torque f_i of an element is upper_i for w_i > 0, lower_i
-    for w_i < 0, and between them for w_i = 0.
+for w_i < 0, and between them for w_i = 0.
 
 Source: block principal pivoting with Murty's rule as its safeguard, Judice and Pires 1994.
 
@@ -30,7 +30,7 @@ Modes = tuple[int, ...]
 #: velocities are not.
 REGULARISATION = 1e-10
 
-#: Tolerances of the law of an element: share of a bound, and velocity [rad/s or m/s].
+#: Tolerances of the friction law of an element: share of a bound, velocity [rad/s or m/s].
 TORQUE_TOLERANCE = 1e-12
 SPEED_TOLERANCE = 1e-13
 
@@ -44,7 +44,7 @@ def solve_box_complementarity(
     shift: float = REGULARISATION,
 ) -> tuple[FloatArray, Modes]:
     """
-    Solve for the torques of the friction elements.
+    Solve the complementarity conditions for torques and modes of all friction elements.
 
     Parameters
     ----------
@@ -128,7 +128,7 @@ class Contacts:
 
     @classmethod
     def of(cls, friction: DryFriction) -> Contacts:
-        """Return the contacts of friction elements."""
+        """Return contacts that consist of dry friction elements."""
         joints = [np.flatnonzero(direction).tolist() for direction in friction.directions]
         axes = tuple(some[0] if len(some) == 1 else -1 for some in joints)
         loaded = None if friction.load_share is None else friction
@@ -140,21 +140,21 @@ class Contacts:
         return -1 not in self.axes and len(set(self.axes)) == len(self.axes)
 
     def under(self, load: FloatArray) -> Contacts:
-        """Return the contacts with friction levels for a rigid-body torque, shape (n,) [N m]."""
+        """Return the contacts with friction levels under a rigid-body torque, shape (n,) [N m]."""
         if self.friction is None:
             return self
         more = self.friction.widening(load)
         return replace(self, lower=self.friction.lower - more, upper=self.friction.upper + more)
 
     def torques(self, g: FloatArray, w_free: FloatArray, modes: Modes) -> tuple[FloatArray, Modes]:
-        """Solve for torques and modes of the elements; see `solve_box_complementarity`."""
+        """Return torques and modes of the elements; see `solve_box_complementarity`."""
         regular = self.friction is None and self.of_single_joints
         shift = 0.0 if regular else REGULARISATION
         return solve_box_complementarity(self.lower, self.upper, g, w_free, modes, shift)
 
 
 def split_constant(friction: DryFriction | None, n_joints: int) -> tuple[DryFriction, FloatArray]:
-    """Separate elements that cannot stick, because both levels are equal, as a constant torque."""
+    """Return the friction elements that can stick, and the constant torque of all others."""
     if friction is None:
         return DryFriction(np.empty((0, n_joints)), np.empty(0), np.empty(0)), np.zeros(n_joints)
     span = friction.upper - friction.lower

@@ -28,7 +28,7 @@ Desired = tuple[FloatArray, FloatArray, FloatArray]
 @dataclass(frozen=True, eq=False)
 class LinearFeedback:
     """
-    Feedback law: inverse dynamics of a rigid body, plus a spring and a damper on every joint.
+    Feedback control law: inverse dynamics, plus a spring and a damper on every joint.
 
     tau = ID(q, s dq, w^2 e + 2 w de + s ddq_d) + kp e + kd de + feedforward, e = q_d - q.
 
@@ -60,7 +60,7 @@ class LinearFeedback:
     _data: pin.Data = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        """Make the rigid body and its scratch memory."""
+        """Set the rigid body of the inverse dynamics, and its scratch memory."""
         body = self.robot if self.weighs else self.robot.with_gravity(np.zeros(3))
         object.__setattr__(self, '_body', body)
         object.__setattr__(self, '_data', body.model.createData())
@@ -76,7 +76,7 @@ class LinearFeedback:
     def torque(
         self, q: FloatArray, dq: FloatArray, desired: Desired, feedforward: FloatArray
     ) -> FloatArray:
-        """Return the torque, shape (n,); see `Controller.torque`."""
+        """Return feedback torque plus feedforward, shape (n,) [N m]; see `Controller.torque`."""
         behind, slower = desired[0] - q, desired[1] - dq
         ddq = self.bandwidth**2 * behind
         ddq += 2.0 * self.bandwidth * slower
@@ -92,9 +92,9 @@ class LinearFeedback:
 
 class Controller:
     """
-    A control law: torque as a function of the measured and the desired motion.
+    Control law: torque as a function of the measured and the desired motion.
 
-    The law uses the true position and velocity, of the motors if joints are elastic. Sensors
+    It uses the true position and velocity, of the motors if joints are elastic. Sensors
     distort the recording only. The drives apply their torque limits to the commanded torque.
 
     Attributes
@@ -102,7 +102,7 @@ class Controller:
     acts_once : bool
         Whether the controller has a state, so that it may act only once per step.
     feedback : LinearFeedback, or None
-        The law as a `LinearFeedback`; None if it has another form.
+        The control law as a `LinearFeedback`; None if it has another form.
 
     """
 
@@ -110,7 +110,7 @@ class Controller:
     feedback: LinearFeedback | None = None
 
     def __init__(self, feedback: LinearFeedback | None = None) -> None:
-        """Make a controller of a feedback law; a subclass may have a law of another form."""
+        """Make a controller with a linear feedback law; a subclass may override `torque`."""
         self.feedback = feedback
 
     def started(self) -> Controller:
@@ -135,7 +135,7 @@ class Controller:
         self, q: FloatArray, dq: FloatArray, desired: Desired, feedforward: FloatArray
     ) -> FloatArray:
         """
-        Return the torque to apply now.
+        Return the joint torque to apply in the present step, shape (n,) [N m].
 
         Parameters
         ----------
@@ -209,7 +209,7 @@ class VelocityLoop:
 @dataclass(eq=False)
 class MotorControl(Controller):
     """
-    A controller with a velocity loop on every motor; the integrals of the errors are its state.
+    Controller with a proportional-integral velocity loop on every motor.
 
     Attributes
     ----------
@@ -239,11 +239,12 @@ class MotorControl(Controller):
     @classmethod
     def of(cls, plant: Plant) -> MotorControl:
         """
-        Return loops designed for an arm with elastic joints, with that arm as the model.
+        Return velocity loops designed for an arm with elastic joints.
 
-        The velocity gain is the smallest of three: the gain of a rigid joint for 8 Hz, the gain
-        sqrt(K M) with the best damping of the link on its spring, and the largest stable gain of
-        a sampled loop on a rotor. The position gain makes the joint critically damped.
+        The feedforward uses the same arm. The velocity gain is the smallest of three: the gain of
+        a rigid joint for 8 Hz, the gain sqrt(K M) with the best damping of the link on its spring,
+        and the largest stable gain of a sampled loop on a rotor. The position gain makes the joint
+        critically damped.
 
         """
         robot, springs = plant.robot, plant.springs
@@ -266,7 +267,7 @@ class MotorControl(Controller):
         return cls(VelocityLoop(gain, gain**2 / (4.0 * inertia)), plant.dt, plant)
 
     def started(self) -> MotorControl:
-        """Return the same loops with zero integrals."""
+        """Return a controller with the same loops and zero integrals."""
         return replace(self)
 
     def targets(self, desired: Motion, previous: FloatArray | None = None) -> Motion:

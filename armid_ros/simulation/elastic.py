@@ -43,14 +43,8 @@ def two_link_arm(parameters: TwoLinkParameters, robot: Robot | None = None) -> A
     return arm
 
 
-def two_link_plant(parameters: TwoLinkParameters, *, substeps: int = 2) -> Plant:
-    """Return the plant of the two-link arm."""
-    arm = two_link_arm(parameters)
-    return Plant(arm, elasticity=Elasticity(substeps, parameters.link_damping))
-
-
 def two_link_loop(shipped: TwoLinkSet, share: float = 1.0) -> VelocityLoop:
-    """Return the velocity loop of the shipped arm, with its gains times a factor."""
+    """Return the velocity loops of the two-link arm, with their gains times a factor."""
     # units of the gains are V s/rad and V/rad at the motors
     scale = share * shipped.parameters.torque_per_volt * shipped.parameters.gear
     proportional, integral = (
@@ -76,7 +70,7 @@ def shipped_arm(robot: Robot) -> tuple[ArmModel, TwoLinkSet | None]:
 
 def elastic_joints(arm: ArmModel) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """
-    Return the elastic joints: those with rotor inertia, and those without.
+    Return the names of elastic joints with rotor inertia, and of those without.
 
     A motor without inertia has no independent motion. The twist of its spring follows the load
     without delay.
@@ -202,7 +196,7 @@ def multisine_course(
     robot: Robot, duration: float, torque: float, rng: np.random.Generator, clear: Clear
 ) -> Reference:
     """
-    Return moves from pose to pose, each with a multisine of torque added.
+    Return a reference of moves between poses, each with an added multisine of torque.
 
     Friction keeps its sign during a move. The arm rests between two moves.
 
@@ -261,7 +255,7 @@ def step_course(
     robot: Robot, duration: float, velocity: float, rng: np.random.Generator, clear: Clear
 ) -> Reference:
     """
-    Return steps of velocity from rest in many poses, of single joints and of all joints.
+    Return a reference of velocity steps from rest, of single joints and of all joints.
 
     Parameters
     ----------
@@ -306,7 +300,7 @@ def step_course(
 def _next_pose(
     robot: Robot, here: FloatArray, rng: np.random.Generator, clear: Clear, beyond: FloatArray
 ) -> FloatArray:
-    """Draw a pose which a straight line can reach, and in which the given step stays allowed."""
+    """Draw a pose that a straight line can reach and from which a given step is allowed."""
     middle = robot.middle_pose
     reach, tries = np.pi / 3.0, 1000  # largest distance from the middle [rad or m]; drawn poses
     lower = np.maximum(robot.lower, middle - reach)
@@ -322,11 +316,12 @@ def _next_pose(
     )
 
 
-def _finite(robot: Robot, limit: FloatArray, what: str) -> FloatArray:
+def _finite(robot: Robot, limit: FloatArray, quantity: str) -> FloatArray:
+    """Return the limits of all joints; raise a TrajectoryError if a joint has none."""
     for joint, value in zip(robot.joints, limit, strict=True):
         if not np.isfinite(value):
             raise TrajectoryError(
-                f'joint {joint}: the description has no {what} limit, but a share of it was '
+                f'joint {joint}: the description has no {quantity} limit, but a share of it was '
                 'requested'
             )
     return limit

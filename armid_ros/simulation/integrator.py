@@ -29,7 +29,7 @@ from scipy.linalg.lapack import dgesv, dposv
 
 def step(plant: Plant, state: State, torque: FloatArray) -> State:
     """
-    Integrate one step under a constant actuator torque.
+    Integrate the plant over one step under a constant actuator torque.
 
     Parameters
     ----------
@@ -83,7 +83,7 @@ def _end_velocity(
     dq: FloatArray,
     modes: Modes,
 ) -> tuple[FloatArray, FloatArray, Modes]:
-    """Return end velocity, acceleration, and torques and modes of friction elements and stops."""
+    """Return velocity and acceleration at the end of a step, and modes of the contacts."""
     dt, directions = plant.dt, contacts.directions
     right = np.empty((1 + len(directions), len(force)))
     right[0], right[1:] = force, directions
@@ -122,7 +122,7 @@ def _stop(
     q_next: FloatArray,
     load: FloatArray | None,
 ) -> tuple[FloatArray, FloatArray, FloatArray, Modes]:
-    """Repeat the step with the joint stops that it reached."""
+    """Repeat a step with contacts at the joint stops that it reached; return its result."""
     robot, count = plant.robot, len(state.modes)
     at_upper, at_lower = q_next > robot.upper, q_next < robot.lower
     while True:
@@ -141,7 +141,7 @@ def _stop(
 def spring_substep(
     plant: Plant, springs: ElasticJoints, rotors: Rotors, state: State, torque: FloatArray
 ) -> State:
-    """Integrate one substep under a constant actuator torque (n,) [N m]."""
+    """Integrate a plant with elastic joints over one substep under a constant motor torque."""
     dt, e = springs.dt, len(springs.joints)
     half = 0.5 * dt
     x = np.concatenate([rotors.twist, rotors.dq, state.dq])
@@ -180,7 +180,7 @@ def spring_substep(
 
 
 def _propagated(springs: ElasticJoints, rates: FloatArray, x: FloatArray) -> FloatArray:
-    """Return final twists and velocities without dry friction, and the effect of friction."""
+    """Return twists and velocities after a substep, and their change per friction torque."""
     e, size = len(springs.joints), len(x)
     z = np.zeros((size, size))
     z[:e, e:] = springs.to_twists
@@ -203,7 +203,7 @@ def _force(
     v: FloatArray,
     twist: FloatArray,
 ) -> tuple[FloatArray, FloatArray]:
-    """Return the torques on motors and links at mid-substep, and the new friction states."""
+    """Return the torques on motors and links at mid-substep, and the new hysteresis states."""
     robot, action, e = plant.robot, plant.action, len(springs.joints)
     t = state.t + 0.5 * springs.dt
     motor_speed = springs.to_motors.dot(v)
@@ -233,7 +233,7 @@ def _hold(
     modes: Modes,
     moved: FloatArray,
 ) -> None:
-    """Keep the positions of motors that stick exactly, without rounding errors."""
+    """Set velocity and motion of sticking motors to exactly zero, without rounding errors."""
     e = len(springs.joints)
     for axis, mode in zip(plant.contacts.axes, modes, strict=True):
         if mode != 0 or axis < 0:

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The plant: an arm model prepared for integration, its state, and checks before its motion."""
+"""Plant: an arm model prepared for integration, its state, and checks of its masses."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from scipy.linalg import eigh, LinAlgError
 
 
 def require_masses(robot: Robot) -> None:
-    """Raise a ModelError that names the links of negative mass, if a robot has any."""
+    """Raise a ModelError that names the links of a robot with a negative mass."""
     masses = robot.rigid_parameters[::PER_LINK]
     named = [
         f"link '{name}' has a mass of {mass:g} kg"
@@ -38,7 +38,7 @@ def require_masses(robot: Robot) -> None:
 
 def possible_loads(robot: Robot, values: FloatArray) -> bool:
     """
-    Return whether bodies within reach of an arm can have the parameters of loads.
+    Return whether parameters of loads belong to possible bodies within reach of an arm.
 
     Parameters
     ----------
@@ -60,7 +60,7 @@ def possible_loads(robot: Robot, values: FloatArray) -> bool:
 
 def require_any_mass(robot: Robot) -> None:
     """
-    Raise a ModelError if no link of a robot has a mass, since it then predicts no torque.
+    Raise a ModelError if no link of a robot has a mass, as its torque is then always zero.
 
     Raises
     ------
@@ -77,7 +77,7 @@ def require_any_mass(robot: Robot) -> None:
 
 
 def no_body(robot: Robot) -> ModelError:
-    """Return the error of an inertia matrix that is not positive definite."""
+    """Return the error for an inertia matrix that is not positive definite."""
     odd = [
         f"'{name}' ({values[0]:g} kg)"
         for name, values in zip(
@@ -112,7 +112,7 @@ class Rotors(NamedTuple):
 
 class State(NamedTuple):
     """
-    The state of a plant at the beginning of a step.
+    State of a plant at the beginning of a step: motion, friction modes and springs.
 
     Attributes
     ----------
@@ -145,7 +145,7 @@ class State(NamedTuple):
 
 class Plant:
     """
-    An arm model prepared for integration.
+    An arm model prepared for the integration of its motion.
 
     The motor and the link of a rigid joint have the same velocity. If elasticity is given, motor
     and link of joints with joint_elasticity and rotor_inertia have different velocities. Otherwise
@@ -242,7 +242,7 @@ class Plant:
         steps: int = 0,
     ) -> State:
         """
-        Make a state, by default at rest.
+        Return the plant state of given positions and velocities, by default at rest.
 
         The weight of the links twists the springs, and motors have the velocity of their links.
 
@@ -298,7 +298,7 @@ class Plant:
     def resist(
         self, force: FloatArray, t: float, q: FloatArray, dq: FloatArray, memory: FloatArray
     ) -> None:
-        """Subtract the torques of smooth effects from the torques on the motors, (n,) [N m]."""
+        """Subtract the torques of all smooth effects from the motor torques, (n,) [N m]."""
         if self.constant is not None:
             force -= self.constant
         if self.torque is not None:
@@ -319,10 +319,9 @@ class Plant:
         self, at_lower: npt.NDArray[np.bool_], at_upper: npt.NDArray[np.bool_]
     ) -> Contacts:
         """
-        Return the friction elements and then the active joint stops.
+        Return the contacts of the friction elements, followed by the active joint stops.
 
-        A stop is an element that holds any torque in one direction. Its law is w <= 0, f >= 0, w f
-        = 0 at the upper limit.
+        A stop holds any torque in one direction: w <= 0, f >= 0, w f = 0 at the upper limit.
 
         """
         friction, hit = self.contacts, np.flatnonzero(at_lower | at_upper)
@@ -339,7 +338,7 @@ class Plant:
 
 
 def _damping_weight(robot: Robot, inertia: FloatArray, damping: FloatArray, dt: float) -> float:
-    """Return the weight of the velocity at the end of a step in the damping torque."""
+    """Return the implicit share of the damping: the weight of the velocity after a step."""
     # 1/2 (second order) for weak damping, 1 (no overshoot) for stiff damping. In between, the
     # value for which the fastest decay rate of the arm is exact (Liniger and Willoughby 1970)
     try:

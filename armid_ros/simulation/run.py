@@ -24,7 +24,7 @@ _MAX_SPEED = 1e6
 @dataclass(frozen=True, eq=False)
 class SimulatedRun:
     """
-    The recording of a run, and its true motion.
+    Recording of a simulated run, with the true motion of the arm and its reference.
 
     Attributes
     ----------
@@ -39,7 +39,7 @@ class SimulatedRun:
         acceleration are constant over a step and jump between two steps; each sample is the mean
         of the steps before and after it.
     reference : Motion
-        The reference of the arm.
+        The reference that the arm follows.
     sides : ElasticRun or None
         Recordings of both sides of the springs; None if all joints are rigid. The other readings
         are readings of the motors.
@@ -163,13 +163,23 @@ def record(
     if plant.springs is None:
         return run
     moved = Motion(truth.joints, truth.t, *links[:, rows])
-    return replace(run, sides=_both_sides(arm, run, moved))
+    q, dq, felt = arm.read_links(moved)
+    period = run.t[1] - run.t[0] if len(run.t) > 1 else plant.dt
+    loops = arm.controller.targets(desired)
+    before = loops.q[:1] - period * desired.dq[:1]
+    sides = ElasticRun(
+        Motion(run.joints, run.t, run.q, run.dq, np.zeros_like(run.q), run.tau),
+        Motion(run.joints, run.t, q, dq, moved.ddq),
+        np.diff(loops.q, axis=0, prepend=before) / period,
+        felt=felt,
+    )
+    return replace(run, sides=sides)
 
 
 def _simulated_motion(
     arm: SimulatedArm, steps: int, progress: Callable[[float], None] | None
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Simulate steps; return the motion of motors and links, and the torques."""
+    """Simulate a number of steps; return the motion of motors and links, and the torques."""
     plant, pieces, done = arm.plant, [], 0
     with np.errstate(over='ignore', invalid='ignore'):  # overflow is checked below
         for trace in arm.traces(steps):
@@ -191,34 +201,20 @@ def _simulated_motion(
     return motors, links, tau[0]
 
 
-def _both_sides(arm: SimulatedArm, run: SimulatedRun, moved: Motion) -> ElasticRun:
-    """Return the readings of motors and links of a run, and the reference of the loops."""
-    period = run.t[1] - run.t[0] if len(run.t) > 1 else arm.plant.dt
-    q, dq, felt = arm.read_links(moved)
-    targets = arm.controller.targets(run.reference)
-    before = targets.q[:1] - period * run.reference.dq[:1]
-    return ElasticRun(
-        Motion(run.joints, run.t, run.q, run.dq, np.zeros_like(run.q), run.tau),
-        Motion(run.joints, run.t, q, dq, moved.ddq),
-        np.diff(targets.q, axis=0, prepend=before) / period,
-        felt=felt,
-    )
-
-
-def whole_steps(time: float, dt: float, what: str) -> int:
+def whole_steps(time: float, dt: float, setting: str) -> int:
     """
-    Return a time as a number of steps.
+    Return a time as a whole number of plant steps.
 
     Raises
     ------
     ModelError
-        If the time is not a whole number of steps; the message begins with `what`.
+        If the time is not a whole number of steps; the message begins with `setting`.
 
     """
     steps = round(time / dt) if np.isfinite(time) else 0
     if steps < 1 or abs(steps * dt - time) > 1e-9 * time:
         raise ModelError(
-            f'{what} does not fit the step of {dt:g} s: take {1.0 / dt:g} Hz divided by a whole '
-            'number'
+            f'{setting} does not fit the step of {dt:g} s: take {1.0 / dt:g} Hz divided by a '
+            'whole number'
         )
     return steps

@@ -107,7 +107,7 @@ def readings(
     action: Action, truth: Motion, commanded: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """
-    Return the readings of sensors without noise.
+    Return the sensor readings without noise for a true motion and torque.
 
     Parameters
     ----------
@@ -136,7 +136,7 @@ def readings(
 
 class RecentPast:
     """
-    The latest samples of an arm, on which its readings depend.
+    The latest true samples of an arm, on which late or filtered readings depend.
 
     Parameters
     ----------
@@ -184,7 +184,7 @@ class RecentPast:
         return (tau[1:] + tau[:-1]) / 2 if self._plant.springs is None else tau[1:]
 
     def drop(self, count: int) -> None:
-        """Remove the last samples, which the last trace added."""
+        """Remove the last samples, which `extend` added."""
         self._rows, self._steps = self._rows[:, :-count], self._steps - count
 
     def latest(self, ahead: int = 0) -> tuple[FloatArray, FloatArray, FloatArray]:

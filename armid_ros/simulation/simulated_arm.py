@@ -51,7 +51,7 @@ class LinkSample:
 @dataclass(frozen=True, eq=False)
 class Sample:
     """
-    One sample of the sensor readings.
+    Sensor readings of a simulated arm at one time.
 
     Attributes
     ----------
@@ -193,7 +193,7 @@ class SimulatedArm:
 
     def become(self, arm: ArmModel) -> None:
         """
-        Change the arm model without a change of state, as when the arm picks up a load.
+        Replace the arm model in the present state, as when the arm picks up a load.
 
         The controller keeps its model.
 
@@ -254,16 +254,16 @@ class SimulatedArm:
         self._end_block()
         curve, now = reference.for_robot(self.plant.robot), self._desired(1)
         if curve.dq is not None:
-            self._require_small('ends with', curve.dq[-1], _REST_SPEED, '/s', 'stop it')
+            self._require_small('velocity at the end', curve.dq[-1], _REST_SPEED, '/s', 'stop it')
         if curve.t[0] > 0.0:
             curve = curve.after(now.q[0], now.dq[0], now.ddq[0])
         else:
             # largest distance of an immediate first point from the desired position [rad or m]
             advice = 'give its first point a later time, to get there'
-            self._require_small('starts away by', curve.q[0] - now.q[0], 0.01, '', advice)
+            self._require_small('step to the first point', curve.q[0] - now.q[0], 0.01, '', advice)
             if curve.dq is not None:
                 jump = curve.dq[0] - now.dq[0]
-                self._require_small('starts with a jump of', jump, _REST_SPEED, '/s', advice)
+                self._require_small('velocity step at the start', jump, _REST_SPEED, '/s', advice)
         curve.require_limits(self.plant.robot, self.plant.dt)
         self._reference, self._begun = curve, self._state.steps
         self._look_ahead(self._targets.q[self._row])
@@ -300,7 +300,7 @@ class SimulatedArm:
             yield trace
 
     def _take(self, steps: int) -> Trace:
-        """Simulate some steps, at most to the end of the targets, and return their trace."""
+        """Simulate steps, at most to the end of the present targets, and return their trace."""
         row = self._row + 1
         if row >= len(self._targets):
             self._look_ahead(self._targets.q[-1])
@@ -313,7 +313,7 @@ class SimulatedArm:
         return trace
 
     def _end_block(self) -> None:
-        """Set the state to that of the present: take the steps of the block again up to it."""
+        """Set the state to the present one: repeat the steps of the block up to the present."""
         if self._ahead <= 0:
             return
         (state, torque), present = self._block_start, self.steps
@@ -361,7 +361,7 @@ class SimulatedArm:
         return q, dq, acceleration
 
     def _begin(self, reference: Reference, steps: int) -> None:
-        """Start on a reference, with an empty sensor history."""
+        """Start at the first point of a reference, with an empty sensor history."""
         first = reference.sample(np.zeros(1))
         self._state = self.plant.state(first.q[0], first.dq[0], first.ddq[0], steps)
         self._ahead = 0
@@ -373,15 +373,15 @@ class SimulatedArm:
 
     @property
     def _row(self) -> int:
-        """Row of the targets that belongs to the present step."""
+        """Row of the present step in the targets."""
         return self._state.steps - self._first
 
     def _act(self) -> None:
-        """Return the torque that the controller applies for the present targets."""
+        """Set the torque that the controller applies for the present targets."""
         self._torque = command(self.plant, self._acting, self._state, self._targets, 0)
 
     def _look_ahead(self, commanded: FloatArray | None = None, steps: int = 1000) -> None:
-        """Evaluate the reference for the next steps, from the last commanded motor position."""
+        """Set the targets of the next steps, from the last commanded motor position."""
         self._first = self._state.steps
         self._targets = self.controller.targets(self._desired(steps + 1), commanded)
 
@@ -392,14 +392,14 @@ class SimulatedArm:
         return replace(motion, t=times(first, count))
 
     def _require_small(
-        self, what: str, values: FloatArray, tolerance: float, per: str, advice: str
+        self, quantity: str, values: FloatArray, tolerance: float, per: str, advice: str
     ) -> None:
-        """Raise a TrajectoryError if the value of any joint exceeds a tolerance."""
+        """Raise a TrajectoryError if a value of a joint exceeds a tolerance."""
         worst = int(np.argmax(np.abs(values)))
         if abs(values[worst]) > tolerance:
-            unit = self.plant.robot.position_units[worst] + per
+            joint, unit = self.joints[worst], self.plant.robot.position_units[worst] + per
             raise TrajectoryError(
-                f"trajectory: joint '{self.joints[worst]}' {what} {values[worst]:.4g} {unit}, "
+                f"trajectory: the {quantity} of joint '{joint}' is {values[worst]:.4g} {unit}, "
                 f'more than {tolerance:g} {unit}; {advice}'
             )
 

@@ -86,7 +86,7 @@ class ElasticJoints:
 
     @cached_property
     def pull(self) -> FloatArray:
-        """Torques of engaged springs and friction per twist and velocity, (e + n, e + e + n)."""
+        """Torques of engaged springs and dampers per twist and velocity, (e + n, e + e + n)."""
         return self._pull_of(self.transmission.stiffness, self.transmission.damping)
 
     @cached_property
@@ -118,7 +118,7 @@ class ElasticJoints:
 
         """
         action = arm.action()
-        springs = _required(arm.robot, action)
+        springs = _required_springs(arm.robot, action)
         joints = np.flatnonzero(np.isfinite(springs.stiffness))
         n, e = len(mass), len(joints)
         none = np.zeros((n, n))
@@ -157,12 +157,12 @@ class ElasticJoints:
         )
 
     def _pull_of(self, stiffness: FloatArray, damping: FloatArray) -> FloatArray:
-        """Return torques of springs and friction per twist and velocity, (e + n, e + e + n)."""
+        """Return the torques of springs and dampers per twist and velocity, (e + n, e + e + n)."""
         w = self.to_twists
         return np.hstack([-w.T * stiffness, -self.damping - (w.T * damping) @ w])
 
     def meshing(self, twist: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return the matrix of the engaged springs, and minus their torque at zero twist (e,)."""
+        """Return the `pull` of engaged springs, and minus their torque at zero twist, (e,)."""
         springs = self.transmission
         meshes = np.abs(twist) > springs.gap
         stiffness = np.where(meshes, springs.stiffness, 0.0)
@@ -179,8 +179,8 @@ class ElasticJoints:
         return np.asarray(links + twist.dot(self.to_motors[:, : len(self.joints)].T))
 
 
-def _required(robot: Robot, action: Action) -> Transmission:
-    """Return the transmission of an arm; raise a ModelError if no motor moves independently."""
+def _required_springs(robot: Robot, action: Action) -> Transmission:
+    """Return the springs of an arm; raise a ModelError if no motor moves independently."""
     springs = action.transmission
     if springs is None or not np.any(np.isfinite(springs.stiffness)):
         raise ModelError(

@@ -12,7 +12,7 @@ import numpy as np
 
 def temperature_course(text: str, n_joints: int, duration: float) -> Temperatures:
     """
-    Return the temperatures of a run from a text.
+    Return the joint temperatures of a run from a text such as 20:45:600.
 
     Parameters
     ----------
@@ -48,6 +48,6 @@ def temperature_course(text: str, n_joints: int, duration: float) -> Temperature
 
 
 def at_temperature(arm: ArmModel, course: Temperatures) -> ArmModel:
-    """Return an arm whose effects follow temperatures, to be simulated."""
+    """Return an arm model whose effects follow given joint temperatures in a simulation."""
     still = np.zeros_like(course.values)
     return arm.along(Motion(arm.robot.joints, course.t, still, still, still, temperature=course))

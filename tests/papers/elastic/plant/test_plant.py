@@ -12,13 +12,19 @@ from armid_ros.papers.elastic.experiments import run_experiment, step_of_velocit
 from armid_ros.robots import load_robot
 from armid_ros.robots.two_link import two_link_set
 from armid_ros.simulation import Elasticity, Plant, step
-from armid_ros.simulation.elastic import two_link_plant
+from armid_ros.simulation.elastic import two_link_arm
 import numpy as np
 import pytest
 
 from tests.papers.elastic.two_link_in_mujoco import FREE, LOCKED, modes
 
 SHIPPED = two_link_set('after')
+
+
+def two_link_plant(parameters, substeps=2):
+    """Return the plant of the two-link arm with elastic joints."""
+    elasticity = Elasticity(substeps, parameters.link_damping)
+    return Plant(two_link_arm(parameters), elasticity=elasticity)
 
 
 def lossless():
