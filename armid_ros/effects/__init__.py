@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Effects: causes of joint torque besides the rigid body, one family per file.
+Effects: physical causes of joint torque in addition to the rigid body.
 
 A user-defined effect derives from ``Effect``. ``register`` adds it to the catalogue.
 ``joint_columns`` and ``scatter`` arrange the columns and values of an effect that acts on each

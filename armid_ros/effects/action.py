@@ -58,7 +58,7 @@ class DryFriction:
 
     def torque(self, dq: FloatArray, load: FloatArray | None = None) -> FloatArray:
         """
-        Return the joint torques; an element at rest has the mean of its levels.
+        Return the friction torques of the joints; an element at rest has its mean level.
 
         Parameters
         ----------
@@ -79,7 +79,7 @@ class DryFriction:
         return np.asarray(half @ np.abs(self.directions))
 
     def widening(self, load: FloatArray) -> FloatArray:
-        """Return by how much a load raises the friction levels, shape (..., m) [N m]."""
+        """Return the increase of the friction levels under a load, shape (..., m) [N m]."""
         if self.load_share is None:
             return np.zeros((*load.shape[:-1], len(self.lower)))
         return np.asarray(self.load_share * np.abs(load @ self.directions.T))
@@ -87,7 +87,7 @@ class DryFriction:
 
 def direction(motion: Motion, joints: Sequence[int] | None = None) -> FloatArray:
     """
-    Return the sign of the velocity of each joint, or of a shaft.
+    Return the direction of motion of each joint, or of a shaft that several joints turn.
 
     Parameters
     ----------
@@ -137,7 +137,7 @@ class Transmission:
 @dataclass(frozen=True)
 class Action:
     """
-    How effects with given values act on plant and sensors; None where they do not act.
+    Terms that effects with given values add to the plant and its sensors; None if absent.
 
     The actuators have to supply damping @ dq + inertia @ ddq + dry friction + hysteresis +
     torque(t, q, dq) on the motor side, and the rigid body's torque + link_torque(t, q, dq) on the
@@ -213,7 +213,7 @@ class Action:
 
 
 def law_derivatives(law: TorqueLaw, motion: Motion) -> tuple[FloatArray, FloatArray]:
-    """Differentiate a torque law by q and dq, by central differences, each (N, n, n)."""
+    """Return the derivatives of a torque function by q and dq, each of shape (N, n, n)."""
     n = motion.n_joints
     size = 1e-6  # of the differences [rad, m, rad/s or m/s]
     slopes = np.empty((2, len(motion), n, n))
@@ -229,7 +229,7 @@ def law_derivatives(law: TorqueLaw, motion: Motion) -> tuple[FloatArray, FloatAr
 
 def merge_actions(robot: Robot, actions: Sequence[Action]) -> Action:
     """
-    Join the actions of several effects on one robot.
+    Return the action of several effects on one robot together.
 
     Matrices and torques are summed. Dry friction along one direction becomes one element.
     Actions on readings are applied in the given order.
@@ -239,6 +239,7 @@ def merge_actions(robot: Robot, actions: Sequence[Action]) -> Action:
     readings = [a.reading for a in actions if a.reading is not None]
     drives = [a.drive for a in actions if a.drive is not None]
     displacements = [a.displacement for a in actions if a.displacement is not None]
+    transmissions = [a.transmission for a in actions if a.transmission]
 
     def reading(motion: Motion, tau: FloatArray) -> FloatArray:
         for read in readings:
@@ -254,6 +255,15 @@ def merge_actions(robot: Robot, actions: Sequence[Action]) -> Action:
         parts = [displace(motion) for displace in displacements]
         return Displacement(*(np.sum(arrays, axis=0) for arrays in zip(*parts, strict=True)))
 
+    transmission = None
+    if transmissions:  # in series: compliances and gaps are summed
+        with np.errstate(divide='ignore'):
+            stiffness = 1.0 / np.sum([1.0 / part.stiffness for part in transmissions], axis=0)
+        transmission = Transmission(
+            stiffness,
+            np.sum([part.damping for part in transmissions], axis=0),
+            np.sum([part.gap for part in transmissions], axis=0),
+        )
     return Action(
         damping=sum((a.damping for a in actions if a.damping is not None), zero),
         inertia=sum((a.inertia for a in actions if a.inertia is not None), zero),
@@ -262,7 +272,7 @@ def merge_actions(robot: Robot, actions: Sequence[Action]) -> Action:
         torque=sum_laws([a.torque for a in actions if a.torque is not None]),
         link_torque=sum_laws([a.link_torque for a in actions if a.link_torque is not None]),
         robot=robot,
-        transmission=_merge_transmissions([a.transmission for a in actions if a.transmission]),
+        transmission=transmission,
         drive=drive if drives else None,
         displacement=displacement if displacements else None,
         reading=reading if readings else None,
@@ -271,7 +281,7 @@ def merge_actions(robot: Robot, actions: Sequence[Action]) -> Action:
 
 
 def sum_laws(laws: Sequence[TorqueLaw]) -> TorqueLaw | None:
-    """Return the sum of torque laws; None if there is no law."""
+    """Return the sum of torque functions of time and motion; None if there are none."""
 
     def torque(t: FloatArray, q: FloatArray, dq: FloatArray) -> FloatArray:
         return np.asarray(sum(law(t, q, dq) for law in laws))
@@ -282,7 +292,7 @@ def sum_laws(laws: Sequence[TorqueLaw]) -> TorqueLaw | None:
 
 
 def _merge_friction(elements: list[DryFriction]) -> DryFriction | None:
-    """Stack friction elements; those along the same direction become one with summed levels."""
+    """Return all friction elements; elements along one direction become one with summed levels."""
     if not elements:
         return None
     directions = np.vstack([e.directions for e in elements])
@@ -302,6 +312,7 @@ def _merge_friction(elements: list[DryFriction]) -> DryFriction | None:
 
 
 def _merge_hysteresis(elements: list[Hysteresis]) -> Hysteresis | None:
+    """Return all slipping springs with a level above zero; None if there are none."""
     if not elements:
         return None
     level = np.concatenate([e.level for e in elements])
@@ -311,17 +322,3 @@ def _merge_hysteresis(elements: list[Hysteresis]) -> Hysteresis | None:
     directions = np.vstack([e.directions for e in elements])
     distance = np.concatenate([e.distance for e in elements])
     return Hysteresis(directions[active], level[active], distance[active])
-
-
-def _merge_transmissions(parts: list[Transmission]) -> Transmission | None:
-    """Combine transmissions in series: compliances and gaps are summed."""
-    if not parts:
-        return None
-    compliance = np.sum([1.0 / part.stiffness for part in parts], axis=0)
-    with np.errstate(divide='ignore'):
-        stiffness = 1.0 / compliance
-    return Transmission(
-        stiffness,
-        np.sum([part.damping for part in parts], axis=0),
-        np.sum([part.gap for part in parts], axis=0),
-    )

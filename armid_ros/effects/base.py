@@ -36,7 +36,7 @@ import numpy.typing as npt
 @dataclass(frozen=True)
 class Effect(ABC):
     """
-    A kind of physical effect, on some joints of an arm.
+    Base class of physical effects on some joints of an arm, or on the whole arm.
 
     Attributes
     ----------
@@ -82,7 +82,7 @@ class Effect(ABC):
     learned: ClassVar[bool] = False
     #: Whether the torque changes smoothly with position and velocity.
     smooth: ClassVar[bool] = False
-    #: Whether the law is the same on every day, as its input is measured.
+    #: Whether the effect is the same on every day, as its input is measured.
     lasting: ClassVar[bool] = False
 
     def __init_subclass__(cls) -> None:
@@ -92,7 +92,7 @@ class Effect(ABC):
             cls.traits = TRAITS[cls.name]
 
     def __post_init__(self) -> None:
-        """Fill in the default shape, and check joints and shape."""
+        """Set the default shape parameters, and check the number and range of given ones."""
         defaults = tuple(s.default for s in self.shapes) * len(self.owners)
         values = tuple(float(value) for value in self.shape) or defaults
         if len(values) != len(defaults):
@@ -150,7 +150,7 @@ class Effect(ABC):
     @classmethod
     def places(cls, robot: Robot) -> tuple[tuple[str, ...], ...]:
         """
-        Return the sets of joints on which one cause can act: single joints, pairs, or all.
+        Return the sets of joints on which one such effect can act: joints, pairs, or all.
 
         Raises
         ------
@@ -163,33 +163,33 @@ class Effect(ABC):
 
     @classmethod
     def as_change(cls) -> type[Effect]:
-        """Return the class to use between two days if the effect may exist on the first one."""
+        """Return the class that describes a change of this effect since the baseline."""
         return cls
 
     def particulars(self) -> dict[str, Any]:
-        """Return the entries for model.yaml in addition to joints, parameters and shapes."""
+        """Return further entries of the effect for model.yaml, such as a reference temperature."""
         return {}
 
     def with_particulars(self, entry: Mapping[str, Any]) -> Self:
-        """Return the effect with the `particulars` in an entry of model.yaml."""
+        """Return the effect with the further entries that model.yaml has; see `particulars`."""
         return self
 
     def named_as(self, values: FloatArray, arm: Arm) -> tuple[tuple[Effect, FloatArray], ...]:
-        """Return equivalent effects of the catalogue, with their values."""
+        """Return equivalent effects of the catalogue and their values, for a report."""
         return ((self, values),)
 
     def _default_shape(self, robot: Robot) -> FloatArray:
-        """Return an initial shape on this robot, shape (number of owners, S)."""
+        """Return default shape parameters for this robot, shape (number of owners, S)."""
         return self.shape_values
 
     @property
     def shape_values(self) -> FloatArray:
-        """Shape parameters, shape (number of owners, S)."""
+        """Shape parameters of all owners, shape (number of owners, S)."""
         return np.array(self.shape).reshape(len(self.owners), len(self.shapes))
 
     def with_shape(self, values: npt.ArrayLike) -> Effect:
         """
-        Return the effect with another shape.
+        Return the effect with other shape parameters.
 
         Parameters
         ----------
@@ -213,7 +213,7 @@ class Effect(ABC):
         return replace(self, shape=tuple(spread.ravel().tolist()))
 
     def spread(self, robot: Robot) -> FloatArray:
-        """Return the largest values that are expected, shape (P,)."""
+        """Return the largest expected absolute value of each parameter, shape (P,)."""
         return np.full(len(self.parameters(robot)), np.inf)
 
     def shape_parameters(self, robot: Robot) -> tuple[ParameterName, ...]:
@@ -226,7 +226,7 @@ class Effect(ABC):
 
     def shape_starts(self, unexplained: Unexplained, arm: Arm) -> tuple[FloatArray, ...]:
         """
-        Return start values of a search, for each shape an array (number of owners, G).
+        Return start values for a search of the shape parameters, each (number of owners, G).
 
         Parameters
         ----------
@@ -258,7 +258,7 @@ class Effect(ABC):
         return lower, upper
 
     def adds_to(self, robot: Robot) -> tuple[int, ...]:
-        """Return the rigid-body parameters to which parameters of the effect add; often none."""
+        """Return the indices of rigid-body parameters to which the effect adds; often none."""
         return ()
 
     @property
@@ -272,7 +272,7 @@ class Effect(ABC):
         return ()
 
     def along(self, motion: Motion) -> Self:
-        """Return the effect with signals of a recording that it needs, such as temperatures."""
+        """Return the effect with the signals of a recording that it needs, as temperatures."""
         return self
 
     def referred_to(self, temperatures: Mapping[str, float]) -> Self:
@@ -282,7 +282,7 @@ class Effect(ABC):
     @abstractmethod
     def columns(self, motion: Motion, arm: Arm) -> FloatArray:
         """
-        Return the derivatives of the torques by the parameters.
+        Return the derivatives of the joint torques by the parameters of the effect.
 
         Parameters
         ----------
@@ -300,7 +300,7 @@ class Effect(ABC):
         """
 
     def checked_columns(self, motion: Motion, arm: Arm) -> FloatArray:
-        """Return `columns`; ModelError if their shape is not (N, n, P)."""
+        """Return `columns`; raise a ModelError if their array is not of shape (N, n, P)."""
         columns = self.columns(motion, arm)
         wanted = (*motion.q.shape, len(self.owners) * len(self.quantities))
         if np.shape(columns) != wanted:
@@ -312,7 +312,7 @@ class Effect(ABC):
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
         """
-        Return the action of the effect on the plant for given parameter values.
+        Return what the effect adds to the plant and its sensors for given parameter values.
 
         By default, the torque on the link side is columns @ values. This is correct for a torque
         that is linear in the values and depends on time, position and velocity only.
@@ -337,7 +337,7 @@ class Effect(ABC):
 
     def plausible(self, values: FloatArray, std: FloatArray, arm: Arm) -> bool:
         """
-        Return whether values within the bounds are plausible for this effect.
+        Return whether fitted values within the bounds are physically plausible.
 
         ``std``, shape (P,), has standard deviations for white noise. The arm does not contain
         the effect.
@@ -353,7 +353,7 @@ class Effect(ABC):
 @dataclass(frozen=True)
 class Unexplained:
     """
-    Torque residual of a model, in rows of all recordings.
+    Torque residual of a model in all recordings, which a new effect should explain.
 
     Attributes
     ----------
@@ -392,7 +392,7 @@ class Arm(Protocol):
         """Return the values of an effect, shape (P_e,)."""
 
     def action(self) -> Action:
-        """Return the merged action of all effects."""
+        """Return the action of all effects together."""
 
     def link_motion(self, motion: Motion) -> Motion:
         """Return the true motion of the links for a recorded motion."""
@@ -407,22 +407,22 @@ class Arm(Protocol):
         """Return the torque of the rigid body along a motion of the links, (N, n) [N m]."""
 
     def load_derivatives(self, motion: Motion) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Differentiate the load by position, velocity, acceleration, each (N, n, n)."""
+        """Return the derivatives of the load by q, dq and ddq, each of shape (N, n, n)."""
 
     def body_columns(self, motion: Motion) -> FloatArray:
         """Return the regressor of the load along a recorded motion, (N, n, 10 n)."""
 
     def gravity_columns(self, motion: Motion) -> FloatArray:
-        """Differentiate the load along a recorded motion by gravity, (N, n, 3)."""
+        """Return the derivatives of the load by the gravity vector, shape (N, n, 3)."""
 
     def joint_torque(self, motion: Motion) -> FloatArray:
         """Return the true torques of a recorded motion, (N, n) [N m]."""
 
     def torque_before(self, effect: Effect, motion: Motion) -> FloatArray:
-        """Return the torque before the action of an effect on readings, (N, n) [N m]."""
+        """Return the torque that the reading of an effect receives, shape (N, n) [N m]."""
 
     def torque_change(self, motion: Motion, change: Displacement) -> FloatArray:
-        """Return the change of the true torque due to changes of the links' motion."""
+        """Return the change of the joint torques due to changes of the links' motion."""
 
     def columns_of(self, effect: Effect, motion: Motion) -> FloatArray:
-        """Return the sensitivities of the torque readings to the parameters of an effect."""
+        """Return the derivatives of the torque readings by the parameters of an effect."""

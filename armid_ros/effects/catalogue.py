@@ -106,13 +106,13 @@ class Catalogue(Mapping[str, type[Effect]]):
         self.broken: dict[str, str] = {}
 
     def __getitem__(self, name: str) -> type[Effect]:
-        """Return a class by its name; packages are loaded if needed."""
+        """Return the effect class of a name; installed packages are loaded if needed."""
         if name not in self._kinds:
             self._complete_once()
         return self._kinds[name]
 
     def __iter__(self) -> Iterator[str]:
-        """Iterate over all names; shipped names come first."""
+        """Iterate over the names of all effects; shipped effects come first."""
         self._complete_once()
         return iter(tuple(self._kinds))
 
@@ -123,7 +123,7 @@ class Catalogue(Mapping[str, type[Effect]]):
 
     def find(self, name: str) -> type[Effect]:
         """
-        Return a class by its name.
+        Return the effect class of a name; the error suggests similar names.
 
         Raises
         ------
@@ -149,7 +149,7 @@ class Catalogue(Mapping[str, type[Effect]]):
 
     def add(self, kind: type[Effect]) -> None:
         """
-        Add a class, or replace an old version of the class.
+        Add an effect class to the catalogue, or replace an old version of the class.
 
         Raises
         ------
@@ -179,12 +179,12 @@ class Catalogue(Mapping[str, type[Effect]]):
         self._kinds[kind.name] = kind
 
     def remove(self, name: str) -> None:
-        """Remove a class that is not shipped, if it exists."""
+        """Remove an effect class that is not shipped, if the catalogue has it."""
         if name not in self._shipped:
             self._kinds.pop(name, None)
 
     def _complete_once(self) -> None:
-        """Load the effects of all packages at the first call."""
+        """Load the effects of all installed packages at the first call."""
         if self._complete:
             return
         self._complete = True
@@ -383,7 +383,7 @@ def parse_effect(text: str, robot: Robot) -> tuple[Effect, FloatArray]:
 
 
 def _number(text: str, effect: Effect, key: str, number: str) -> float:
-    """Return the value of a quantity or a shape; the error explains values per joint."""
+    """Return the number given for a quantity or shape; the error explains values per joint."""
     try:
         value = float(number)
     except ValueError:
@@ -400,7 +400,7 @@ def _number(text: str, effect: Effect, key: str, number: str) -> float:
 
 
 def _require_possible(name: str, quantity: Quantity, value: float) -> None:
-    """Raise a ModelError if a value is outside the physical bounds."""
+    """Raise a ModelError if a value is outside the physical bounds of its quantity."""
     if quantity.lower <= value <= quantity.upper:
         return
     bounds = f'{quantity.lower:g} or more'

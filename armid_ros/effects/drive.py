@@ -76,7 +76,7 @@ class TorqueRipple(JointLaw):
     )
 
     def shape_starts(self, unexplained: Unexplained, arm: Arm) -> tuple[FloatArray, ...]:
-        """Return the orders of waves over the angle that explain most of the residual."""
+        """Return the ripple orders that explain most of the residual, as start values."""
         robot = arm.robot
         # Range of ripple orders in a search [1/rad, 1/m]. Gravity and springs cause lower orders;
         # filters remove higher orders. Screws and racks have a turn or tooth every 4 to 60 mm.
@@ -89,7 +89,7 @@ class TorqueRipple(JointLaw):
         return (np.array(orders),)
 
     def plausible(self, values: FloatArray, std: FloatArray, arm: Arm) -> bool:
-        """Return whether the order is above the range that other causes explain."""
+        """Return whether the ripple order is above the orders that gravity and springs explain."""
         return bool(np.all(self.shape_values > 1.05 * _MIN_RIPPLE_ORDER))
 
     def law(self, x: JointStates) -> tuple[FloatArray, ...]:
@@ -100,7 +100,7 @@ class TorqueRipple(JointLaw):
 
 def wave_orders(unexplained: Unexplained, joint: int, between: tuple[float, float]) -> FloatArray:
     """
-    Return the orders of waves over a joint position that explain most of the residual, (K,).
+    Return the ripple orders over a joint position that explain most of the residual, (K,).
 
     All recordings are used together, because a ripple has the same order and phase in each.
 
@@ -194,7 +194,7 @@ class ActuatorSaturation(TorqueReading):
         return (np.outer(highest, [0.3, 0.4, *np.linspace(0.5, 0.95, 10)]),)
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
-        """Return the law of the drives and the law of the reading."""
+        """Return an action with the torque that drives lose and the torque that they report."""
         lost = scatter(self, values, arm.robot)[0]
         (level,) = scatter(self, self.shape_values, arm.robot)
 
@@ -215,7 +215,7 @@ class ActuatorSaturation(TorqueReading):
     def transfer(
         self, values: FloatArray, motion: Motion, tau: FloatArray, columns: FloatArray
     ) -> FloatArray:
-        """Scale the columns of samples whose torque is beyond the level."""
+        """Return columns of torque as columns of readings: scaled beyond the level."""
         lost, clipped, level = self._spread(values, motion)
         slope = (lost / (1.0 - lost) if motion.tau is None else 0.0) - clipped
         return np.asarray((1.0 + slope * (np.abs(tau) > level))[:, :, np.newaxis] * columns)

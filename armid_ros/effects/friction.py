@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Friction that depends on velocity: viscous, Coulomb, and further laws."""
+"""Friction that depends on velocity: viscous, Coulomb, Stribeck, quadratic and thermal."""
 
 from __future__ import annotations
 
@@ -175,7 +175,7 @@ class ThermalFriction(JointLaw):
 
     @classmethod
     def as_change(cls) -> type[Effect]:
-        """Return the class that also has a change that is present from the beginning."""
+        """Return the class that also describes a change present from the beginning."""
         return ThermalChange
 
     def law(self, x: JointStates) -> tuple[FloatArray, ...]:
@@ -241,7 +241,7 @@ class TemperatureDependentFriction(Effect):
     lasting = True
 
     def __post_init__(self) -> None:
-        """Fill in the reference temperatures."""
+        """Set the default reference temperature of joints that have none."""
         super().__post_init__()
         known = dict.fromkeys(self.joints, _REFERENCE_TEMPERATURE) | dict(self.reference)
         object.__setattr__(self, 'reference', tuple(known.items()))
@@ -289,7 +289,7 @@ class TemperatureDependentFriction(Effect):
         return joint_columns(self, motion, warmer * motion.dq, warmer * direction(motion))
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
-        """Return dry friction of the extreme temperature, and its change at other ones."""
+        """Return dry friction at the temperature of most friction, and the change at others."""
         viscous, coulomb = scatter(self, values, arm.robot)
         if self.course is None:
             return Action()
@@ -303,7 +303,7 @@ class TemperatureDependentFriction(Effect):
         return Action(dry_friction=DryFriction(np.eye(len(level)), -level, level), torque=torque)
 
     def warmer(self, t: FloatArray, joints: tuple[str, ...]) -> FloatArray:
-        """Return T - T0 of all joints, zero without measurement, shape (N, n) [K]."""
+        """Return the joint temperatures minus T0, zero without measurement, shape (N, n) [K]."""
         if self.course is None:
             return np.zeros((np.size(t), len(joints)))
         known = dict(self.reference)

@@ -23,7 +23,7 @@ from scipy.spatial.transform import Rotation
 
 
 class _GravityEffect(Effect):
-    """An effect on the whole arm."""
+    """Base class of changes of gravity, which act on the whole arm."""
 
     changes_body = True
 
@@ -58,7 +58,7 @@ class GravityMagnitude(_GravityEffect):
         return np.asarray(arm.gravity_columns(motion) @ direction)
 
     def plausible(self, values: FloatArray, std: FloatArray, arm: Arm) -> bool:
-        """Return whether gravity keeps its direction, so that the base is not upside down."""
+        """Return whether gravity keeps its direction; a reversal is a tilt of the base."""
         return bool(values[0] > -np.linalg.norm(arm.robot.gravity))
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
@@ -70,7 +70,7 @@ class GravityMagnitude(_GravityEffect):
 @dataclass(frozen=True)
 class BaseTilt(_GravityEffect):
     """
-    Rotation of the base relative to the world that the model lacks.
+    Tilt of the robot base relative to the base of the model.
 
     The base is turned by the rotation vector (tilt_x, tilt_y) about two axes normal to gravity:
     the base's own x and y for a base that is upright in the model. A rotation about gravity has no
@@ -138,7 +138,7 @@ class GravityVector(_GravityEffect):
 
 
 def with_exact_vector(kinds: Sequence[type[Effect]]) -> list[type[Effect]]:
-    """Return kinds for a search, with the exact vector in place of a tilt next to a magnitude."""
+    """Return effect classes with BaseTilt replaced by GravityVector, if gravity may change too."""
     both = BaseTilt in kinds and GravityMagnitude in kinds
     return [GravityVector if both and kind is BaseTilt else kind for kind in kinds]
 

@@ -173,7 +173,7 @@ class InterfaceSlack(Attached):
         return values
 
     def shape_starts(self, unexplained: Unexplained, arm: Arm) -> tuple[FloatArray, ...]:
-        """Return the anchors and slacks that explain most of the residual."""
+        """Return the anchors and slacks that explain most of the residual, as start values."""
         rows = np.unique(np.linspace(0, len(unexplained.q) - 1, 400).astype(int))
         weight = unexplained.weight[rows, :, np.newaxis]
         basis = np.linalg.qr((unexplained.nuisance[rows] * weight).reshape(weight.size, -1))[0]
@@ -217,7 +217,7 @@ class InterfaceSlack(Attached):
 
 
 def _proposals(places: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return anchors (A, 3) and slacks (A,) around the positions of an attachment."""
+    """Return candidate anchors (A, 3) and slacks (A,) around positions of an attachment."""
     middle, spread = places.mean(axis=0), float(places.std(axis=0).max())
     directions = np.array(
         [direction for direction in product((-1.0, 0.0, 1.0), repeat=3) if any(direction)]

@@ -104,7 +104,7 @@ class TorqueMap:
         return bool(np.isfinite(self.lengths[2]))
 
     def given(self, torque: FloatArray) -> TorqueMap:
-        """Return the map with weights that reproduce torques at its points, shape (M,) [N m]."""
+        """Return the map fitted to given torques at its inducing points, shape (M,) [N m]."""
         return replace(self, weights=cho_solve(self._factor, torque))
 
     def torque(self, inputs: FloatArray) -> FloatArray:
@@ -124,13 +124,13 @@ class TorqueMap:
         return cho_factor(self._nearness(self.points) + np.diag(share))
 
     def _nearness(self, inputs: FloatArray) -> FloatArray:
-        """Return the kernel over s^2 between inputs and points, shape (..., M)."""
-        own, others = counted(inputs, self.knee), counted(self.points, self.knee)
+        """Return the kernel between inputs and inducing points, over s^2, shape (..., M)."""
+        own, others = (scaled_inputs(x, self.knee) for x in (inputs, self.points))
         difference = (own[..., np.newaxis, :] - others) / self.lengths
         return np.asarray(np.exp(-0.5 * np.sum(difference**2, axis=-1)))
 
     def document(self) -> dict[str, Any]:
-        """Return the entry for model.yaml, one line per point."""
+        """Return the entry of the map in model.yaml, with one line per inducing point."""
         rows = np.column_stack([self.points, self.weights, self.noise])
         return {
             'amplitude': float(self.amplitude),
@@ -142,7 +142,7 @@ class TorqueMap:
     @classmethod
     def of_document(cls, entry: Mapping[str, Any], joint: str) -> TorqueMap:
         """
-        Return the map of an entry written by `document`.
+        Return the map of an entry in model.yaml that `document` wrote.
 
         Raises
         ------
@@ -150,16 +150,18 @@ class TorqueMap:
             If the entry is invalid; the message names the joint and the fault.
 
         """
-        what = f"torque map of joint '{joint}'"
+        torque_map = f"torque map of joint '{joint}'"
         try:
             rows = [[float(x) for x in str(line).split()] for line in entry['points']]
             lengths = [np.inf if x is None else float(x) for x in entry['length_scales']]
             table = np.array(rows, dtype=float).reshape(len(rows), len(INPUTS) + 2)
         except (TypeError, ValueError) as error:
-            raise ModelError(f'{what}: {error}') from None
+            raise ModelError(f'{torque_map}: {error}') from None
         if not np.all(np.isfinite(table)) or np.any(np.isnan(lengths)):
-            raise ModelError(f'{what}: a number is not finite')
-        size, knee = (finite(entry[key], f'{key} of the {what}') for key in ('amplitude', 'knee'))
+            raise ModelError(f'{torque_map}: a number is not finite')
+        size, knee = (
+            finite(entry[key], f'{key} of the {torque_map}') for key in ('amplitude', 'knee')
+        )
         return cls(table[:, :3], table[:, 3], table[:, 4], np.array(lengths), size, knee)
 
 
@@ -214,11 +216,11 @@ class LearnedTorque(Effect):
         return replace(self, maps=maps)
 
     def torque(self, robot: Robot, q: FloatArray, dq: FloatArray) -> FloatArray:
-        """Return the torque of the maps, zero for other joints, shape (..., n) [N m]."""
+        """Return the learned torque of all joints, zero without a map, shape (..., n) [N m]."""
         tau = np.zeros(np.shape(q))
         if self.maps:
             loads = any(own.takes_load for own in self.maps)
-            load = weight(robot, q) if loads else np.zeros(np.shape(q))
+            load = holding_torque(robot, q) if loads else np.zeros(np.shape(q))
             inputs = np.stack([q, dq, load], axis=-1)
             for joint, own in zip(self.indices(robot.joints), self.maps, strict=True):
                 tau[..., joint] = own.torque(inputs[..., joint, :])
@@ -240,13 +242,13 @@ class LearnedTorque(Effect):
         return Action(link_torque=torque)
 
 
-def counted(inputs: FloatArray, knee: float) -> FloatArray:
+def scaled_inputs(inputs: FloatArray, knee: float) -> FloatArray:
     """Return inputs, (..., 3), with the velocity converted to the scale u of `TorqueMap`."""
     velocity = knee * np.arcsinh(inputs[..., 1] / knee)
     return np.stack([inputs[..., 0], velocity, inputs[..., 2]], axis=-1)
 
 
-def weight(robot: Robot, q: FloatArray) -> FloatArray:
+def holding_torque(robot: Robot, q: FloatArray) -> FloatArray:
     """Return the torque that holds the rigid body at rest, shape (..., n) [N m]."""
     flat = np.reshape(q, (-1, robot.n_joints))
     still = np.zeros_like(flat)

@@ -18,12 +18,12 @@ import numpy as np
 
 @dataclass(frozen=True)
 class _LinkBody(Effect):
-    """Ten inertial parameters about the frame of a link's joint, added to the link's own."""
+    """Base class of bodies added to links: ten inertial parameters in the joint's frame."""
 
     changes_body = True
 
     def parameters(self, robot: Robot) -> tuple[ParameterName, ...]:
-        """Names of the parameters; their units are the same on a prismatic joint."""
+        """Return the parameter names; the units are the same on a prismatic joint."""
         return tuple(
             ParameterName(q.name, owner, q.unit) for owner in self.owners for q in self.quantities
         )
@@ -33,7 +33,7 @@ class _LinkBody(Effect):
         return arm.body_columns(motion)[:, :, list(self.adds_to(arm.robot))]
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
-        """Return the robot with the parameters added to its links."""
+        """Return the robot whose links carry the added mass, first moments and inertia."""
         parameters = arm.robot.rigid_parameters.copy()
         parameters[list(self.adds_to(arm.robot))] += values
         return Action(robot=arm.robot.with_inertias(parameters))
@@ -86,7 +86,7 @@ class Payload(_LinkBody):
 
     @classmethod
     def as_change(cls) -> type[Effect]:
-        """Return the class for a change of the load."""
+        """Return the class for a change of the payload, whose mass may be negative."""
         return PayloadChange
 
     def plausible(self, values: FloatArray, std: FloatArray, arm: Arm) -> bool:
@@ -107,7 +107,7 @@ class Payload(_LinkBody):
         return not most * heaviest < np.maximum(aside, 0.0) ** 2
 
     def _weighs(self, values: FloatArray, std: FloatArray, arm: Arm) -> bool:
-        """Return whether a positive mass with its centre within the arm's length is possible."""
+        """Return whether the mass may be positive, with its centre within the arm's length."""
         if std[0] == 0.0:  # noqa: RUF069 - set exactly to zero if no motion identifies it, as for an inner link
             return bool(np.any(values[1:4]))
         places = [placement.translation for placement in arm.robot.model.jointPlacements]

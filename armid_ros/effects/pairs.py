@@ -20,7 +20,7 @@ import numpy as np
 
 @dataclass(frozen=True)
 class _Pairs(Effect):
-    """An effect on pairs of joints (i, k), which are consecutive in ``joints``."""
+    """Base class of effects on pairs of joints (i, k), which are consecutive in ``joints``."""
 
     def __post_init__(self) -> None:
         """Check that the joints are pairs."""
@@ -199,7 +199,7 @@ class TorqueCrosstalk(_Pairs, TorqueReading):
         return tuple(permutations(robot.joints, 2))
 
     def parameters(self, robot: Robot) -> tuple[ParameterName, ...]:
-        """Name the shares, each with the joint of the reading and the joint of the torque."""
+        """Return parameter names with the joint of the reading and the joint of the torque."""
         (quantity,) = self.quantities
         return tuple(
             ParameterName(

@@ -91,7 +91,7 @@ class Quantity:
 @dataclass(frozen=True)
 class Shape:
     """
-    One nonlinear parameter of the torque, per owner of an effect.
+    One nonlinear parameter of an effect, per joint or once for the arm.
 
     Attributes
     ----------
@@ -175,5 +175,5 @@ def written_units(unit: str) -> tuple[str, ...]:
 
 @lru_cache(maxsize=1024)
 def places_among(joints: tuple[str, ...], among: tuple[str, ...]) -> tuple[int, ...]:
-    """Return the indices of joints; cached, because streams repeat the call per sample."""
+    """Return the indices of joints among other joints; cached for calls in every sample."""
     return tuple(among.index(joint) for joint in joints)

@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Base classes of effects on the recording: on positions, or on torque readings.
+Base classes of effects that change recorded positions or recorded torques.
 
 A recording contains the readings of position sensors and of torque sensors. The torque that a
 model predicts for a recorded motion is
@@ -25,12 +25,12 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Displacing(Effect):
-    """Effect that displaces the links from the recorded motion."""
+    """Effect whose link positions differ from the recorded positions."""
 
     @abstractmethod
     def displacements(self, motion: Motion, arm: Arm) -> Displacement:
         """
-        Return true minus recorded motion per unit of each parameter.
+        Return the true minus the recorded motion, per unit of each parameter.
 
         Returns
         -------
@@ -40,7 +40,7 @@ class Displacing(Effect):
         """
 
     def columns(self, motion: Motion, arm: Arm) -> FloatArray:
-        """Return how torques change with the displacements, dtau/dtheta, shape (N, n, P)."""
+        """Return the change of torque due to the displacements, dtau/dtheta, (N, n, P)."""
         return arm.torque_change(motion, self.displacements(motion, arm))
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
@@ -77,7 +77,7 @@ class TorqueReading(Effect):
         self, values: FloatArray, motion: Motion, tau: FloatArray, columns: FloatArray
     ) -> FloatArray:
         """
-        Apply the derivative of the reading by the torque to columns, shape (N, n, Q).
+        Return columns of true torque as columns of torque readings, shape (N, n, Q).
 
         By default, the reading is linear in the torque, and `read` takes columns as well.
 
@@ -86,14 +86,14 @@ class TorqueReading(Effect):
 
     @abstractmethod
     def sensitivity(self, values: FloatArray, motion: Motion, tau: FloatArray) -> FloatArray:
-        """Differentiate the reading by the values, shape (N, n, P)."""
+        """Return the derivatives of the reading by the parameter values, shape (N, n, P)."""
 
     def memory(self, values: FloatArray) -> float:
         """Return the time span of the past torque on which the reading depends [s]."""
         return 0.0
 
     def columns(self, motion: Motion, arm: Arm) -> FloatArray:
-        """Return the derivative of the reading at the torque before the effect, (N, n, P)."""
+        """Return the derivatives of the reading by the parameters, shape (N, n, P)."""
         return self.sensitivity(arm.values_of(self), motion, arm.torque_before(self, motion))
 
     def action(self, values: FloatArray, arm: Arm) -> Action:

@@ -35,11 +35,11 @@ class Hysteresis:
     distance: FloatArray
 
     def start(self, dq: FloatArray) -> FloatArray:
-        """Return the springs' states after long motion at this velocity; zero at rest, (m,)."""
+        """Return the states after a long motion at a velocity; zero at rest, shape (m,)."""
         return np.asarray(np.sign(self.directions @ dq))
 
     def advance(self, state: FloatArray, dq: FloatArray) -> FloatArray:
-        """Return the state, (m,), after a displacement of the joints, (n,), in one direction."""
+        """Return the states, (m,), after a joint displacement, (n,), without a reversal."""
         travel = self.directions @ dq
         end = np.sign(travel)
         return np.asarray(end - (end - state) * np.exp(-np.abs(travel) / self.distance))

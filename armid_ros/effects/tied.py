@@ -28,7 +28,7 @@ from scipy.interpolate import CubicHermiteSpline
 @dataclass(frozen=True)
 class Tied(Attached):
     """
-    Base class of springs that tie an arm to moving points of another machine.
+    Base class of springs between an arm and moving points of another machine or person.
 
     Attributes
     ----------
@@ -137,7 +137,7 @@ def tied_effect(
     joints: Sequence[str] | None = None,
 ) -> Tied:
     """
-    Make a tied effect on the joints named, or on all that have a tie.
+    Make springs that tie given joints, or all joints with a tie, to another machine.
 
     Parameters
     ----------
@@ -183,7 +183,7 @@ def tied_effect(
 
 def tied_as_written(entry: Mapping[str, Any], robot: Robot) -> Tied:
     """
-    Make a tied effect from its entry in model.yaml.
+    Make the springs to another machine from their entry in model.yaml.
 
     Raises
     ------
@@ -214,7 +214,7 @@ def tied_as_written(entry: Mapping[str, Any], robot: Robot) -> Tied:
 @dataclass(frozen=True)
 class Partner:
     """
-    A second machine, and possible ties of the arm to it.
+    A second machine, and the springs that may tie the arm to it.
 
     Attributes
     ----------
@@ -232,6 +232,6 @@ class Partner:
     source: str = ''
 
     def tied(self, arm: Robot, joints: Sequence[str] | None = None, *, slack: bool) -> Effect:
-        """Make springs and dampers, or straps with slack, that tie joints of an arm, or all."""
+        """Make springs and dampers, or straps with slack, on given joints or on all tied ones."""
         name = (TiedSlack if slack else TiedInteraction).name
         return tied_effect(name, self.ties, self.source or self.robot.name, arm, joints)

@@ -21,7 +21,7 @@ from scipy.signal import butter, lfilter, sosfiltfilt
 
 @dataclass(frozen=True)
 class LateReading(TorqueReading):
-    """Late torque reading, with an error proportional to the rate of the torque."""
+    """Base class of late torque readings, whose error grows with the rate of the torque."""
 
     def columns(self, motion: Motion, arm: Arm) -> FloatArray:
         """
@@ -39,7 +39,7 @@ class LateReading(TorqueReading):
         return ((), *((joint,) for joint in robot.joints))
 
     def _owned(self, motion: Motion) -> list[list[int]]:
-        """Return the joints that share each delay: all joints, or one."""
+        """Return the indices of the joints that share each delay: all joints, or single ones."""
         joints = self.indices(motion.joints)
         return [[joint] for joint in joints] or [list(range(motion.n_joints))]
 
@@ -134,7 +134,7 @@ class TorqueLag(LateReading):
 
 
 def rate_of_change(t: FloatArray, x: FloatArray) -> FloatArray:
-    """Differentiate samples along the first axis."""
+    """Return the time derivative of samples along the first axis."""
     if len(t) < 2:
         raise ModelError(
             'delay, lag, elasticity and backlash depend on the rate of the torque: they need a '
@@ -145,7 +145,7 @@ def rate_of_change(t: FloatArray, x: FloatArray) -> FloatArray:
 
 def within_band(motion: Motion, x: FloatArray) -> FloatArray:
     """
-    Remove frequencies above the band of a motion from a signal computed from it.
+    Return a signal without frequencies above the band of the motion that it depends on.
 
     The second derivative of a torque contains the fourth derivative of the positions, in which
     noise dominates at high frequency. The filter runs forwards and backwards, without a time
@@ -166,18 +166,18 @@ def _sections(band_hz: float, rate_hz: float) -> FloatArray:
 
 
 def smoothed(motion: Motion) -> Motion:
-    """Remove frequencies above the band of a motion from q, dq and ddq."""
+    """Return a motion whose q, dq and ddq have no frequencies above its band."""
     q, dq, ddq = (within_band(motion, x) for x in (motion.q, motion.dq, motion.ddq))
     return replace(motion, q=q, dq=dq, ddq=ddq)
 
 
 def low_pass(t: FloatArray, x: FloatArray, lag: float) -> FloatArray:
     """
-    Filter evenly spaced samples, T dy/dt + y = x, from an initial state of constant rate.
+    Return samples behind a first-order low-pass, T dy/dt + y = x.
 
-    The filter is computed as y = x - T v, where v is the filtered rate of x, and the rate is
-    linear between samples. It is of second order in the step for any ratio of lag and step. A
-    negative lag advances the signal.
+    Samples are evenly spaced and begin at a constant rate. The filter is computed as y = x - T v,
+    where v is the filtered rate of x, and the rate is linear between samples. It is of second
+    order in the step for any ratio of lag and step. A negative lag advances the signal.
 
     """
     rate = rate_of_change(t, x)
@@ -193,7 +193,7 @@ def low_pass(t: FloatArray, x: FloatArray, lag: float) -> FloatArray:
 
 
 def _by_owner(effect: TorqueReading, motion: Motion, values: FloatArray) -> FloatArray:
-    """Return the columns of sensitivities (N, n): one per joint, or one for the whole arm."""
+    """Return values (N, n) as columns: one column per joint, or one for the whole arm."""
     if effect.joints:
         return joint_columns(effect, motion, values)
     return values[:, :, np.newaxis]

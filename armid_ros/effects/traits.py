@@ -3,7 +3,7 @@
 """
 Descriptions and prior knowledge of the shipped effects, in one table.
 
-The classes of effects contain the law of the torque. This table contains texts, frequency of
+The classes of effects contain the equations of the torque. This table contains texts, frequency of
 occurrence, and the URDF attributes of the quantities.
 
 """
@@ -16,7 +16,7 @@ from dataclasses import dataclass
 @dataclass(frozen=True)
 class Traits:
     """
-    Texts and prior knowledge of an effect class, in addition to its torque law.
+    Texts and prior knowledge of an effect class, in addition to its equations.
 
     Attributes
     ----------

@@ -46,7 +46,7 @@ class JointElasticity(Displacing):
     instantaneous = False
 
     def displacements(self, motion: Motion, arm: Arm) -> Displacement:
-        """Return minus the torque that twists the transmission, with its time derivatives."""
+        """Return the link displacement per compliance: minus the torque on the transmission."""
         load = within_band(motion, arm.load(motion))
         (retardation,) = scatter(self, self.shape_values, arm.robot)
         for joint in np.flatnonzero(retardation):
@@ -91,7 +91,7 @@ class Backlash(Displacing):
     instantaneous = False
 
     def displacements(self, motion: Motion, arm: Arm) -> Displacement:
-        """Return the negative motor position in the gap, as a share, and its time derivatives."""
+        """Return the link displacement per backlash: minus the share of the gap."""
         load = arm.load(motion)
         inertia = np.diagonal(arm.load_derivatives(motion)[2], axis1=1, axis2=2)
         place = np.zeros(motion.q.shape)
@@ -112,7 +112,7 @@ class Backlash(Displacing):
 
 
 def place_in_gap(t: FloatArray, pull: FloatArray, width: float) -> FloatArray:
-    """Return the position of a body in the backlash, accelerated between its stops, (N,)."""
+    """Return the position of a body that a given acceleration moves within a gap, (N,)."""
     speed = cumulative_trapezoid(pull, t, initial=0.0)
     way = cumulative_trapezoid(speed, t, initial=0.0)
     times, speeds, ways = t.tolist(), speed.tolist(), way.tolist()
@@ -136,7 +136,7 @@ def place_in_gap(t: FloatArray, pull: FloatArray, width: float) -> FloatArray:
 
 
 def _twist(effect: Displacing, motion: Motion, twist: FloatArray) -> Displacement:
-    """Return link displacements by twists, (N, n), with their time derivatives, by parameter."""
+    """Return the link displacement of each parameter for twists of transmissions, (N, n)."""
     speed = rate_of_change(motion.t, twist)
     parts = (-twist, -speed, -rate_of_change(motion.t, speed))
     return Displacement(*(joint_columns(effect, motion, part) for part in parts))

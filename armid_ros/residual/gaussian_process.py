@@ -14,7 +14,7 @@ from __future__ import annotations
 from typing import NamedTuple
 import warnings
 
-from armid_ros.effects.learned import counted, TorqueMap
+from armid_ros.effects.learned import scaled_inputs, TorqueMap
 from armid_ros.motion import FloatArray
 from armid_ros.residual.rows import JointRows
 import numpy as np
@@ -64,7 +64,7 @@ def learn_map(rows: JointRows, rng: np.random.Generator) -> tuple[TorqueMap, Flo
         means = MiniBatchKMeans(
             count, n_init=1, random_state=int(rng.integers(2**31)), batch_size=1024
         )
-        inputs = counted(rows.inputs, knee)
+        inputs = scaled_inputs(rows.inputs, knee)
         labels = np.asarray(means.fit_predict(inputs / _span(inputs)), dtype=np.intp)
         cells = _cells(rows, labels, everywhere)
         evidence, scales = _fitted(cells, knee)
@@ -113,7 +113,7 @@ def _fitted(cells: _Cells, knee: float) -> tuple[float, _Scales]:
     smooth = kernels.ConstantKernel(1.0, amplitudes) * kernels.RBF([0.3, 0.3, 1.0], _LENGTHS)
     # bounds of the noise variance of a cell, over the mean square of the residual
     regressor = GaussianProcessRegressor(smooth + kernels.WhiteKernel(0.1, (1e-6, 2.0)))
-    points = counted(cells.points, knee)
+    points = scaled_inputs(cells.points, knee)
     span = _span(points)
     # a hundred points suffice for the scales; the order of cells is arbitrary
     some = slice(None, None, max(1, len(points) // 100))

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.data.trajectory import Trajectory
-from armid_ros.effects.learned import weight
+from armid_ros.effects.learned import holding_torque
 from armid_ros.motion import FloatArray
 import numpy as np
 import numpy.typing as npt
@@ -73,7 +73,7 @@ def joint_rows(arm: ArmModel, data: Sequence[Trajectory]) -> list[JointRows]:
     """
     links = [arm.link_motion(part.at_rows) for part in data]
     q, dq = (np.concatenate([getattr(link, name) for link in links]) for name in ('q', 'dq'))
-    inputs = np.stack([q, dq, weight(arm.body, q)], axis=-1)
+    inputs = np.stack([q, dq, holding_torque(arm.body, q)], axis=-1)
     residual = np.concatenate([part.residual(arm) for part in data])
     informative = np.concatenate([part.informative for part in data])
     result = []

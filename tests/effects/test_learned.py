@@ -5,7 +5,7 @@
 from armid_ros.arm import ArmModel, load_model, save_model
 from armid_ros.arm.testing import CHECKS, EffectCase, sines
 from armid_ros.effects import CATALOGUE
-from armid_ros.effects.learned import LearnedTorque, TorqueMap, weight
+from armid_ros.effects.learned import holding_torque, LearnedTorque, TorqueMap
 from armid_ros.errors import ModelError
 from armid_ros.model import inverse_dynamics
 from armid_ros.motion import Motion
@@ -68,8 +68,8 @@ def test_the_load_is_what_holds_the_arm_where_it_is(robot):
     motion = sines(robot)
     still = np.zeros_like(motion.q)
     held = inverse_dynamics(robot, Motion(motion.joints, motion.t, motion.q, still, still))
-    np.testing.assert_allclose(weight(robot, motion.q), held, atol=1e-12)
-    np.testing.assert_allclose(weight(robot, motion.q[3]), held[3], atol=1e-12)
+    np.testing.assert_allclose(holding_torque(robot, motion.q), held, atol=1e-12)
+    np.testing.assert_allclose(holding_torque(robot, motion.q[3]), held[3], atol=1e-12)
 
 
 def test_a_file_keeps_it_to_the_last_digit_that_matters(robot, learned, tmp_path):
