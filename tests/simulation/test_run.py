@@ -179,10 +179,6 @@ def test_a_joint_that_moves_nothing_cannot_be_simulated():
 class Pushing(Controller):
     """Always more of what there is."""
 
-    def feedforward(self, desired):
-        """Return no torque."""
-        return np.zeros_like(desired.q)
-
     def torque(self, q, dq, desired, feedforward):
         """Return torque along the velocity."""
         return 1e3 * dq + 1.0

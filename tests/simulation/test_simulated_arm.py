@@ -119,10 +119,7 @@ def bad_trajectories(joints):
     coasting[1, 2] = 0.5
     return [
         (Reference(joints, 0.2 * t, rushed, still), rf"'{joints[3]}'.*velocity"),
-        (
-            Reference(joints, t, home, coasting),
-            rf"velocity at the end.*'{joints[2]}' is 0.5 rad/s",
-        ),
+        (Reference(joints, t, home, coasting), rf"at the end.*'{joints[2]}' is 0.5 rad/s"),
         (Reference(joints, t, home, coasting[::-1]), rf"velocity step.*'{joints[2]}'"),
         (Reference(joints, t, home + 0.1, still), r'0\.1 rad.*later'),
         (Reference(joints[:-1], t, home[:, :-1]), f"'{joints[-1]}'"),
