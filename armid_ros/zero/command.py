@@ -21,7 +21,7 @@ _SCENE_OPTIONS = ('joint_limits', 'velocity', 'clearance', 'floor', 'environment
 @click.group(epilog='Example: armid zero plan --robot ur5.urdf --out plan')
 def zero() -> None:
     """
-    Find torque zeros and gains, tilt of the base and tool from an arm at rest.
+    Find torque sensor zeros and gains, base tilt and tool from an arm at rest.
 
     plan writes a trajectory of static poses, each reached from both sides, for
     excitation_publisher. fit estimates the quantities from the rests of a recording. It takes the
@@ -50,7 +50,7 @@ def zero() -> None:
 def plan(
     robot_source: str, gravity: str, joints: str | None, out: Path, as_json: bool, **given: Any
 ) -> None:
-    """Plan static poses and a tour through them, as a trajectory of armid excite."""
+    """Plan a trajectory that rests in static poses, for excitation_publisher."""
     from armid_ros.api.excitation import ExcitationResult
     from armid_ros.cli import options
     from armid_ros.excitation import CollisionScene, with_joint_limits
@@ -87,8 +87,8 @@ plan.params += [one for one in excite.params if one.name in _SCENE_OPTIONS]
     '--known',
     type=click.Choice(['gain', 'tilt', 'tool']),
     multiple=True,
-    help='Held at the described value: gains of 1, no tilt, no tool; may be given several times. '
-    'With known gains, the size of gravity is fitted.',
+    help='Quantity that is known and not fitted: gains of 1, no tilt, no tool; may be given '
+    'several times. With known gains, the size of gravity is fitted.',
 )
 @click.option(
     '--link-error',

@@ -49,7 +49,7 @@ _REMEDY = 'record a run of armid zero plan'
 @dataclass(frozen=True)
 class FittedQuantity:
     """
-    Fitted quantity with the half-width of its 95 % interval, 0 for a fixed quantity.
+    Fitted quantity with the half-width of its 95 % interval, 0 for a known quantity.
 
     The joint is empty for a quantity of the whole arm. The reason why the quantity is not
     determined ends with a remedy; it is empty for a determined one.
@@ -67,7 +67,7 @@ class FittedQuantity:
 @dataclass(frozen=True)
 class ZeroFit:
     """
-    Fit of an arm to K rests.
+    Result of a fit of zeros, gains, gravity and tool to K rests of an arm.
 
     Attributes
     ----------
@@ -94,11 +94,11 @@ class ZeroFit:
     outliers: int
 
     def of(self, name: str, joint: str = '') -> FittedQuantity:
-        """Return a quantity by its name and joint."""
+        """Return the fitted quantity of a name and a joint, which is empty for the whole arm."""
         return next(one for one in self.quantities if (one.name, one.joint) == (name, joint))
 
     def model(self) -> ArmModel:
-        """Return the arm with the determined effects but no friction; the tool is a point mass."""
+        """Return the arm with all determined effects but friction; the tool is a point mass."""
         arm = ArmModel(self.arm.robot)
         for effect, values in zip(self.arm.effects, self.arm.values, strict=True):
             if effect.name == 'payload' and values[0] > 0.0:
@@ -112,7 +112,7 @@ class ZeroFit:
 
 
 def arm_at_rest(robot: Robot, known: Collection[str] = ()) -> ArmModel:
-    """Return an arm at rest with the effects to fit; known gains add the size of gravity."""
+    """Return a quasi-static arm with the effects to fit; known gains add gravity magnitude."""
     names = ['payload', 'base_tilt', 'coulomb_friction', 'torque_offset', 'torque_gain']
     if 'gain' in known and 'tilt' not in known:
         names.append('gravity_magnitude')
@@ -125,7 +125,7 @@ def arm_at_rest(robot: Robot, known: Collection[str] = ()) -> ArmModel:
 
 def quantities_of(arm: ArmModel) -> dict[tuple[str, str, str], float]:
     """
-    Return the quantities of a fitted arm by name, joint and unit.
+    Return zeros, gains, friction, gravity and tool of a fitted arm by name, joint and unit.
 
     A zero is the reading without any torque. The centre of the tool is in the frame of the last
     joint.
@@ -156,7 +156,7 @@ def fit_rests(
     link_error: float = 0.0,
 ) -> ZeroFit:
     """
-    Fit an arm at rest.
+    Fit zeros, gains, gravity, tool and friction to the rests of recordings.
 
     Parameters
     ----------
@@ -205,24 +205,24 @@ def fit_rests(
 def _predicted(
     arms: Sequence[ArmModel], rests: Sequence[Motion], x: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Return readings (K, n) and sensitivities (K, n, P) for a change of all parameters."""
+    """Return torques (K, n) and derivatives (K, n, P) for parameters changed by x."""
     pairs = [(a.with_theta(a.theta + x), motion) for a, motion in zip(arms, rests, strict=True)]
     torque = np.concatenate([arm.torque(motion) for arm, motion in pairs])
     return torque, np.concatenate([arm.columns(motion) for arm, motion in pairs])
 
 
 def _approached(rests: Sequence[Motion]) -> npt.NDArray[np.bool_]:
-    """Return which readings follow an approach; the others only bound dry friction."""
+    """Return the mask (K, n) of readings after a motion of the joint."""
     return np.concatenate([one.dq for one in rests]).astype(bool)
 
 
 class _Solution(NamedTuple):
     """
-    Change x of all parameters (P,), and indices of the F free ones.
+    Solution of the fit: change x of all P parameters, indices and covariance of F free ones.
 
-    Covariances (F, F) from the variances of joints and from the scatter of the rests,
-    information (F, F) without the prior, used readings (K, n), and the smallest number of
-    redundant readings of a joint.
+    Covariances (F, F) are from the variances of joints and from the scatter of the rests. The
+    information (F, F) is without the prior. Further values are the used readings (K, n), and the
+    smallest number of redundant readings of a joint.
 
     """
 
@@ -238,7 +238,7 @@ class _Solution(NamedTuple):
 def _solved(
     arms: Sequence[ArmModel], rests: Sequence[Motion], prior: FloatArray, scales: FloatArray
 ) -> _Solution:
-    """Solve by Gauss-Newton iterations; estimate variances and leave out outliers on the way."""
+    """Return the fit by Gauss-Newton iterations, with variances of joints and outliers found."""
     y, approached = np.concatenate([np.asarray(one.tau) for one in rests]), _approached(rests)
     x, free, used, sigma = np.zeros(len(prior)), np.flatnonzero(prior), approached, 0.02 * scales
     for _ in range(60):
@@ -268,7 +268,7 @@ def _solved(
 def _quantities(
     arm: ArmModel, solved: _Solution, units: Mapping[str, float], few: str
 ) -> tuple[FittedQuantity, ...]:
-    """Return the quantities of a fitted arm, with intervals; `few`: reason for all of them."""
+    """Return the fitted quantities with intervals; `few` is the reason if poses are too few."""
     factor = float(student.ppf(0.975, max(solved.freedom, 1.0)))
     middle, std = quantities_of(arm), np.sqrt(np.diag(solved.covariance))
     found, tool = [], True
@@ -295,7 +295,7 @@ def _quantities(
 
 
 def _reason(arm: ArmModel, solved: _Solution, slope: FloatArray, limit: float) -> str:
-    """Return why a quantity is undetermined, from its derivatives by the free parameters."""
+    """Return why a quantity is not determined, from its derivatives by free parameters."""
     std = np.sqrt(np.diag(solved.covariance))
     most = int(np.argmax(np.abs(slope) * std))
     correlation = np.abs(solved.covariance[most]) / std
@@ -317,7 +317,7 @@ def _reason(arm: ArmModel, solved: _Solution, slope: FloatArray, limit: float) -
 def fit_document(
     found: ZeroFit, known: Collection[str], link_error: float, external: bool
 ) -> dict[str, Any]:
-    """Return the content of zero.json."""
+    """Return the results of a fit as the content of zero.json."""
     gains = [one.value for one in found.quantities if one.name == 'gain' and not one.reason]
     links = f'links within {100.0 * link_error:g} %' if link_error else 'links as described'
     held = [links, *known]
@@ -344,7 +344,7 @@ def fit_document(
 
 
 def fit_summary(found: ZeroFit, document: dict[str, Any], step: str, noise: FloatArray) -> Summary:
-    """Return the summary of a fit with its next step; `noise` of a reading at rest, shape (n,)."""
+    """Return the terminal summary of a fit; `noise` is that of a reading at rest, shape (n,)."""
     names = ('zero', 'gain', 'friction')
     rows = [
         (joint, *(_cell(found.of(name, joint)) for name in names), f'{residual:.2g}')
@@ -393,7 +393,7 @@ def fit_summary(found: ZeroFit, document: dict[str, Any], step: str, noise: Floa
 
 
 def _cell(one: FittedQuantity) -> str:
-    """Write a quantity with its interval."""
+    """Return the text of a quantity with its interval, for a table."""
     if one.reason:
         return 'not det.'
     value, half = measured(one.value, one.half_width)

@@ -44,10 +44,10 @@ def plan_zero(
     seed: int = 0,
 ) -> ExcitationResult:
     """
-    Plan a tour with a rest of `hold` [s] in each pose after an approach from each free side.
+    Plan a tour through static poses, with a rest of `hold` [s] after each approach.
 
-    `seed` is the seed of the random poses. TrajectoryError: too few poses are free, or no tour
-    is found.
+    The tour approaches each pose from each free side. `seed` is the seed of the random poses.
+    TrajectoryError: too few poses are free, or no tour is found.
 
     """
     arm, model, rng = ArmModel(robot), arm_at_rest(robot), np.random.default_rng(seed)
@@ -78,7 +78,7 @@ def _poses(
     rng: np.random.Generator,
 ) -> FloatArray:
     """
-    Return free poses of a model, shape (count, n), ordered for a short tour.
+    Return the most informative free poses, shape (count, n), in the order of a short tour.
 
     The determinant of the information on all effects is maximised, pose by pose and then by
     exchange. Source: Fedorov 1972.
@@ -119,7 +119,7 @@ def _poses(
 def _tour(
     planner: TransferPlanner, limits: Limits, poses: FloatArray, hold: float
 ) -> FourierTrajectory:
-    """Return the tour through the poses that can be reached, without motions that are not free."""
+    """Return a closed tour through all poses that can be reached."""
     rate, smoothing = 20.0, 0.5  # [Hz], and standard deviation of the filter [s]
     # the filter moves the arm for three standard deviations at either end of a rest
     count = round((hold + 6.0 * smoothing) * rate)

@@ -17,7 +17,7 @@ _WINDOW, _SETTLING_TIME, _MIN_REST = 1.0, 0.5, 0.5
 
 
 def reading_noise(recording: Recording) -> FloatArray:
-    """Return the noise of the mean torque of the shortest rest, if it is white, shape (n,)."""
+    """Return the noise of a torque averaged over the shortest rest, shape (n,) [N m or N]."""
     assert recording.tau is not None
     count = max(_MIN_REST / max(recording.period, 1e-6), 1.0)
     # the median leaves out steps of friction; for white noise it is 0.954 standard deviations
@@ -27,7 +27,7 @@ def reading_noise(recording: Recording) -> FloatArray:
 
 def find_rests(recording: Recording) -> Motion:
     """
-    Return the K rests of a recording as samples, with their start times.
+    Return the K rests of a recording as K samples of position and torque.
 
     Position and torque are means over a rest. The velocity is the direction of the approach of a
     joint, 1 or -1, or 0 if the joint hardly moved since the previous rest.
