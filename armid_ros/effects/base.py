@@ -143,7 +143,7 @@ class Effect(ABC):
         return cls._possible_joints(robot)
 
     def in_usual_place(self, robot: Robot) -> bool:
-        """Return whether the effect is on its default joints; see `on`."""
+        """Return whether the effect acts on its default joints only; see `on`."""
         default = self._default_joints(robot)
         return bool(self.joints) == bool(default) and set(self.joints) <= set(default)
 
@@ -272,11 +272,11 @@ class Effect(ABC):
         return ()
 
     def along(self, motion: Motion) -> Self:
-        """Return the effect with the signals of a recording that it needs, as temperatures."""
+        """Return the effect with recorded signals that it needs, such as temperatures."""
         return self
 
     def referred_to(self, temperatures: Mapping[str, float]) -> Self:
-        """Return the effect with reference temperatures of joints [degC], if it has any."""
+        """Return the effect with given reference temperatures [degC], if it depends on them."""
         return self
 
     @abstractmethod
@@ -382,14 +382,14 @@ class Arm(Protocol):
 
     @property
     def robot(self) -> Robot:
-        """The robot as described."""
+        """Robot as in its description, without effects."""
 
     @property
     def body(self) -> Robot:
         """Return the rigid body with effects, such as a payload or a changed gravity."""
 
     def values_of(self, effect: Effect) -> FloatArray:
-        """Return the values of an effect, shape (P_e,)."""
+        """Return the parameter values of an effect, shape (P_e,)."""
 
     def action(self) -> Action:
         """Return the action of all effects together."""

@@ -90,7 +90,7 @@ _EFFECTS: tuple[type[Effect], ...] = (
 
 class Catalogue(Mapping[str, type[Effect]]):
     """
-    Classes of effects by name, the shipped ones first.
+    Mapping from names to effect classes, the shipped effects first.
 
     Attributes
     ----------

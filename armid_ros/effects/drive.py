@@ -36,7 +36,7 @@ class RotorInertia(Effect):
         return joint_columns(self, motion, motion.ddq)
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
-        """Return an action with the rotor inertias on the diagonal of the inertia matrix."""
+        """Return the action on the plant: rotor inertias on the diagonal of the inertia matrix."""
         (inertia,) = scatter(self, values, arm.robot)
         return Action(inertia=np.diag(inertia))
 
@@ -93,7 +93,7 @@ class TorqueRipple(JointLaw):
         return bool(np.all(self.shape_values > 1.05 * _MIN_RIPPLE_ORDER))
 
     def law(self, x: JointStates) -> tuple[FloatArray, ...]:
-        """Return sin(n q) and cos(n q) [-]."""
+        """Return the torque per unit of amplitude, sin(n q) and cos(n q) [-]."""
         angle = self.shape_values[:, 0] * x.q
         return np.sin(angle), np.cos(angle)
 
@@ -194,7 +194,7 @@ class ActuatorSaturation(TorqueReading):
         return (np.outer(highest, [0.3, 0.4, *np.linspace(0.5, 0.95, 10)]),)
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
-        """Return an action with the torque that drives lose and the torque that they report."""
+        """Return the action on the drives: lost torque, and torque that is not reported."""
         lost = scatter(self, values, arm.robot)[0]
         (level,) = scatter(self, self.shape_values, arm.robot)
 
@@ -215,7 +215,7 @@ class ActuatorSaturation(TorqueReading):
     def transfer(
         self, values: FloatArray, motion: Motion, tau: FloatArray, columns: FloatArray
     ) -> FloatArray:
-        """Return columns of torque as columns of readings: scaled beyond the level."""
+        """Return regressor columns of true torque as readings: scaled beyond the level."""
         lost, clipped, level = self._spread(values, motion)
         slope = (lost / (1.0 - lost) if motion.tau is None else 0.0) - clipped
         return np.asarray((1.0 + slope * (np.abs(tau) > level))[:, :, np.newaxis] * columns)

@@ -39,7 +39,7 @@ class ViscousFriction(Effect):
         return joint_columns(self, motion, motion.dq)
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
-        """Return an action with the damping matrix."""
+        """Return the action on the plant: a damping matrix."""
         (viscous,) = scatter(self, values, arm.robot)
         return Action(damping=np.diag(viscous))
 
@@ -65,7 +65,7 @@ class CoulombFriction(Effect):
         return joint_columns(self, motion, direction(motion))
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
-        """Return an action with dry friction between -Fc and Fc."""
+        """Return the action on the plant: dry friction between -Fc and Fc."""
         (coulomb,) = scatter(self, values, arm.robot)
         return Action(dry_friction=DryFriction(np.eye(len(coulomb)), -coulomb, coulomb))
 
@@ -99,7 +99,7 @@ class AsymmetricFriction(JointLaw):
         return bool(np.all(shift <= known + MIN_Z_SCORE * doubt))
 
     def law(self, x: JointStates) -> tuple[FloatArray, ...]:
-        """Return |sign(dq)| and |dq|."""
+        """Return the torque per unit of dFc and dFv, |sign(dq)| and |dq|."""
         return x.forwards**2, x.forwards * x.dq
 
 
@@ -121,7 +121,7 @@ class QuadraticFriction(JointLaw):
     quantities = (Quantity('quadratic_coefficient', 'N m s^2/rad^2', typical=(0.0004, 1.0)),)
 
     def law(self, x: JointStates) -> tuple[FloatArray, ...]:
-        """Return dq |dq| [rad^2/s^2]."""
+        """Return the torque per unit of Fq, dq |dq| [rad^2/s^2]."""
         return (x.dq * np.abs(x.dq),)
 
 
@@ -148,7 +148,7 @@ class StribeckFriction(JointLaw):
     holds_at_rest = True
 
     def law(self, x: JointStates) -> tuple[FloatArray, ...]:
-        """Return exp(-|dq / vs|^d) sign(dq) [-]."""
+        """Return the torque per unit of dFs, exp(-|dq / vs|^d) sign(dq) [-]."""
         velocity, exponent = self.shape_values.T
         return (np.exp(-(np.abs(x.dq / velocity) ** exponent)) * x.forwards,)
 
@@ -179,7 +179,7 @@ class ThermalFriction(JointLaw):
         return ThermalChange
 
     def law(self, x: JointStates) -> tuple[FloatArray, ...]:
-        """Return (1 - exp(-t / T)) dq [rad/s]."""
+        """Return the torque per unit of dFv, (1 - exp(-t / T)) dq [rad/s]."""
         return (-np.expm1(-x.t / self.shape_values[:, 0]) * x.dq,)
 
 
@@ -196,11 +196,11 @@ class ThermalChange(ThermalFriction):
     quantities = (*ThermalFriction.quantities, replace(*ViscousFriction.quantities, lower=-np.inf))
 
     def law(self, x: JointStates) -> tuple[FloatArray, ...]:
-        """Return (1 - exp(-t / T)) dq and dq [rad/s]."""
+        """Return the torque per unit of dFv and c, (1 - exp(-t / T)) dq and dq [rad/s]."""
         return *super().law(x), x.dq
 
     def named_as(self, values: FloatArray, arm: Arm) -> tuple[tuple[Effect, FloatArray], ...]:
-        """Return thermal_friction and viscous_friction with their values."""
+        """Return the equivalent thermal_friction and viscous_friction with their values."""
         change, first = values.reshape(-1, 2).T
         return (
             (ThermalFriction(self.joints, self.shape), change),
@@ -289,7 +289,7 @@ class TemperatureDependentFriction(Effect):
         return joint_columns(self, motion, warmer * motion.dq, warmer * direction(motion))
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
-        """Return dry friction at the temperature of most friction, and the change at others."""
+        """Return the action on the plant: dry friction and the torque of changed friction."""
         viscous, coulomb = scatter(self, values, arm.robot)
         if self.course is None:
             return Action()

@@ -62,7 +62,7 @@ class GravityMagnitude(_GravityEffect):
         return bool(values[0] > -np.linalg.norm(arm.robot.gravity))
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
-        """Return the robot under the changed gravity."""
+        """Return the action on the plant: the robot under the changed gravity."""
         gravity = arm.robot.gravity
         return Action(robot=arm.robot.with_gravity(gravity + values[0] * _unit(gravity)))
 
@@ -97,7 +97,7 @@ class BaseTilt(_GravityEffect):
         return np.asarray(arm.gravity_columns(motion) @ np.transpose(turned))
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
-        """Return the robot with gravity in the frame of the tilted base."""
+        """Return the action on the plant: the robot with gravity as its tilted base sees it."""
         return Action(robot=arm.robot.with_gravity(_turned(arm.robot.gravity, values)))
 
 
@@ -116,15 +116,15 @@ class GravityVector(_GravityEffect):
     quantities = tuple(Quantity(f'gravity_difference_{axis}', 'm/s^2') for axis in 'xyz')
 
     def columns(self, motion: Motion, arm: Arm) -> FloatArray:
-        """Return dtau/dg of the base's axes [N m per m/s^2], shape (N, n, 3)."""
+        """Return dtau/dg along the axes of the base [N m per m/s^2], shape (N, n, 3)."""
         return arm.gravity_columns(motion)
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
-        """Return the robot with the changed gravity."""
+        """Return the action on the plant: the robot with the changed gravity vector."""
         return Action(robot=arm.robot.with_gravity(arm.robot.gravity + values))
 
     def named_as(self, values: FloatArray, arm: Arm) -> tuple[tuple[Effect, FloatArray], ...]:
-        """Return base_tilt and gravity_magnitude with their values."""
+        """Return the equivalent base_tilt and gravity_magnitude with their values."""
         before = np.array(arm.robot.gravity)
         after = before + values
         lengths = np.linalg.norm(before), np.linalg.norm(after)
@@ -150,6 +150,7 @@ def _turned(gravity: FloatArray, tilt: FloatArray) -> FloatArray:
 
 
 def _unit(gravity: FloatArray) -> FloatArray:
+    """Return the direction of gravity; raise a ModelError without gravity."""
     length = np.linalg.norm(gravity)
     if not length > 0.0:
         raise ModelError('an effect of gravity cannot act, as the gravity of the model is zero')
@@ -157,7 +158,7 @@ def _unit(gravity: FloatArray) -> FloatArray:
 
 
 def _horizontal_axes(gravity: FloatArray) -> FloatArray:
-    """Return two unit vectors normal to gravity, rows; x and y when it points along -z."""
+    """Return two unit vectors normal to gravity as rows: x and y if gravity is along -z."""
     down = _unit(gravity)
     upright, _ = Rotation.align_vectors([-down], [[0.0, 0.0, 1.0]])
     return np.asarray(upright.apply(np.eye(3)[:2]))

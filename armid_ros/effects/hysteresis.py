@@ -38,7 +38,7 @@ class LoadDependentFriction(Effect):
         return joint_columns(self, motion, np.abs(load) * direction(motion))
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
-        """Return dry friction whose upper and lower level depend on the load."""
+        """Return the action on the plant: dry friction with levels that depend on the load."""
         (share,) = scatter(self, values, arm.robot)
         zero = np.zeros_like(share)
         return Action(dry_friction=DryFriction(np.eye(len(share)), zero, zero, share))
@@ -68,7 +68,7 @@ class PreslidingHysteresis(Effect):
     instantaneous = False
 
     def columns(self, motion: Motion, arm: Arm) -> FloatArray:
-        """Return dtau/dF = h [-] from the whole motion, shape (N, n, P)."""
+        """Return dtau/dF = h [-], which depends on the whole motion, shape (N, n, P)."""
         columns = np.zeros((*motion.q.shape, len(self.joints)))
         states = self._elements(np.ones(len(self.joints)), motion.joints).along(
             motion.q, motion.dq
@@ -78,7 +78,7 @@ class PreslidingHysteresis(Effect):
         return columns
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
-        """Return an action with the friction as its `hysteresis`."""
+        """Return the action on the plant: friction with hysteresis."""
         return Action(hysteresis=self._elements(values, arm.robot.joints))
 
     def _elements(self, level: FloatArray, joints: tuple[str, ...]) -> Hysteresis:

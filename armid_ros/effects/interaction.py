@@ -43,7 +43,7 @@ class Attached(Effect):
         return robot.moving
 
     def _default_shape(self, robot: Robot) -> FloatArray:
-        """Attach to the centres of mass, no farther from a joint than the reach of the arm."""
+        """Return shape parameters that attach springs to the centres of mass, within reach."""
         values, model = self.shape_values, robot.model
         reach = max(float(np.linalg.norm(place.translation)) for place in model.jointPlacements)
         for row, joint in zip(values, self.joints, strict=True):
@@ -54,7 +54,7 @@ class Attached(Effect):
         return values
 
     def shape_starts(self, unexplained: Unexplained, arm: Arm) -> tuple[FloatArray, ...]:
-        """Return start values: present coordinates of points, and a grid for each other shape."""
+        """Return start values: present coordinates of points, and grids of other shapes."""
         return tuple(
             self.shape_values[:, [index]]
             if shape.unit == 'm' and shape.lower < 0.0
@@ -69,10 +69,10 @@ class Attached(Effect):
 
     @abstractmethod
     def _anchor(self, arm: Arm) -> Anchor:
-        """Return the anchors of the springs."""
+        """Return the function that gives the anchors of the springs at times."""
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
-        """Return an action with the torque of the springs."""
+        """Return the action on the links: the torque of the springs."""
         robot, anchor = arm.robot, self._anchor(arm)
 
         def torque(t: FloatArray, q: FloatArray, dq: FloatArray) -> FloatArray:
@@ -84,7 +84,7 @@ class Attached(Effect):
         return Action(link_torque=torque if np.any(values) else None)
 
     def columns(self, motion: Motion, arm: Arm) -> FloatArray:
-        """Return the torque per quantity of every spring, shape (N, n, P)."""
+        """Return the joint torque per unit of each quantity of every spring, shape (N, n, P)."""
         link = arm.link_motion(motion)
         return self._columns(arm.link_frames(motion), link.dq, *self._anchor(arm)(link.t))
 
@@ -92,7 +92,7 @@ class Attached(Effect):
     def _columns(
         self, frames: LinkFrames, dq: FloatArray, anchors: FloatArray, velocities: FloatArray
     ) -> FloatArray:
-        """Return the torque per quantity, shape (N, n, P), for motions of links and anchors."""
+        """Return the torque per unit of each quantity for link and anchor motions, (N, n, P)."""
 
 
 @dataclass(frozen=True)
@@ -165,7 +165,7 @@ class InterfaceSlack(Attached):
     )
 
     def _default_shape(self, robot: Robot) -> FloatArray:
-        """Put each anchor at its attachment in the middle of the range of motion."""
+        """Return shape parameters with anchors at the attachments in the middle pose."""
         values = super()._default_shape(robot)
         middle = LinkFrames.in_the_middle(robot)
         for row, joint in zip(values, self.joints, strict=True):

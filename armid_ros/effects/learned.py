@@ -108,11 +108,11 @@ class TorqueMap:
         return replace(self, weights=cho_solve(self._factor, torque))
 
     def torque(self, inputs: FloatArray) -> FloatArray:
-        """Return the torque at inputs of shape (..., 3) [N m]."""
+        """Return the learned torque at inputs, shape (..., 3) to (...) [N m or N]."""
         return np.asarray(self._nearness(inputs) @ self.weights)
 
     def std(self, inputs: FloatArray) -> FloatArray:
-        """Return the standard deviation of the torque at inputs of shape (..., 3) [N m]."""
+        """Return the standard deviation of the learned torque at inputs, (..., 3) to (...)."""
         near = self._nearness(inputs)
         solved = cho_solve(self._factor, near.reshape(-1, len(self.weights)).T).T
         explained = np.sum(near * solved.reshape(near.shape), axis=-1)
@@ -200,7 +200,7 @@ class LearnedTorque(Effect):
             )
 
     def particulars(self) -> dict[str, Any]:
-        """Return the maps for model.yaml."""
+        """Return the torque maps as entries for model.yaml."""
         rows = zip(self.joints, self.maps, strict=bool(self.maps))
         return {'maps': [{'joint': joint, **own.document()} for joint, own in rows]}
 
@@ -232,7 +232,7 @@ class LearnedTorque(Effect):
         return joint_columns(self, motion, self.torque(arm.body, link.q, link.dq))
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
-        """Return an action with the torque of the maps."""
+        """Return the action on the links: the torque of the maps."""
         (share,) = scatter(self, values, arm.robot)
         robot = arm.robot
 

@@ -33,7 +33,7 @@ class _LinkBody(Effect):
         return arm.body_columns(motion)[:, :, list(self.adds_to(arm.robot))]
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
-        """Return the robot whose links carry the added mass, first moments and inertia."""
+        """Return the action on the plant: the robot with mass and inertia added to its links."""
         parameters = arm.robot.rigid_parameters.copy()
         parameters[list(self.adds_to(arm.robot))] += values
         return Action(robot=arm.robot.with_inertias(parameters))

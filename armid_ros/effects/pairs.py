@@ -115,7 +115,7 @@ class CoupledJointFriction(_Pairs):
         return columns
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
-        """Return inertia and damping between the joints, and dry friction of the shaft."""
+        """Return the action on the plant: coupled inertia and damping, and dry shaft friction."""
         n = arm.robot.n_joints
         inertia, damping = np.zeros((n, n)), np.zeros((n, n))
         pairs = self.pairs(arm.robot.joints)
@@ -217,11 +217,11 @@ class TorqueCrosstalk(_Pairs, TorqueReading):
     def transfer(
         self, values: FloatArray, motion: Motion, tau: FloatArray, columns: FloatArray
     ) -> FloatArray:
-        """Return columns of true torques as columns of readings with crosstalk."""
+        """Return regressor columns of true torques as those of readings with crosstalk."""
         return np.asarray(columns + self._shares(values, motion) @ columns)
 
     def sensitivity(self, values: FloatArray, motion: Motion, tau: FloatArray) -> FloatArray:
-        """Return the torque of joint k in the row of joint i, shape (N, n, P)."""
+        """Return the derivatives of the readings: the torque of k in row i, shape (N, n, P)."""
         columns = np.zeros((*tau.shape, len(values)))
         for position, (i, k) in enumerate(self.pairs(motion.joints)):
             columns[:, i, position] = tau[:, k]

@@ -71,7 +71,7 @@ class Quantity:
 
     def largest(self, joint: str, robot: Robot) -> float:
         """
-        Return the largest size of the quantity on a joint of a robot, or on the whole arm (`''`).
+        Return the largest plausible size on a joint of a robot, or on the whole arm (`''`).
 
         The size is limited by the bounds, by the torque limit of the joint if described, and by a
         multiple of the typical size. It is inf without any of these limits.

@@ -44,7 +44,7 @@ class Displacing(Effect):
         return arm.torque_change(motion, self.displacements(motion, arm))
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
-        """Return an action with a displacement in proportion to the values."""
+        """Return the action on sensors: a displacement in proportion to the values."""
 
         def displacement(motion: Motion) -> Displacement:
             parts = self.displacements(motion, arm)
@@ -77,7 +77,7 @@ class TorqueReading(Effect):
         self, values: FloatArray, motion: Motion, tau: FloatArray, columns: FloatArray
     ) -> FloatArray:
         """
-        Return columns of true torque as columns of torque readings, shape (N, n, Q).
+        Return regressor columns of true torque as those of torque readings, (N, n, Q).
 
         By default, the reading is linear in the torque, and `read` takes columns as well.
 
@@ -97,7 +97,7 @@ class TorqueReading(Effect):
         return self.sensitivity(arm.values_of(self), motion, arm.torque_before(self, motion))
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
-        """Return an action with the function from true torque to reading."""
+        """Return the action on sensors: the function from true torque to reading."""
         if not np.any(values):
             return Action()
 

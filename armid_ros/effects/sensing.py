@@ -35,7 +35,7 @@ class TorqueOffset(Effect):
         return joint_columns(self, motion, np.ones_like(motion.q))
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
-        """Return an action with the constant torque."""
+        """Return the action on the plant: a constant torque."""
         (offset,) = scatter(self, values, arm.robot)
 
         def torque(t: FloatArray, q: FloatArray, dq: FloatArray) -> FloatArray:
@@ -60,13 +60,13 @@ class TorqueGain(TorqueReading):
     quantities = (Quantity('gain_error', '', lower=-0.95, typical=(0.005, 0.3)),)
 
     def read(self, values: FloatArray, motion: Motion, tau: FloatArray) -> FloatArray:
-        """Return the scaled torque, shape (N, n) [N m], or scaled columns."""
+        """Return the scaled torque, shape (N, n) [N m], or scaled regressor columns."""
         gain = np.ones(motion.n_joints)
         gain[self.indices(motion.joints)] += values
         return np.asarray(tau * gain.reshape(-1, *(1,) * (tau.ndim - 2)))
 
     def sensitivity(self, values: FloatArray, motion: Motion, tau: FloatArray) -> FloatArray:
-        """Return the torque [N m], shape (N, n, P)."""
+        """Return the derivative by the gain error: the torque [N m], shape (N, n, P)."""
         return joint_columns(self, motion, tau)
 
 
@@ -87,9 +87,8 @@ class TorqueDrift(TorqueReading):
     shapes = (Shape('drift_time', 's', 0.1, 1e5, 600.0, (10.0, 60.0, 300.0, 1000.0, 3000.0)),)
 
     def shape_starts(self, unexplained: Unexplained, arm: Arm) -> tuple[FloatArray, ...]:
-        """Return distinguishable time constants; above three recording lengths drift is a line."""
-        # time constants of a drift in a search, over the length of a recording; a faster drift is
-        # an offset
+        """Return start values of the time constant, in proportion to the recording length."""
+        # a faster drift is an offset, and a slower drift is a straight line
         times = np.maximum(
             float(np.ptp(unexplained.motion.t)) * np.array((0.3, 1.0, 3.0)), self.shapes[0].lower
         )
@@ -102,11 +101,11 @@ class TorqueDrift(TorqueReading):
     def transfer(
         self, values: FloatArray, motion: Motion, tau: FloatArray, columns: FloatArray
     ) -> FloatArray:
-        """Return the columns without change."""
+        """Return the regressor columns unchanged, as drift does not depend on the torque."""
         return columns
 
     def sensitivity(self, values: FloatArray, motion: Motion, tau: FloatArray) -> FloatArray:
-        """Return 1 - exp(-t / T) [-], shape (N, n, P)."""
+        """Return the derivative by the drift, 1 - exp(-t / T) [-], shape (N, n, P)."""
         constants = np.ones(motion.n_joints)
         constants[self.indices(motion.joints)] = self.shape_values[:, 0]
         return joint_columns(self, motion, -np.expm1(-motion.t[:, np.newaxis] / constants))

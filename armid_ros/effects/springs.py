@@ -36,7 +36,7 @@ class JointSpring(JointLaw):
     on_links = True
 
     def law(self, x: JointStates) -> tuple[FloatArray, ...]:
-        """Return the torque per unit of stiffness, q, and per unit of preload, 1."""
+        """Return the torque per unit of stiffness, which is q, and of preload, which is 1."""
         return x.q, np.ones_like(x.q)
 
     def plausible(self, values: FloatArray, std: FloatArray, arm: Arm) -> bool:
@@ -77,7 +77,7 @@ class SoftLimit(JointLaw):
         return np.where(known[:, np.newaxis], edges, self.shape_values)
 
     def shape_starts(self, unexplained: Unexplained, arm: Arm) -> tuple[FloatArray, ...]:
-        """Return positions near both ends of the recorded motion."""
+        """Return start positions of the bumpers near both ends of the recorded motion."""
         motion = unexplained.motion
         q = arm.link_motion(motion).q[:, self.indices(motion.joints)]
         lowest, highest = q.min(axis=0)[:, np.newaxis], q.max(axis=0)[:, np.newaxis]
@@ -86,6 +86,6 @@ class SoftLimit(JointLaw):
         return lowest + depth, highest - depth
 
     def law(self, x: JointStates) -> tuple[FloatArray, ...]:
-        """Return the signed compression of each bumper [rad]."""
+        """Return the torque per unit of stiffness: the signed compression of each bumper [rad]."""
         lower, upper = self.shape_values.T
         return -np.maximum(lower - x.q, 0.0), np.maximum(x.q - upper, 0.0)

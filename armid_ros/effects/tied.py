@@ -73,7 +73,7 @@ class Tied(Attached):
         return replace(self, anchor=lambda t: (curve(t), curve(t, 1)))
 
     def columns(self, motion: Motion, arm: Arm) -> FloatArray:
-        """Return the torque per quantity of every spring, shape (N, n, P)."""
+        """Return the joint torque per unit of each quantity of every spring, shape (N, n, P)."""
         return Attached.columns(self.along(motion), motion, arm)
 
     @property

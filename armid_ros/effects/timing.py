@@ -25,7 +25,7 @@ class LateReading(TorqueReading):
 
     def columns(self, motion: Motion, arm: Arm) -> FloatArray:
         """
-        Return the derivative of the reading, shape (N, n, P).
+        Return the derivatives of the late reading by the parameters, shape (N, n, P).
 
         The derivative is computed along a smoothed motion. The rate of a torque contains the third
         derivative of the positions, and noise in columns biases the values towards zero.
@@ -77,7 +77,7 @@ class TimeDelay(LateReading):
         return float(np.max(np.abs(values)))
 
     def read(self, values: FloatArray, motion: Motion, tau: FloatArray) -> FloatArray:
-        """Return the delayed torque, shape (N, n) [N m], or delayed columns."""
+        """Return the delayed torque, shape (N, n) [N m], or delayed regressor columns."""
         return self._delayed(values, motion, tau)
 
     def _delayed(
@@ -110,7 +110,7 @@ class TorqueLag(LateReading):
     instantaneous = False
 
     def read(self, values: FloatArray, motion: Motion, tau: FloatArray) -> FloatArray:
-        """Return the filtered torque, shape (N, n) [N m], or filtered columns."""
+        """Return the filtered torque, shape (N, n) [N m], or filtered regressor columns."""
         result = tau.copy()
         for lag, rows in zip(values, self._owned(motion), strict=True):
             if lag:
@@ -193,7 +193,7 @@ def low_pass(t: FloatArray, x: FloatArray, lag: float) -> FloatArray:
 
 
 def _by_owner(effect: TorqueReading, motion: Motion, values: FloatArray) -> FloatArray:
-    """Return values (N, n) as columns: one column per joint, or one for the whole arm."""
+    """Return derivatives (N, n) as columns: one for each joint, or one for the whole arm."""
     if effect.joints:
         return joint_columns(effect, motion, values)
     return values[:, :, np.newaxis]

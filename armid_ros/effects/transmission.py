@@ -46,7 +46,7 @@ class JointElasticity(Displacing):
     instantaneous = False
 
     def displacements(self, motion: Motion, arm: Arm) -> Displacement:
-        """Return the link displacement per compliance: minus the torque on the transmission."""
+        """Return the link displacement per unit of compliance: minus the torque on the spring."""
         load = within_band(motion, arm.load(motion))
         (retardation,) = scatter(self, self.shape_values, arm.robot)
         for joint in np.flatnonzero(retardation):
@@ -54,7 +54,7 @@ class JointElasticity(Displacing):
         return _twist(self, motion, load)
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
-        """Return springs and dampers, and their effect on motor encoder readings."""
+        """Return the action: springs and dampers, and the displacement of encoder readings."""
         (compliance,) = scatter(self, values, arm.robot)
         (retardation,) = scatter(self, self.shape_values, arm.robot)
         with np.errstate(divide='ignore'):
@@ -91,7 +91,7 @@ class Backlash(Displacing):
     instantaneous = False
 
     def displacements(self, motion: Motion, arm: Arm) -> Displacement:
-        """Return the link displacement per backlash: minus the share of the gap."""
+        """Return the link displacement per unit of backlash, as a share of the gap."""
         load = arm.load(motion)
         inertia = np.diagonal(arm.load_derivatives(motion)[2], axis1=1, axis2=2)
         place = np.zeros(motion.q.shape)
@@ -102,7 +102,7 @@ class Backlash(Displacing):
         return _twist(self, motion, place)
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
-        """Return the gaps, and their effect on motor encoder readings."""
+        """Return the action: gaps of transmissions, and the displacement of encoder readings."""
         (gap,) = scatter(self, values, arm.robot)
         if not np.any(values):
             return Action()

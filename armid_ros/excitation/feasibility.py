@@ -43,7 +43,7 @@ def trajectory_faults(
     clearance: ClearanceModel | None,
 ) -> Faults:
     """
-    Return the limits that a periodic trajectory exceeds, and the first two bodies too close.
+    Return the limits that a periodic trajectory exceeds, and two bodies that come too close.
 
     The check holds at and between all samples.
 

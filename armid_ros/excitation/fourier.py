@@ -134,12 +134,12 @@ class FourierTrajectory:
         return self.motion(np.arange(n_samples) * (self.period / n_samples))
 
     def with_margins(self, n_samples: int) -> Motion:
-        """Return the samples of one period, and `MARGIN` more before and after it."""
+        """Return the samples of one period, with `MARGIN` samples more before and after it."""
         step = self.period / n_samples
         return self.motion(np.arange(-MARGIN, n_samples + MARGIN) * step)
 
     def shifted(self, time: float) -> FourierTrajectory:
-        """Return the trajectory that starts a time [s] later on the same periodic motion."""
+        """Return the same periodic motion with its start later by a given time [s]."""
         angle = self.angular_frequency * time * np.arange(1, self.harmonics + 1)
         cosine, sine = np.cos(angle), np.sin(angle)
         a = self.a * cosine + self.b * sine

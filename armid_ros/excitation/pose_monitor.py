@@ -96,7 +96,7 @@ class PoseMonitor:
 
     @property
     def sources(self) -> int:
-        """Number of different joint name lists, one per sender."""
+        """Number of senders, which differ in the joint names of their messages."""
         return len(self._sources)
 
     def update(
@@ -171,7 +171,7 @@ class PoseMonitor:
         return self._sources[names]
 
     def contradiction(self, now: float, count: int = MIN_AGREEING) -> str:
-        """Return the latest reason if the last 0.5 s have many rejections; otherwise empty."""
+        """Return the latest reason if many positions were rejected in 0.5 s; otherwise empty."""
         recent = [
             fault for arrived, fault in self._rejections if now - arrived <= _REJECTION_WINDOW
         ]

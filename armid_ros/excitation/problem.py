@@ -95,7 +95,7 @@ class DesignSettings:
     time_budget: float = np.inf
 
     def __post_init__(self) -> None:
-        """Check the names and numbers."""
+        """Check the names of criterion and target, and the numbers."""
         for kind, name, known in (
             ('criterion', self.criterion, CRITERIA),
             ('target', self.target, TARGETS),
@@ -330,7 +330,7 @@ def torque_noise(arm: ArmModel, settings: DesignSettings) -> FloatArray:
 
 
 def _joined(arm: ArmModel, rival: ArmModel) -> ArmModel:
-    """Return the rival model with the effects that only the arm has added to it."""
+    """Return the rival model, extended by the effects that only the arm has."""
     known = {(effect.name, effect.joints) for effect in rival.effects}
     joined = replace(rival, robot=arm.robot)
     for effect, values in zip(arm.effects, arm.values, strict=True):
@@ -340,7 +340,7 @@ def _joined(arm: ArmModel, rival: ArmModel) -> ArmModel:
 
 
 def parameter_mask(arm: ArmModel, names: Collection[str]) -> npt.NDArray[np.bool_]:
-    """Return the mask of the parameters of the named effects, shape (P,)."""
+    """Return a mask of all parameters, shape (P,), that is True for named effects."""
     rigid = np.zeros(len(arm.robot.rigid_parameters), dtype=bool)
     named = [np.full(len(e.parameters(arm.robot)), e.name in names) for e in arm.effects]
     return np.concatenate([rigid, *named])

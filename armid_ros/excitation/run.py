@@ -167,7 +167,7 @@ def plan_run(
 def _unwound(
     excitation: Excitation, arm: ArmModel, limits: Limits, start: FloatArray
 ) -> Excitation:
-    """Return the excitation shifted by whole turns to be as near a start pose as limits allow."""
+    """Return the excitation with joints moved by whole turns towards a start pose, if allowed."""
     # A joint with a range of two turns reaches most poses at two positions. The path to one of the
     # two is often blocked, as the shoulder would hit the floor.
     trajectory = excitation.trajectory

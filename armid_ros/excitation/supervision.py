@@ -103,7 +103,7 @@ def tracking_fault(
     measured: FloatArray,
     tolerance: float,
 ) -> str:
-    """Return a message if a tracking error exceeds a tolerance, each (n,); otherwise empty."""
+    """Return a message if the tracking error of a joint exceeds a tolerance; otherwise empty."""
     error = measured - wanted
     worst = int(np.argmax(np.abs(error)))
     if abs(error[worst]) <= tolerance:

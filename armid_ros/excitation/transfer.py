@@ -153,12 +153,12 @@ class TransferPlanner:
 
     def free_start(self) -> FloatArray:
         """
-        Return `zero_pose`, or the nearest pose found that is free, shape (n,).
+        Return the zero pose, or the nearest allowed pose that was found, shape (n,).
 
         Raises
         ------
         TrajectoryError
-            If no pose about zero is free.
+            If no pose around zero is allowed.
 
         """
         zero = self.zero_pose

@@ -67,7 +67,7 @@ class LinearFeedback:
 
     @classmethod
     def of(cls, arm: ArmModel, **terms: Any) -> LinearFeedback:
-        """Return the feedback for the rigid body of an arm and the inertia of its effects."""
+        """Return a feedback law for the rigid body of an arm and the inertia of its effects."""
         action = arm.action()
         robot = action.robot or arm.robot
         none = np.zeros((robot.n_joints, robot.n_joints))

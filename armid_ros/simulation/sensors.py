@@ -66,7 +66,7 @@ class Sensors:
 
     @cached_property
     def _step(self) -> FloatArray | None:
-        """Step of the encoders, 1 where there is no quantisation; None without quantisation."""
+        """Encoder resolution, 1 for joints without quantisation; None if no joint has it."""
         resolution = np.asarray(self.resolution, dtype=float)
         return np.where(resolution > 0.0, resolution, 1.0) if resolution.any() else None
 
@@ -164,7 +164,7 @@ class RecentPast:
 
     def extend(self, trace: Trace) -> None:
         """
-        Add the samples of a trace.
+        Add the samples of a simulated trace.
 
         Torque is constant over a step. With rigid joints, the reading between two steps is the
         mean of their torques, because the acceleration jumps with the torque. With elastic joints,

@@ -238,7 +238,7 @@ class _Solution(NamedTuple):
 def _solved(
     arms: Sequence[ArmModel], rests: Sequence[Motion], prior: FloatArray, scales: FloatArray
 ) -> _Solution:
-    """Return the fit by Gauss-Newton iterations, with variances of joints and outliers found."""
+    """Fit by Gauss-Newton iterations, with estimated variances and without outliers."""
     y, approached = np.concatenate([np.asarray(one.tau) for one in rests]), _approached(rests)
     x, free, used, sigma = np.zeros(len(prior)), np.flatnonzero(prior), approached, 0.02 * scales
     for _ in range(60):

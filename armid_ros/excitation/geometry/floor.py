@@ -28,7 +28,7 @@ import numpy as np
 @dataclass(frozen=True)
 class LowestPoint:
     """
-    The lowest point of a motion.
+    Lowest point of all links during a motion: height, link and time.
 
     Attributes
     ----------
@@ -118,13 +118,13 @@ def link_heights(
 
 
 def vertical(gravity: FloatArray) -> FloatArray:
-    """Return the unit vector against gravity; z of the base without gravity."""
+    """Return the unit vector opposite to gravity; the z axis of the base without gravity."""
     size = float(np.linalg.norm(gravity))
     return np.asarray(-gravity / size) if size > 0.0 else np.array([0.0, 0.0, 1.0])
 
 
 def outline(shape: coal.CollisionGeometry) -> tuple[FloatArray, float]:
-    """Return points and a radius whose rounded hull holds a shape; no points if unbounded."""
+    """Return points and a radius whose spheres enclose a body; no points if it is unbounded."""
     if isinstance(shape, coal.Convex):
         return np.array(shape.points()), 0.0
     if isinstance(shape, coal.Sphere):
@@ -141,7 +141,7 @@ def outline(shape: coal.CollisionGeometry) -> tuple[FloatArray, float]:
 
 
 def _support(shape: coal.CollisionGeometry, direction: FloatArray) -> FloatArray:
-    """Return the extent of a shape along unit vectors in its frame, shape (N, 3) to (N,) [m]."""
+    """Return how far a body extends along unit vectors in its frame, (N, 3) to (N,) [m]."""
     if isinstance(shape, coal.Cylinder):
         axial = np.abs(direction[:, 2])
         radial = np.sqrt(np.maximum(1.0 - axial**2, 0.0))
@@ -161,7 +161,7 @@ NO_FLOOR = 'none'
 @dataclass(frozen=True)
 class Floor:
     """
-    The floor of an arm.
+    Floor under an arm: height, normal, and source of the height.
 
     Attributes
     ----------

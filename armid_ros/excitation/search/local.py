@@ -170,7 +170,7 @@ class Search:
 
 @dataclass
 class _Branch:
-    """One local search: its trajectory, and the box and the times of its next round."""
+    """One local search, with its trajectory and the settings of its next round."""
 
     search: Search
     objective: Objective
