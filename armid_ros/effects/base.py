@@ -98,7 +98,7 @@ class Effect(ABC):
         if len(values) != len(defaults):
             raise ModelError(
                 f'{self.name}: {len(values)} shape values were given, but {len(defaults)} are '
-                f'needed, {", ".join(s.name for s in self.shapes) or "none"} of each owner'
+                f'needed, {", ".join(s.name for s in self.shapes) or "none"} of each joint'
             )
         for index, value in enumerate(values):
             shape = self.shapes[index % len(self.shapes)]
@@ -208,7 +208,7 @@ class Effect(ABC):
         except ValueError:
             raise ModelError(
                 f'{self.name}: the shape array has to have size {size}, not {np.shape(values)}: a '
-                f'row for each owner, columns {", ".join(s.name for s in self.shapes) or "none"}'
+                f'row for each joint, columns {", ".join(s.name for s in self.shapes) or "none"}'
             ) from None
         return replace(self, shape=tuple(spread.ravel().tolist()))
 

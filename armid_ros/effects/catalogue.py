@@ -139,11 +139,11 @@ class Catalogue(Mapping[str, type[Effect]]):
             raise ModelError(
                 f"no effect '{name}'; did you mean '{near}'? 'armid effects' lists all of them"
             )
-        lost = ''.join(
+        broken = ''.join(
             f'; {package} cannot be loaded: {why}' for package, why in self.broken.items()
         )
         raise ModelError(
-            f"no effect '{name}'; the catalogue has {', '.join(self)}{lost}"
+            f"no effect '{name}'; the catalogue has {', '.join(self)}{broken}"
             '; install a package to add its effects'
         )
 
@@ -215,25 +215,25 @@ def check_kind(kind: type[Effect]) -> None:
     """
     if not (inspect.isclass(kind) and issubclass(kind, Effect)):
         raise ModelError(f'{kind!r} is not an effect class; derive it from armid_ros.Effect')
-    where = _home(kind)
+    class_path = _home(kind)
     name = getattr(kind, 'name', None)
     if not isinstance(name, str) or not _NAME.fullmatch(name):
-        raise ModelError(f"{where}: 'name' has to be like 'viscous_friction', not {name!r}")
+        raise ModelError(f"{class_path}: 'name' has to be like 'viscous_friction', not {name!r}")
     lacking = sorted(getattr(kind, '__abstractmethods__', ()))
     if lacking:
-        raise ModelError(f'{name} ({where}) has no {" and no ".join(lacking)}')
+        raise ModelError(f'{name} ({class_path}) has no method {" and no method ".join(lacking)}')
     summary = getattr(kind, 'summary', None)
     if not isinstance(summary, str) or not summary.strip():
-        raise ModelError(f"{name} ({where}): 'summary' has to be a text of one line")
+        raise ModelError(f"{name} ({class_path}): 'summary' has to be a text of one line")
     quantities: tuple[Quantity, ...] = getattr(kind, 'quantities', ())
     if not quantities or not all(isinstance(one, Quantity) for one in quantities):
-        raise ModelError(f"{name} ({where}): 'quantities' has to be a tuple of Quantity")
+        raise ModelError(f"{name} ({class_path}): 'quantities' has to be a tuple of Quantity")
     if not all(isinstance(one, Shape) for one in kind.shapes):
-        raise ModelError(f"{name} ({where}): 'shapes' has to be a tuple of Shape")
+        raise ModelError(f"{name} ({class_path}): 'shapes' has to be a tuple of Shape")
     names = part_names(kind)
     twice = [part for part in names if names.count(part) > 1]
     if twice:
-        raise ModelError(f"{name} ({where}): two quantities are called '{twice[0]}'")
+        raise ModelError(f"{name} ({class_path}): two quantities are called '{twice[0]}'")
 
 
 def part_names(kind: type[Effect]) -> list[str]:
@@ -367,10 +367,10 @@ def parse_effect(text: str, robot: Robot) -> tuple[Effect, FloatArray]:
     for assignment in filter(None, assignments.split(',')):
         key, _, number = (part.strip() for part in assignment.partition('='))
         if number and key not in quantities + shapes:
-            place = f'; a joint is named as {effect.name}@JOINT' if key.startswith('joint') else ''
+            hint = f'; a joint is named as {effect.name}@JOINT' if key.startswith('joint') else ''
             raise ModelError(
                 f"{effect.name} has no '{key}'; it has {', '.join(quantities + shapes)}"
-                f'{meant(key, quantities + shapes)}{place}'
+                f'{meant(key, quantities + shapes)}{hint}'
             )
         value = _number(text, effect, key, number)
         if key in quantities:

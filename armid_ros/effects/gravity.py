@@ -34,7 +34,7 @@ class _GravityEffect(Effect):
     def __post_init__(self) -> None:
         """Raise a ModelError if joints are given."""
         if self.joints:
-            raise ModelError(f'{self.name} belongs to the whole arm, not to {self.joints[0]}')
+            raise ModelError(f'{self.name} acts on the whole arm, not on joint {self.joints[0]}')
         super().__post_init__()
 
 
@@ -153,7 +153,7 @@ def _unit(gravity: FloatArray) -> FloatArray:
     """Return the direction of gravity; raise a ModelError without gravity."""
     length = np.linalg.norm(gravity)
     if not length > 0.0:
-        raise ModelError('an effect of gravity cannot act, as the gravity of the model is zero')
+        raise ModelError('effects on gravity need a model with gravity; that of the model is zero')
     return np.asarray(gravity / length)
 
 

@@ -186,7 +186,7 @@ def placed(problem: DesignProblem, trajectory: FourierTrajectory) -> Excitation:
         acceleration = np.abs(path.ddq) / limits.acceleration
         return float(max(velocity.max(), acceleration.max()))
 
-    run_in, last = settings.run_in, ''
+    run_in, reason = settings.run_in, ''
     entries = 48  # points of the period at which a run can enter the trajectory
     for _ in range(12):  # run-ins of increasing duration
         runs = [
@@ -201,9 +201,9 @@ def placed(problem: DesignProblem, trajectory: FourierTrajectory) -> Excitation:
             faults = excitation_faults(problem.arm, limits, run)
             if not faults:
                 return run
-            last = f'in {run_in:.3g} s, {faults}'
+            reason = f'in {run_in:.3g} s, {faults}'
         run_in *= 1.5
-    raise TrajectoryError(f'no run-in of the trajectory stays inside the limits; {last}')
+    raise TrajectoryError(f'no run-in of the trajectory stays inside the limits: {reason}')
 
 
 def evaluate(

@@ -324,7 +324,7 @@ class Template:
             if not found:
                 return trajectory
             faults = str(found)
-        raise TrajectoryError(f'{self.name}: {faults}')
+        raise TrajectoryError(f'no {self.name} is feasible: {faults}')
 
 
 #: Motions of all joints: slow, medium, fast, and with the largest accelerations.

@@ -65,7 +65,7 @@ class MotionGate:
         limits = Limits.of(robot, speed=1.0, reserve=False)
         violations = check_limits(limits, motion, torque)
         if violations:
-            raise TrajectoryError(f'the run was not sent: {violations[0]}')
+            raise TrajectoryError(f'the run exceeds a limit and was not sent: {violations[0]}')
         run.require_waypoints()
         if planner.clearance is not None:
             # intervals of 0.1 s at the beginning of the proof
@@ -73,7 +73,7 @@ class MotionGate:
             peak = np.abs(motion.ddq).max(axis=0)
             near = planner.clearance.first_fault(run.at, 1.5 * peak, times)
             if near is not None:
-                raise TrajectoryError(f'the run was not sent: {near}')
+                raise TrajectoryError(f'bodies come too close, and the run was not sent: {near}')
         # dry friction of a joint may need a tenth of its limit
         room = np.where(np.isfinite(robot.torque_limit), 0.1 * robot.torque_limit, 0.0)
         return cls(run, limits, planner.clearance, np.maximum(np.abs(torque).max(axis=0), room))
@@ -145,15 +145,16 @@ class MotionGate:
         step = np.abs(measured - set_point)
         if not step.max() <= largest:
             j = int(np.argmax(step))
+            joint, unit = self.limits.joints[j], self.limits.unit('position', j)
             raise TrajectoryError(
-                f"joint '{self.limits.joints[j]}' is {step[j]:.3g} "
-                f'{self.limits.unit("position", j)} from its set point, more than {largest:g}'
+                f"joint '{joint}' is {step[j]:.3g} {unit} from its set point, more than "
+                f'{largest:g} {unit}'
             )
         inside = np.clip(measured, self.limits.lower, self.limits.upper)
         near = clear_line(self.clearance, set_point, inside)
         if near is not None:
             raise TrajectoryError(
-                f'{near.first} and {near.second} would be {near.distance:.4f} m apart'
+                f'{near.first} and {near.second} would come within {near.distance:.4f} m'
             )
         needed = max(self._time_of(step, speed), HANDOVER_TIME)
         t, still = needed + np.array([0.0, HANDOVER_TIME / 2.0]), np.zeros((2, len(step)))

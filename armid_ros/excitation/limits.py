@@ -62,11 +62,11 @@ class Limits:
     def __post_init__(self) -> None:
         """Freeze the arrays; raise a TrajectoryError for an empty range."""
         n = len(self.joints)
-        for name in ('lower', 'upper', 'velocity', 'acceleration', 'torque'):
-            values = read_only(getattr(self, name))
-            object.__setattr__(self, name, values)
+        for limit in ('lower', 'upper', 'velocity', 'acceleration', 'torque'):
+            values = read_only(getattr(self, limit))
+            object.__setattr__(self, limit, values)
             if values.shape != (n,):
-                raise TrajectoryError(f'limits: {name} has shape {values.shape}, expected ({n},)')
+                raise TrajectoryError(f'limits: {limit} has shape {values.shape}, expected ({n},)')
         for j, joint in enumerate(self.joints):
             if not self.lower[j] < self.upper[j]:
                 raise TrajectoryError(
@@ -77,7 +77,7 @@ class Limits:
                 limit = getattr(self, quantity)[j]
                 if not limit > 0.0:
                     raise TrajectoryError(
-                        f'joint {joint}: its {quantity} limit is {limit:g}; it cannot move'
+                        f'joint {joint}: its {quantity} limit is {limit:g}, but has to be positive'
                     )
 
     @classmethod

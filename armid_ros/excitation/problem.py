@@ -108,15 +108,15 @@ class DesignSettings:
 
     def _require_numbers(self) -> None:
         """Raise a TrajectoryError for an impossible count, time or size."""
-        for name in ('harmonics', 'n_periods', 'starts', 'candidates', 'iterations'):
-            if (value := getattr(self, name)) < 1:
-                raise TrajectoryError(f'{name} is {value}, but has to be at least 1')
-        for name in ('period', 'run_in', 'rate'):
-            if not 0.0 < (value := getattr(self, name)) < np.inf:
-                raise TrajectoryError(f'{name} is {value}, but has to be positive and finite')
-        for name in ('time_budget', 'clearance', 'balance'):
-            if not (value := getattr(self, name)) >= 0.0:
-                raise TrajectoryError(f'{name} is {value}, but has to be 0 or more')
+        for setting in ('harmonics', 'n_periods', 'starts', 'candidates', 'iterations'):
+            if (value := getattr(self, setting)) < 1:
+                raise TrajectoryError(f'{setting} is {value}, but has to be at least 1')
+        for setting in ('period', 'run_in', 'rate'):
+            if not 0.0 < (value := getattr(self, setting)) < np.inf:
+                raise TrajectoryError(f'{setting} is {value}, but has to be positive and finite')
+        for setting in ('time_budget', 'clearance', 'balance'):
+            if not (value := getattr(self, setting)) >= 0.0:
+                raise TrajectoryError(f'{setting} is {value}, but has to be 0 or more')
         duration = self.n_periods * self.period + 2.0 * self.run_in
         if not duration <= MAX_DURATION:
             raise TrajectoryError(
@@ -214,7 +214,7 @@ class DesignProblem:
         noise = torque_noise(arm, settings)
         if (settings.criterion == 'T') != (rival is not None):
             raise TrajectoryError(
-                "criterion 'T' and a rival need each other, and only one was given: give both or "
+                "criterion 'T' needs a rival, and other criteria cannot have one: give both or "
                 'neither'
             )
         whole = arm if rival is None else _joined(arm, rival)
@@ -222,7 +222,7 @@ class DesignProblem:
         columns = _target_columns(whole, settings.target, motion)
         if not columns.any():
             raise TrajectoryError(
-                f"target '{settings.target}': {arm.robot.name} has no parameter of this kind"
+                f"{arm.robot.name} has no parameters for target '{settings.target}'"
             )
         level = replace(whole, robot=levelled(whole.robot))
         flat = _target_columns(level, settings.target, motion).reshape(-1, columns.shape[-1])

@@ -95,10 +95,10 @@ class TransferPlanner:
         inside = np.clip(start, limits.lower, limits.upper)
         # tolerance beyond a position limit for a measured position [rad or m]
         start = np.where(np.abs(start - inside) <= 0.01, inside, start)
-        for name, q in (('leave', start), ('go to', goal)):
+        for end, q in (('start', start), ('goal', goal)):
             fault = self.fault(q)
             if fault:
-                raise TrajectoryError(f'the pose to {name} is not allowed: {fault}')
+                raise TrajectoryError(f'the {end} pose is not allowed: {fault}')
         poses = find_path(
             self.clearance,
             (start, goal),

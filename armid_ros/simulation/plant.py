@@ -27,13 +27,14 @@ from scipy.linalg import eigh, LinAlgError
 def require_masses(robot: Robot) -> None:
     """Raise a ModelError that names the links of a robot with a negative mass."""
     masses = robot.rigid_parameters[::PER_LINK]
-    named = [
-        f"link '{name}' has a mass of {mass:g} kg"
+    negative = [
+        f"'{name}' ({mass:g} kg)"
         for name, mass in zip(robot.links, masses, strict=True)
         if mass < 0.0
     ]
-    if named:
-        raise ModelError(f'{robot.name}: {", ".join(named)}; correct the description')
+    if negative:
+        links = ', '.join(negative)
+        raise ModelError(f'{robot.name}: negative mass of {links}; correct the description')
 
 
 def possible_loads(robot: Robot, values: FloatArray) -> bool:
@@ -261,10 +262,11 @@ class Plant:
             lower, upper, slack = self.robot.lower, self.robot.upper, limit_slack(self.robot)
             beyond = (position < lower - slack) | (position > upper + slack)
             for joint in np.flatnonzero(beyond)[:1]:
+                unit = self.robot.position_units[joint]
                 raise TrajectoryError(
                     f"{self.robot.name}: joint '{self.robot.joints[joint]}' cannot be at "
-                    f'{position[joint]:.4g}, its stops are at {lower[joint]:.4g} and '
-                    f'{upper[joint]:.4g}'
+                    f'{position[joint]:.4g} {unit}, beyond its stops at {lower[joint]:.4g} and '
+                    f'{upper[joint]:.4g} {unit}'
                 )
             position = read_only(np.clip(position, lower, upper))
         modes = tuple(np.sign(self.contacts.directions @ velocity).astype(int).tolist())

@@ -188,7 +188,7 @@ def _simulated_motion(
             if np.any(lost):
                 step, joint = np.argwhere(lost)[0]
                 raise ModelError(
-                    f'{plant.robot.name}: the simulated arm does not follow; '
+                    f'{plant.robot.name}: the simulation is unstable; '
                     f'{plant.robot.joints[joint]} is faster than {_MAX_SPEED:g} rad/s (or m/s) '
                     f'after {plant.dt * (done + step):.3g} s'
                 )

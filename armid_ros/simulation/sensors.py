@@ -50,13 +50,14 @@ class Sensors:
     def __post_init__(self) -> None:
         """Raise a ModelError if a value is negative."""
         noises = ('torque_noise', 'position_noise', 'velocity_noise', 'acceleration_noise')
-        for name in (*noises, 'resolution'):
-            value = np.asarray(getattr(self, name), dtype=float)
+        for setting in (*noises, 'resolution'):
+            value = np.asarray(getattr(self, setting), dtype=float)
             if not np.all(np.isfinite(value)) or np.any(value < 0.0):
-                raise ModelError(f'sensors: {name} has to be 0 or more, not {value.tolist()}')
+                raise ModelError(f'sensors: {setting} has to be 0 or more, not {value.tolist()}')
         if self.torque_delay < 0 or int(self.torque_delay) != self.torque_delay:
             raise ModelError(
-                f'sensors: torque_delay is a whole number of steps, not {self.torque_delay}'
+                f'sensors: torque_delay has to be a whole number of steps, 0 or more, not '
+                f'{self.torque_delay}'
             )
 
     @cached_property

@@ -92,9 +92,10 @@ def _poses(
     drawn = rng.uniform(lower + room, upper - room, (400, robot.n_joints))
     free = np.array([q for q in drawn if not planner.fault(q)])
     if len(free) < count:
+        reason = next(filter(None, map(planner.fault, drawn)))
         raise TrajectoryError(
-            f'{len(free)} of {len(drawn)} random poses are free, fewer than {count}; in the '
-            f'first one {planner.fault(drawn[0])}'
+            f'only {len(free)} of {len(drawn)} random poses are allowed, and {count} are needed: '
+            f'{reason}'
         )
     sides = [Motion.of_states(robot.joints, free, side, 0.0) for side in (-1.0, 1.0)]
     columns = np.concatenate([model.effect_columns(side) for side in sides], axis=1)

@@ -106,9 +106,9 @@ def test_where_there_is_no_way_the_bodies_are_named(two_link):
 
 def test_a_pose_that_is_not_free_is_refused_with_what_is_wrong(two_link):
     plan = planner(two_link, Obstacle('floor', 'plane', (), (0.0, 0.0, 0.3)))
-    with pytest.raises(TrajectoryError, match=r'leave.*upper'):
+    with pytest.raises(TrajectoryError, match=r'start.*upper'):
         plan(np.array([3.0, 0.0]), np.zeros(2))
-    with pytest.raises(TrajectoryError, match=r'go.*floor'):
+    with pytest.raises(TrajectoryError, match=r'goal.*floor'):
         plan(np.zeros(2), np.array([2.4, 0.0]))
 
 

@@ -318,9 +318,9 @@ def _frame(name: str, robot: Robot | None) -> pin.SE3:
     if name in _WORLD:
         return pin.SE3.Identity()
     moves = model.existFrame(name)
-    why = 'moves with the arm' if moves else 'is not in the description'
+    fault = 'moves with the arm' if moves else 'is not in the description'
     raise TrajectoryError(
-        f"a collision object is in the frame '{name}', which {why}; fixed frames are "
+        f"a collision object is in the frame '{name}', which {fault}; fixed frames are "
         f'{", ".join(frame for frame in fixed if frame != "universe") or "world"}'
     )
 
