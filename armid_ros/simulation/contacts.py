@@ -115,6 +115,8 @@ class Contacts:
         Bounds of the torques of the elements [N m].
     axes : tuple of int, length m
         The joint that an element acts on alone; -1 if it acts on several.
+    of_single_joints : bool
+        Whether every element acts on one joint, and no two elements on the same joint.
     friction : DryFriction
         Dry friction without a load, if friction depends on the load.
 
@@ -124,6 +126,7 @@ class Contacts:
     lower: FloatArray
     upper: FloatArray
     axes: tuple[int, ...]
+    of_single_joints: bool
     friction: DryFriction | None = None
 
     @classmethod
@@ -132,12 +135,8 @@ class Contacts:
         joints = [np.flatnonzero(direction).tolist() for direction in friction.directions]
         axes = tuple(some[0] if len(some) == 1 else -1 for some in joints)
         loaded = None if friction.load_share is None else friction
-        return cls(friction.directions, friction.lower, friction.upper, axes, loaded)
-
-    @property
-    def of_single_joints(self) -> bool:
-        """Whether every element acts on one joint, and no two elements on the same joint."""
-        return -1 not in self.axes and len(set(self.axes)) == len(self.axes)
+        single = -1 not in axes and len(set(axes)) == len(axes)
+        return cls(friction.directions, friction.lower, friction.upper, axes, single, loaded)
 
     def under(self, load: FloatArray) -> Contacts:
         """Return the contacts with friction levels under a rigid-body torque, shape (n,) [N m]."""

@@ -190,6 +190,8 @@ class Plant:
         Actions of the effects on the arm and on its sensors.
     springs : ElasticJoints, or None
         Springs between motors and links; None if all joints are rigid.
+    sensing : Action
+        Action of the effects on the readings of the motors.
     data : pinocchio.Data
         Scratch memory of the rigid-body algorithms; two threads therefore need two plants.
 
@@ -229,10 +231,12 @@ class Plant:
         self.added_inertia: FloatArray = inertia + weight * dt * self.damping
         laws = [self.action.torque]
         self.springs: ElasticJoints | None = None
+        self.sensing: Action = self.action
         if elasticity is None:
             laws.append(self.action.link_torque)
         else:
             self.springs = ElasticJoints.of(arm, elasticity, friction.directions, mass, dt)
+            self.sensing = self.springs.sensing
         self.torque: TorqueLaw | None = sum_laws([law for law in laws if law is not None])
 
     def state(
@@ -307,11 +311,6 @@ class Plant:
             force -= self.torque(np.asarray(t), q, dq)
         if self.action.hysteresis is not None:
             force -= self.action.hysteresis.torque(memory)
-
-    @property
-    def sensing(self) -> Action:
-        """Return the action of the effects on the readings of the motors."""
-        return self.action if self.springs is None else self.springs.sensing
 
     def times(self, first: int, count: int) -> FloatArray:
         """Return the times of successive steps [s], shape (count,)."""

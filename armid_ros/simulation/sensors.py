@@ -4,8 +4,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from functools import cached_property
+from dataclasses import dataclass, field
 
 from armid_ros.effects import Action
 from armid_ros.errors import ModelError, RobotError
@@ -46,9 +45,11 @@ class Sensors:
     resolution: float | FloatArray = 0.0
     torque_delay: int = 0
     acceleration_noise: float = 0.0
+    _noisy: bool = field(init=False, repr=False)
+    _quantised: bool = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        """Raise a ModelError if a value is negative."""
+        """Raise a ModelError if a value is negative; note which errors the readings have."""
         noises = ('torque_noise', 'position_noise', 'velocity_noise', 'acceleration_noise')
         for setting in (*noises, 'resolution'):
             value = np.asarray(getattr(self, setting), dtype=float)
@@ -59,17 +60,9 @@ class Sensors:
                 f'sensors: torque_delay has to be a whole number of steps, 0 or more, not '
                 f'{self.torque_delay}'
             )
-
-    @cached_property
-    def _noisy(self) -> bool:
-        noises = (self.torque_noise, self.position_noise, self.velocity_noise)
-        return any(np.any(noise) for noise in noises)
-
-    @cached_property
-    def _step(self) -> FloatArray | None:
-        """Encoder resolution, 1 for joints without quantisation; None if no joint has it."""
-        resolution = np.asarray(self.resolution, dtype=float)
-        return np.where(resolution > 0.0, resolution, 1.0) if resolution.any() else None
+        std = (self.torque_noise, self.position_noise, self.velocity_noise)
+        object.__setattr__(self, '_noisy', any(np.any(each) for each in std))
+        object.__setattr__(self, '_quantised', bool(np.any(self.resolution)))
 
     def measure(
         self,
@@ -99,8 +92,9 @@ class Sensors:
             q = q + noise[:, 0] * self.position_noise
             dq = dq + noise[:, 1] * self.velocity_noise
             tau = tau + noise[:, 2] * self.torque_noise
-        if self._step is not None:
-            q = np.where(self.resolution, np.rint(q / self._step) * self._step, q)
+        if self._quantised:
+            step = np.where(self.resolution, self.resolution, 1.0)
+            q = np.where(self.resolution, np.rint(q / step) * step, q)
         return q, dq, tau
 
 

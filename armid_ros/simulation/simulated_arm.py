@@ -212,7 +212,8 @@ class SimulatedArm:
         self.plant = self.successor(arm)
         self._state = self.plant.state(now.q, now.dq, now.ddq, now.steps)
         self._compiled = CompiledLoop.of(self.plant, self.controller)
-        self._past = self._new_past()
+        delay = self.sensors.torque_delay
+        self._past = RecentPast(self.plant, self._state, self._torque, delay)
 
     def successor(self, arm: ArmModel) -> Plant:
         """
@@ -268,7 +269,7 @@ class SimulatedArm:
         self._reference, self._begun = curve, self._state.steps
         self._look_ahead(self._targets.q[self._row])
         if not self.controller.acts_once:
-            self._act()
+            self._torque = command(self.plant, self._acting, self._state, self._targets, 0)
 
     def advance(self, steps: int = 1) -> Sample:
         """
@@ -368,17 +369,14 @@ class SimulatedArm:
         self._reference, self._begun = reference, steps
         self._acting = self.controller.started()
         self._look_ahead(steps=1)
-        self._act()
-        self._past = self._new_past()
+        self._torque = command(self.plant, self._acting, self._state, self._targets, 0)
+        delay = self.sensors.torque_delay
+        self._past = RecentPast(self.plant, self._state, self._torque, delay)
 
     @property
     def _row(self) -> int:
         """Row of the present step in the targets."""
         return self._state.steps - self._first
-
-    def _act(self) -> None:
-        """Set the torque that the controller applies for the present targets."""
-        self._torque = command(self.plant, self._acting, self._state, self._targets, 0)
 
     def _look_ahead(self, commanded: FloatArray | None = None, steps: int = 1000) -> None:
         """Set the targets of the next steps, from the last commanded motor position."""
@@ -402,7 +400,3 @@ class SimulatedArm:
                 f"trajectory: the {quantity} of joint '{joint}' is {values[worst]:.4g} {unit}, "
                 f'more than {tolerance:g} {unit}; {advice}'
             )
-
-    def _new_past(self) -> RecentPast:
-        """Return the sensor history of an arm that begins in its present state."""
-        return RecentPast(self.plant, self._state, self._torque, self.sensors.torque_delay)
