@@ -239,6 +239,7 @@ def merge_actions(robot: Robot, actions: Sequence[Action]) -> Action:
     readings = [a.reading for a in actions if a.reading is not None]
     drives = [a.drive for a in actions if a.drive is not None]
     displacements = [a.displacement for a in actions if a.displacement is not None]
+    slipping = [a.hysteresis for a in actions if a.hysteresis]
     transmissions = [a.transmission for a in actions if a.transmission]
 
     def reading(motion: Motion, tau: FloatArray) -> FloatArray:
@@ -255,7 +256,13 @@ def merge_actions(robot: Robot, actions: Sequence[Action]) -> Action:
         parts = [displace(motion) for displace in displacements]
         return Displacement(*(np.sum(arrays, axis=0) for arrays in zip(*parts, strict=True)))
 
-    transmission = None
+    hysteresis = transmission = None
+    if slipping:
+        hysteresis = Hysteresis(
+            np.vstack([springs.directions for springs in slipping]),
+            np.concatenate([springs.level for springs in slipping]),
+            np.concatenate([springs.distance for springs in slipping]),
+        )
     if transmissions:  # in series: compliances and gaps are summed
         with np.errstate(divide='ignore'):
             stiffness = 1.0 / np.sum([1.0 / part.stiffness for part in transmissions], axis=0)
@@ -268,7 +275,7 @@ def merge_actions(robot: Robot, actions: Sequence[Action]) -> Action:
         damping=sum((a.damping for a in actions if a.damping is not None), zero),
         inertia=sum((a.inertia for a in actions if a.inertia is not None), zero),
         dry_friction=_merge_friction([a.dry_friction for a in actions if a.dry_friction]),
-        hysteresis=_merge_hysteresis([a.hysteresis for a in actions if a.hysteresis]),
+        hysteresis=hysteresis,
         torque=sum_laws([a.torque for a in actions if a.torque is not None]),
         link_torque=sum_laws([a.link_torque for a in actions if a.link_torque is not None]),
         robot=robot,
@@ -309,16 +316,3 @@ def _merge_friction(elements: list[DryFriction]) -> DryFriction | None:
     active = np.any(np.abs(sums) > NO_FRICTION, axis=0)
     lower, upper, share = sums[:, active]
     return DryFriction(unique[active], lower, upper, share if np.any(share) else None)
-
-
-def _merge_hysteresis(elements: list[Hysteresis]) -> Hysteresis | None:
-    """Return all slipping springs with a level above zero; None if there are none."""
-    if not elements:
-        return None
-    level = np.concatenate([e.level for e in elements])
-    active = level != 0.0  # noqa: RUF069 - only exact zero is no element
-    if not np.any(active):
-        return None
-    directions = np.vstack([e.directions for e in elements])
-    distance = np.concatenate([e.distance for e in elements])
-    return Hysteresis(directions[active], level[active], distance[active])

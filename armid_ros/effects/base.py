@@ -23,7 +23,7 @@ from typing import Any, ClassVar, Protocol, Self
 
 from armid_ros.effects.action import Action, Displacement
 from armid_ros.effects.quantities import joint_unit, places_among, Quantity, Shape
-from armid_ros.effects.traits import TRAITS, Traits
+from armid_ros.effects.traits import Traits
 from armid_ros.errors import meant, ModelError
 from armid_ros.estimate import ParameterName
 from armid_ros.model import LinkFrames
@@ -84,12 +84,6 @@ class Effect(ABC):
     smooth: ClassVar[bool] = False
     #: Whether the effect is the same on every day, as its input is measured.
     lasting: ClassVar[bool] = False
-
-    def __init_subclass__(cls) -> None:
-        """Set the traits of a shipped effect."""
-        super().__init_subclass__()
-        if vars(cls).get('name') in TRAITS:
-            cls.traits = TRAITS[cls.name]
 
     def __post_init__(self) -> None:
         """Set the default shape parameters, and check the number and range of given ones."""

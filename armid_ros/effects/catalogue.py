@@ -40,6 +40,7 @@ from armid_ros.effects.quantities import Quantity, Shape
 from armid_ros.effects.sensing import EncoderOffset, TorqueDrift, TorqueGain, TorqueOffset
 from armid_ros.effects.springs import JointSpring, SoftLimit
 from armid_ros.effects.timing import TimeDelay, TorqueLag
+from armid_ros.effects.traits import TRAITS
 from armid_ros.effects.transmission import Backlash, JointElasticity
 from armid_ros.errors import meant, ModelError, nearest
 from armid_ros.files.cells import listed, parted
@@ -86,6 +87,8 @@ _EFFECTS: tuple[type[Effect], ...] = (
     TemperatureDependentFriction,
     LearnedTorque,
 )
+for _kind in _EFFECTS:
+    _kind.traits = TRAITS.get(_kind.name, _kind.traits)
 
 
 class Catalogue(Mapping[str, type[Effect]]):

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from armid_ros.effects.action import Action
 from armid_ros.effects.base import Arm, Effect
 from armid_ros.effects.quantities import Quantity
+from armid_ros.effects.traits import TRAITS
 from armid_ros.errors import ModelError
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.robots import Robot
@@ -112,6 +113,7 @@ class GravityVector(_GravityEffect):
     """
 
     name = BaseTilt.name
+    traits = TRAITS[name]
     summary = 'gravity of another direction or size than in the model'
     quantities = tuple(Quantity(f'gravity_difference_{axis}', 'm/s^2') for axis in 'xyz')
 

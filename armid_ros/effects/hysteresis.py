@@ -79,8 +79,11 @@ class PreslidingHysteresis(Effect):
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
         """Return the action on the plant: friction with hysteresis."""
+        if not np.any(values):
+            return Action()
         return Action(hysteresis=self._elements(values, arm.robot.joints))
 
     def _elements(self, level: FloatArray, joints: tuple[str, ...]) -> Hysteresis:
+        """Return the slipping springs of the joints, with given levels."""
         directions = np.eye(len(joints))[self.indices(joints)]
         return Hysteresis(directions, level, self.shape_values[:, 0])
