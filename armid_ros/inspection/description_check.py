@@ -23,7 +23,7 @@ from armid_ros.inspection.inspect import notes_on, Remark, worst_first
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.robots import NO_MASS, Robot
 from armid_ros.robots.description import MOVABLE, parse_xml
-from armid_ros.robots.geometry import all_in_one, collision_geometry
+from armid_ros.robots.geometry import collision_geometry, combined_mesh_note
 from armid_ros.robots.robot import PER_LINK
 import numpy as np
 
@@ -226,7 +226,7 @@ def _of_shapes(robot: Robot) -> Iterator[Remark]:
             yield Remark('bad', f'{density}; steel has 7850')
         elif mass < 30.0 * volume[link] and link != robot.base:
             yield Remark('doubt', f'{density}; foam has 30')
-    yield from (Remark('note', text) for text in all_in_one([*missing.values()]))
+    yield from (Remark('note', text) for text in combined_mesh_note([*missing.values()]))
     shaped = {
         link.get('name')
         for link in parse_xml(robot.urdf).iter('link')

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Coupling of the joints of a robot: moving joints, their map from the driven joints, limits."""
+"""Joints that follow driven joints, as mimic joints or in closed loops, and the limits of all."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ import pinocchio as pin
 
 def moving_joints(description: Description, driven: Sequence[str]) -> tuple[str, ...]:
     """
-    Return the joints that move a body when some joints are driven, in the order of the file.
+    Return the names of the joints that move a body if given joints are driven, in file order.
 
     A driven joint that others follow is a motor without a body if neither its link nor the links
     that it carries have inertia.
@@ -30,7 +30,7 @@ def moving_joints(description: Description, driven: Sequence[str]) -> tuple[str,
         {*driven, *description.passive},
         {name for name, inertial in description.links.items() if inertial},
     )
-    while True:  # rigid links up to the links with bodies
+    while True:  # links above a link with inertia move with it
         more = {j.parent for j in description.joints if j.child in bodies} - bodies
         if not more:
             break
@@ -46,12 +46,12 @@ def moving_joints(description: Description, driven: Sequence[str]) -> tuple[str,
 
 def couple(tree: Robot, driven: Sequence[Joint], known: Mapping[str, float]) -> Robot:
     """
-    Return the robot whose moving joints follow some driven joints.
+    Return the robot in which only given joints are driven, and all other joints follow these.
 
     Parameters
     ----------
     tree : Robot
-        The robot with all moving joints as driven ones.
+        The robot with all moving joints driven.
     driven : sequence of Joint
         The driven joints.
     known : mapping of str to float
@@ -96,7 +96,7 @@ def couple(tree: Robot, driven: Sequence[Joint], known: Mapping[str, float]) -> 
 def _mechanism(
     tree: Robot, names: Sequence[str], start: FloatArray, known: Mapping[str, float]
 ) -> Mechanism:
-    """Return the map from driven joints, by name, to the moving joints of a robot."""
+    """Return the map from positions of the named driven joints to those of all moving joints."""
     description = tree.description
     passive = [name for name in description.passive if name in tree.joints]
     matrix, offset = np.zeros((len(tree.joints), len(names) + len(passive))), []
@@ -163,7 +163,10 @@ def _narrowed_limits(
             lower[acts] = np.maximum(lower, middle - room)[acts]
             upper[acts] = np.minimum(upper, middle + room)[acts]
     if np.any(lower >= upper):
-        raise RobotError('the limits of coupled joints leave no range for their driven joints')
+        raise RobotError(
+            'the position limits of coupled joints leave no range for the joints that drive them; '
+            'widen these limits in the description'
+        )
     return lower, upper
 
 
@@ -171,9 +174,9 @@ def _closing_range(
     mechanism: Mechanism, tree: Robot, lower: FloatArray, upper: FloatArray
 ) -> tuple[Mechanism, FloatArray, FloatArray]:
     """
-    Narrow the range of driven joints to where loops close and passive joints keep limits.
+    Narrow the limits of driven joints so that loops close and passive joints keep their limits.
 
-    Both conditions hold up to a tenth beyond the result, because motions may overshoot limits.
+    Both conditions hold up to 10 % beyond the new limits, because motions may overshoot limits.
 
     """
     start = mechanism.start[0]

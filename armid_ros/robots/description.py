@@ -7,6 +7,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
+from graphlib import CycleError, TopologicalSorter
 import math
 from xml.etree import ElementTree
 from xml.parsers import expat
@@ -26,7 +27,7 @@ INERTIA = ('ixx', 'ixy', 'ixz', 'iyy', 'iyz', 'izz')
 
 @dataclass(frozen=True)
 class Inertial:
-    """Mass [kg], pose of the centroid frame [m, rad], inertia Ixx Ixy Ixz Iyy Iyz Izz [kg m^2]."""
+    """Mass [kg] of a link, pose of its centroid frame [m, rad], and its inertia [kg m^2]."""
 
     mass: float
     xyz: Vector
@@ -34,7 +35,7 @@ class Inertial:
     inertia: tuple[float, ...]
 
     def doubt(self) -> str | None:
-        """Return why no mass distribution has this inertia; None if it is valid."""
+        """Return the reason why no body can have this inertia; None if the inertia is possible."""
         ixx, ixy, ixz, iyy, iyz, izz = self.inertia
         tensor = np.array([[ixx, ixy, ixz], [ixy, iyy, iyz], [ixz, iyz, izz]])
         moments = np.linalg.eigvalsh(tensor)
@@ -54,20 +55,20 @@ class Inertial:
 
 @dataclass(frozen=True)
 class Mimic:
-    """Position of a mimic joint: offset plus the sum of multiplier times followed position."""
+    """Relation of a mimic joint: position = offset + sum of multiplier x position of a leader."""
 
     multipliers: Mapping[str, float]
     offset: float
 
     @property
     def joint(self) -> str:
-        """Return the joint that is followed, or the first of several."""
+        """Return the name of the followed joint, or of the first if the joint follows several."""
         return next(iter(self.multipliers))
 
 
 @dataclass(frozen=True)
 class Loop:
-    """Closed loop: points of two links, in their frames [m], that passive joints keep together."""
+    """Closed kinematic loop: points of two links [m] that coincide, and the passive joints."""
 
     links: tuple[str, str]
     points: tuple[Vector, Vector]
@@ -95,11 +96,6 @@ class Joint:
     mimic: Mimic | None
 
     @property
-    def movable(self) -> bool:
-        """Whether the joint has a degree of freedom."""
-        return self.kind in MOVABLE
-
-    @property
     def unit(self) -> str:
         """Return the unit of the joint position: 'rad' or 'm'."""
         return 'm' if self.kind == 'prismatic' else 'rad'
@@ -107,7 +103,7 @@ class Joint:
 
 @dataclass(frozen=True)
 class Description:
-    """Links (name to inertial) and joints of a URDF, in the order of the document."""
+    """Links, by name with inertial data, joints and closed loops of a URDF, in document order."""
 
     name: str
     links: dict[str, Inertial | None]
@@ -117,21 +113,21 @@ class Description:
 
     @property
     def passive(self) -> tuple[str, ...]:
-        """Return the passive joints, which loops move."""
+        """Return the names of the passive joints, whose positions follow from closed loops."""
         return tuple(dict.fromkeys(joint for loop in self.loops for joint in loop.passive))
 
     def movable(self) -> tuple[Joint, ...]:
-        """Joints with a degree of freedom."""
-        return tuple(joint for joint in self.joints if joint.movable)
+        """Return the revolute, continuous and prismatic joints."""
+        return tuple(joint for joint in self.joints if joint.kind in MOVABLE)
 
     def inertia_doubts(self) -> tuple[str, ...]:
-        """Return one line for every link whose inertia is impossible for any mass distribution."""
+        """Return one line for every link whose inertia no body can have."""
         doubts = {link: inertial.doubt() for link, inertial in self.links.items() if inertial}
         return tuple(f"link '{link}': {doubt}" for link, doubt in doubts.items() if doubt)
 
     @cached_property
     def by_name(self) -> Mapping[str, Joint]:
-        """Joints by their name."""
+        """Return the joints as a mapping from their names."""
         return {joint.name: joint for joint in self.joints}
 
 
@@ -143,7 +139,9 @@ def parse_xml(text: str) -> ElementTree.Element:
 
     """
     if len(text) > TEXT_LIMIT:
-        raise RobotError(f'its {len(text)} characters are too many for a description')
+        raise RobotError(
+            f'the description has {len(text)} characters; at most {TEXT_LIMIT} are read'
+        )
     builder, parser = ElementTree.TreeBuilder(), expat.ParserCreate()
     parser.StartElementHandler, parser.EndElementHandler = builder.start, builder.end
     parser.CharacterDataHandler = builder.data
@@ -171,7 +169,7 @@ GROUND = 'world'
 
 def parse_description(root: ElementTree.Element) -> Description:
     """
-    Return the kinematic tree of a URDF.
+    Return the links, joints and closed loops that a URDF describes.
 
     Raises
     ------
@@ -195,7 +193,7 @@ def parse_description(root: ElementTree.Element) -> Description:
     for element in root.findall('mimic'):
         name = element.get('follower', '')
         if name not in joints:
-            raise RobotError(f"a <mimic> has the follower '{name}', which does not exist")
+            raise RobotError(f"a <mimic> names the follower joint '{name}', which does not exist")
         mimic = _mimic(element, f"joint '{name}'", joints[name].mimic)
         joints[name] = replace(joints[name], mimic=mimic)
     if GROUND not in links and any(joint.parent == GROUND for joint in joints.values()):
@@ -215,7 +213,7 @@ def _loop(element: ElementTree.Element, links: Iterable[str], joints: Mapping[st
     ends = [(end.get('link', ''), _vector(end, 'xyz', 'a <loop>')) for end in element]
     passive = tuple(element.get('passive', '').split())
     unknown = [link for link, _ in ends if link not in links]
-    unknown += [name for name in passive if name not in joints or not joints[name].movable]
+    unknown += [name for name in passive if name not in joints or joints[name].kind not in MOVABLE]
     if len(ends) != 2 or not passive or unknown:
         raise RobotError(
             'a <loop> needs two points of links and the passive movable joints that close it'
@@ -225,7 +223,7 @@ def _loop(element: ElementTree.Element, links: Iterable[str], joints: Mapping[st
 
 
 def _mimic(element: ElementTree.Element, where: str, known: Mimic | None) -> Mimic:
-    """Add a followed joint to the mimic relation of a joint."""
+    """Return a mimic relation with the leader of a <mimic> element added."""
     joint = element.get('joint', '')
     before = {} if known is None else dict(known.multipliers)
     before[joint] = before.get(joint, 0.0) + _number(element, 'multiplier', where, 1.0)
@@ -233,9 +231,9 @@ def _mimic(element: ElementTree.Element, where: str, known: Mimic | None) -> Mim
     return Mimic(before, offset + (0.0 if known is None else known.offset))
 
 
-def _carriers(links: Iterable[str], joints: Iterable[Joint]) -> dict[str, Joint]:
-    """Return the parent joint of each link; every link except the base has one."""
-    carriers: dict[str, Joint] = {}
+def _check_tree(links: Iterable[str], joints: Iterable[Joint]) -> None:
+    """Raise a RobotError unless the joints connect all links to one base link as a tree."""
+    carriers: dict[str, Joint] = {}  # joint above each link
     for joint in joints:
         for role, link in (('parent', joint.parent), ('child', joint.child)):
             if link not in links:
@@ -249,26 +247,19 @@ def _carriers(links: Iterable[str], joints: Iterable[Joint]) -> dict[str, Joint]
                 f"'{carriers[joint.child].name}' and '{joint.name}'; a URDF is a tree"
             )
         carriers[joint.child] = joint
-    return carriers
-
-
-def _check_tree(links: Iterable[str], joints: Iterable[Joint]) -> None:
-    carriers = _carriers(links, joints)
     roots = [link for link in links if link not in carriers]
     if len(roots) > 1:
         raise RobotError(
-            f'{len(roots)} links have no parent ({", ".join(roots)}); only the base may'
+            f'{len(roots)} links have no parent joint ({", ".join(roots)}); only the base link '
+            'may have none'
         )
-    depth = dict.fromkeys(roots, 0)
-    for link in links:
-        path: dict[str, None] = {}
-        while link not in depth:
-            if link in path:
-                raise RobotError(f"link '{link}' is part of a closed loop of joints")
-            path[link] = None
-            link = carriers[link].parent
-        for below, name in enumerate(reversed(path), start=depth[link] + 1):
-            depth[name] = below
+    depth = dict.fromkeys(links, 0)
+    above = {link: [joint.parent] for link, joint in carriers.items()}
+    try:
+        for link in TopologicalSorter(above).static_order():
+            depth[link] = depth[carriers[link].parent] + 1 if link in carriers else 0
+    except CycleError as error:
+        raise RobotError(f"link '{error.args[1][0]}' is part of a closed loop of joints") from None
     deepest = max(depth, key=depth.__getitem__)
     most = 500  # the reader of Pinocchio is recursive
     if depth[deepest] > most:
@@ -328,7 +319,7 @@ def _joint(element: ElementTree.Element, name: str, notes: list[str]) -> Joint:
     length = math.hypot(x, y, z)
     if length < 1e-100:  # a zero vector cannot be normalised
         if kind in MOVABLE:
-            raise RobotError(f'the axis of {where} has no direction')
+            raise RobotError(f'{where}: its <axis> is a zero vector; give it a direction')
         x, y, z, length = 1.0, 0.0, 0.0, 1.0
     lower, upper, velocity, effort = _limits(element, kind, where, notes)
     mimic, followed = None, element.find('mimic')
@@ -378,7 +369,7 @@ def _limits(
     lower = _number(limit, 'lower', where, 0.0, endless=True)
     upper = _number(limit, 'upper', where, 0.0, endless=True)
     if lower > upper:
-        raise RobotError(f'{where} has its lower limit {lower:g} above the upper {upper:g}')
+        raise RobotError(f'{where}: its lower limit {lower:g} is above its upper limit {upper:g}')
     if lower == upper:
         notes.append(f'{where}: no range of motion in <limit>; taken as unlimited')
         lower, upper = -math.inf, math.inf
@@ -401,17 +392,17 @@ def _origin(element: ElementTree.Element, where: str) -> tuple[Vector, Vector]:
 
 
 def _vector(element: ElementTree.Element, name: str, where: str) -> Vector:
-    """Return three finite numbers of limited size, or zeros if the attribute is missing."""
+    """Return the three numbers of an attribute, or zeros if the attribute is missing."""
     text = element.get(name, '0 0 0')
-    subject = f"{where}: {name}='{text}' of <{element.tag}> is"
+    attribute = f"{where}: {name}='{text}' of <{element.tag}>"
     try:
         x, y, z = (float(number) for number in text.split())
     except ValueError:
         x = y = z = math.nan
     if not (math.isfinite(x) and math.isfinite(y) and math.isfinite(z)):
-        raise RobotError(f'{subject} not three finite numbers')
+        raise RobotError(f'{attribute} is not three finite numbers')
     if max(abs(x), abs(y), abs(z)) > LARGEST:
-        raise RobotError(f'{subject} beyond {LARGEST:g}')
+        raise RobotError(f'{attribute} has an absolute value above {LARGEST:g}')
     return x, y, z
 
 
@@ -423,16 +414,17 @@ def _number(
     *,
     endless: bool = False,
 ) -> float:
-    """Return a number of limited size; only limits may be infinite."""
+    """Return the number of an attribute, which may be infinite if it is `endless`."""
     text = element.get(name, '' if default is None else repr(default))
-    subject = f"{where}: {name}='{text}' of <{element.tag}> is"
+    attribute = f"{where}: {name}='{text}' of <{element.tag}>"
     try:
         number = float(text)
     except ValueError:
         number = math.nan
     if math.isnan(number):
-        raise RobotError(f'{subject} no number')
+        raise RobotError(f'{attribute} is not a number')
+    if not endless and math.isinf(number):
+        raise RobotError(f'{attribute} is not finite')
     if not endless and abs(number) > LARGEST:
-        fault = 'not finite' if math.isinf(number) else f'beyond {LARGEST:g}'
-        raise RobotError(f'{subject} {fault}')
+        raise RobotError(f'{attribute} has an absolute value above {LARGEST:g}')
     return number

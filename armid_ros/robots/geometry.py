@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The visual and collision shapes of a URDF on the bodies of the model, and their distances."""
+"""Visual and collision shapes of a URDF, and the pairs of bodies whose distance is checked."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ _SHAPE_ATTRIBUTES = {
 
 class LinkShape(NamedTuple):
     """
-    One <visual> or <collision> of a link.
+    Shape of one <visual> or <collision> element of a link.
 
     Attributes
     ----------
@@ -75,7 +75,7 @@ def shapes_of(
     progress: Callable[[float], None] | None = None,
 ) -> Iterator[LinkShape]:
     """
-    Yield the shapes of a robot.
+    Yield the visual or the collision shapes of all links of a robot.
 
     Parameters
     ----------
@@ -114,8 +114,8 @@ def shapes_of(
                 kind, size, mesh = _geometry(element)
             except (TypeError, ValueError):
                 raise RobotError(
-                    f"{robot.name}: <{element.tag}> {number + 1} of link '{name}' is not a box, "
-                    f'sphere, cylinder, capsule or mesh with its numbers'
+                    f"{robot.name}: <{element.tag}> {number + 1} of link '{name}' has to be a "
+                    'box, sphere, cylinder, capsule or mesh with numbers as dimensions'
                 ) from None
             path = find_mesh(mesh, robot.path) if kind == 'mesh' else None
             yield LinkShape(name, frames[name], number, placement, kind, size, mesh, path)
@@ -127,7 +127,7 @@ def collision_geometry(
     other: Literal['visual', 'collision'] = 'collision',
 ) -> tuple[pin.GeometryModel, dict[str, str]]:
     """
-    Return the collision bodies of a robot, and notes on bodies that are left out.
+    Return the collision bodies of a robot, and notes on links whose mesh file is missing.
 
     Boxes, spheres and cylinders are exact. A mesh is replaced by convex bodies that contain the
     mesh. A mesh that is not found is left out and noted.
@@ -163,7 +163,7 @@ def collision_geometry(
 
 def sticks(model: pin.Model) -> list[tuple[int, FloatArray]]:
     """
-    Return lines to draw in place of links: index of a joint, and end in the joint's frame.
+    Return the lines of a stick figure: index of a joint, and end of its line in its frame [m].
 
     A line ends at the next joint; the line of the last body ends beyond its centre of mass.
     Index 0 is the base.
@@ -174,22 +174,21 @@ def sticks(model: pin.Model) -> list[tuple[int, FloatArray]]:
         carried = [k for k in range(1, model.njoints) if int(model.parents[k]) == joint]
         ends = [np.array(model.jointPlacements[k].translation) for k in carried]
         if joint and not ends:
-            # without bodies, the last link ends at this multiple of the distance of its centre
-            # of mass
+            # the last link is drawn to twice the distance of its centre of mass
             ends = [2.0 * np.array(model.inertias[joint].lever)]
         lines += [(joint, end) for end in ends]
     return lines
 
 
-def all_in_one(notes: Sequence[str]) -> tuple[str, ...]:
-    """Combine notes on meshes into one note with their number and the first mesh."""
+def combined_mesh_note(notes: Sequence[str]) -> tuple[str, ...]:
+    """Return one note on several missing meshes, with their number and the first note."""
     if len(notes) < 2:
         return tuple(notes)
     return (f'{len(notes)} meshes not found, such as that of {notes[0]}',)
 
 
 def _bodies(shape: LinkShape, meshes: _Meshes) -> list[tuple[coal.CollisionGeometry, float]]:
-    """Return the bodies of a shape, each with its offset along the z axis of the shape."""
+    """Return the coal bodies that form a shape, each with its offset along the shape's z axis."""
     if shape.kind == 'box':
         return [(coal.Box(*shape.size), 0.0)]
     if shape.kind == 'sphere':
@@ -206,7 +205,7 @@ def _bodies(shape: LinkShape, meshes: _Meshes) -> list[tuple[coal.CollisionGeome
 
 
 def _geometry(element: ElementTree.Element) -> tuple[str, tuple[float, ...], str]:
-    """Return the kind, the dimensions and the mesh name of a shape."""
+    """Return kind, dimensions and mesh file name from a <visual> or <collision> element."""
     for shape in element.findall('geometry/*'):
         if shape.tag in _SHAPE_ATTRIBUTES:
             texts = [shape.get(name, '') for name in _SHAPE_ATTRIBUTES[shape.tag]]
@@ -225,7 +224,7 @@ def _numbers(text: str) -> tuple[float, float, float]:
 @dataclass(frozen=True, eq=False)
 class CollisionModel:
     """
-    The collision bodies of a robot and the pairs of them that are checked.
+    Collision bodies of a robot, and the pairs of bodies whose distance is checked.
 
     Attributes
     ----------
@@ -234,11 +233,11 @@ class CollisionModel:
     geometry : pinocchio.GeometryModel
         Collision bodies and pairs; never changed.
     notes : tuple of str
-        Sentences on bodies that are left out and pairs that are not checked.
+        Notes on missing bodies, and on pairs of links that are not checked.
     left_out : tuple of str
         Links with a body that was left out, because its mesh was not found.
     touching : tuple of (str, str)
-        Pairs of links that are not checked, because they touch at zero.
+        Pairs of links that are not checked, because they touch in the zero pose.
     excluded : str
         Name of the SRDF and the number of pairs of links that it excludes; empty without an SRDF.
 
@@ -253,7 +252,7 @@ class CollisionModel:
 
     @property
     def pairs(self) -> tuple[tuple[str, str], ...]:
-        """Checked pairs of links, each once, in alphabetical order."""
+        """Return the pairs of links whose distance is checked, in alphabetical order."""
         numbers = range(len(self.geometry.collisionPairs))
         return tuple(sorted({_links(self.robot, self.geometry, number) for number in numbers}))
 
@@ -262,7 +261,7 @@ def collision_model(
     robot: Robot, *, progress: Callable[[float], None] | None = None
 ) -> CollisionModel:
     """
-    Return the collision bodies of a robot and the pairs of links that are checked.
+    Return the collision bodies of a robot, and the pairs of bodies whose distance is checked.
 
     Four kinds of pairs are not checked: links that cannot move against each other, links joined by
     a joint, pairs that one joint moves and that touch nowhere in its range, and pairs that the
@@ -314,7 +313,7 @@ def collision_model(
 
 
 def _leave_out_touching(robot: Robot, geometry: pin.GeometryModel) -> tuple[tuple[str, str], ...]:
-    """Remove the pairs of links that touch at zero; return these pairs in alphabetical order."""
+    """Remove the pairs of links that touch in the zero pose; return them alphabetically sorted."""
     data, placed = robot.model.createData(), geometry.createData()
     pin.computeDistances(robot.model, data, geometry, placed, robot.positions(robot.zero_pose))
     touching = {
@@ -329,7 +328,7 @@ def _leave_out_touching(robot: Robot, geometry: pin.GeometryModel) -> tuple[tupl
 
 
 def _leave_out_separate(robot: Robot, geometry: pin.GeometryModel) -> None:
-    """Remove link pairs that one joint moves and that never touch, such as flange and wrist."""
+    """Remove the pairs of links at one joint that touch at no position of this joint."""
     robot = robot.tree
     data, placed = robot.model.createData(), geometry.createData()
     by_joint: dict[int, list[int]] = {}
@@ -356,7 +355,7 @@ def _leave_out_separate(robot: Robot, geometry: pin.GeometryModel) -> None:
 
 
 def _links(robot: Robot, geometry: pin.GeometryModel, pair: int) -> tuple[str, str]:
-    """Links of a pair, in alphabetical order."""
+    """Return the names of the two links of a collision pair, in alphabetical order."""
     bodies = geometry.collisionPairs[pair]
     first, second = sorted(
         _link(robot, geometry.geometryObjects[number]) for number in (bodies.first, bodies.second)

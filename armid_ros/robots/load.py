@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Loading of a robot from a shipped name, a file or the text of a URDF, with its mounting."""
+"""Loading of robots from shipped names, files and URDF text, and of their mounting files."""
 
 from __future__ import annotations
 
@@ -23,6 +23,7 @@ from armid_ros.robots.description import (
     Description,
     INERTIA,
     Joint,
+    MOVABLE,
     parse_description,
     parse_xml,
 )
@@ -77,7 +78,7 @@ def shipped_robots() -> dict[str, str]:
 
 
 def shipped_path(name: str) -> Path:
-    """Return the file of a shipped robot."""
+    """Return the path of the description file of a shipped robot."""
     return Path(str(resources.files('armid_ros.robots').joinpath(_SHIPPED[name][0])))
 
 
@@ -92,7 +93,7 @@ def load_robot(
     joints: Sequence[str] | None = None,
 ) -> Robot:
     """
-    Load a robot.
+    Load a robot from a shipped name, a URDF, xacro or MJCF file, or the text of a URDF.
 
     Parameters
     ----------
@@ -144,9 +145,9 @@ def load_robot(
         )
     if path.is_dir():
         inside = path / 'model.yaml'
-        what = inside if inside.is_file() else 'the URDF, xacro or MJCF file of the robot'
+        file = inside if inside.is_file() else 'the URDF, xacro or MJCF file of the robot'
         raise RobotError(
-            f'{source} is a folder; name {what} as the robot, which comes before the recordings'
+            f'{source} is a folder; name {file} as the robot, which comes before the recordings'
         )
     text = read_text(path, RobotError)
     notes: tuple[str, ...] = ()
@@ -172,7 +173,7 @@ def robot_from_urdf(
     path: Path | None = None,
 ) -> Robot:
     """
-    Make a robot from the text of a URDF; see `load_robot`.
+    Return the robot that the text of a URDF describes; see `load_robot`.
 
     Parameters
     ----------
@@ -233,7 +234,7 @@ def robot_from_urdf(
 
 
 def _split_arguments(source: str | Path) -> tuple[str | Path, dict[str, str], dict[str, str]]:
-    """Split into path, arguments and packages: 'arm.xacro tool:=true package:grippers:=/a/b'."""
+    """Split 'arm.xacro tool:=true package:grippers:=/a/b' into path, arguments and packages."""
     if not isinstance(source, str) or ':=' not in source:
         return source, {}, {}
     first, *rest = shlex.split(source)
@@ -246,7 +247,9 @@ def _split_arguments(source: str | Path) -> tuple[str | Path, dict[str, str], di
         if package == name:
             arguments[name] = value
         elif not Path(value).is_dir():
-            raise RobotError(f"{source}: the package '{package}' is not a folder: {value}")
+            raise RobotError(
+                f"{source}: the folder of package '{package}' does not exist: {value}"
+            )
         else:
             packages[package] = str(Path(value).resolve())
     return first, arguments, packages
@@ -254,7 +257,7 @@ def _split_arguments(source: str | Path) -> tuple[str | Path, dict[str, str], di
 
 def described_at(robot: Robot, positions: Mapping[str, float]) -> Robot:
     """
-    Return the robot of the description with given positions of the joints that are not driven.
+    Return the described robot with given positions of the joints that are not driven.
 
     Parameters
     ----------
@@ -275,7 +278,7 @@ def described_at(robot: Robot, positions: Mapping[str, float]) -> Robot:
 def _kinematic_model(
     description: Description, driven: Sequence[Joint], known: Mapping[str, float]
 ) -> tuple[pin.Model, tuple[str, ...]]:
-    """Return the model of the moving joints, and notes on the positions of locked joints."""
+    """Return the Pinocchio model of the moving joints, and a note on each locked joint."""
     moving = moving_joints(description, [joint.name for joint in driven])
     positions = {
         joint.name: standing_position(description, joint, known)
@@ -307,7 +310,7 @@ def _kinematic_urdf(description: Description, positions: Mapping[str, float]) ->
         values = dict(zip(INERTIA, map(repr, inertial.inertia), strict=True))
         ElementTree.SubElement(element, 'inertia', values)
     for joint in description.joints:
-        driven = joint.movable and joint.name not in positions
+        driven = joint.kind in MOVABLE and joint.name not in positions
         kind = 'prismatic' if joint.kind == 'prismatic' else 'revolute'
         xyz, rpy, position = joint.xyz, joint.rpy, positions.get(joint.name, 0.0)
         if position != 0.0:  # noqa: RUF069 - as given
@@ -337,7 +340,7 @@ _MOUNTING_SUFFIX = '.mounting.yaml'
 
 def read_mounting(robot: Robot) -> tuple[float | None, Path] | None:
     """
-    Read NAME.mounting.yaml in the folder of a description; return None without a file.
+    Read the height of the floor from NAME.mounting.yaml beside NAME.urdf; None without this file.
 
     Returns
     -------
@@ -375,7 +378,7 @@ _MECHANISM_SUFFIX = '.mechanism.yaml'
 
 def with_mechanism(text: str, path: Path) -> str:
     """
-    Return a URDF with the coupled joints of NAME.mechanism.yaml in its folder, if it exists.
+    Return a URDF with the coupled joints of NAME.mechanism.yaml added, if this file exists.
 
     The additional elements of the result are ignored by other readers of a URDF.
 
@@ -394,7 +397,7 @@ def with_mechanism(text: str, path: Path) -> str:
     with reading(path, RobotError):
         document = load_yaml(read_text(path, RobotError))
         if not isinstance(document, dict) or document.keys() - {'mimic', 'motors', 'loops'}:
-            raise RobotError('has to be a mapping with mimic, motors and loops')
+            raise RobotError('the content has to be a mapping with the keys mimic, motors, loops')
         try:
             lines = _elements(document, text)
         except (AttributeError, KeyError, TypeError) as error:
@@ -404,7 +407,7 @@ def with_mechanism(text: str, path: Path) -> str:
 
 
 def _elements(document: Mapping[str, Any], urdf: str) -> list[str]:
-    """Return the elements of a URDF for the contents of a file of coupled joints."""
+    """Return URDF elements for the mimic joints, motors and loops of NAME.mechanism.yaml."""
 
     def tag(kind: str, /, *inside: str, **attributes: Any) -> str:
         pairs = ''.join(f' {key}={quoteattr(str(value))}' for key, value in attributes.items())

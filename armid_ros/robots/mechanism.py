@@ -112,7 +112,7 @@ class Mechanism:
         return Configuration(solution[0], solution[1], drift)
 
     def states(self, u: FloatArray, du: FloatArray | None = None) -> Configuration:
-        """Return the moving joints in N states, each (N, n), of the driven joints."""
+        """Return the states of the moving joints for N states of the driven joints, (N, n)."""
         m, n = self.driven.shape
         if self.constant:
             q = u @ self.driven.T + self.offset
@@ -131,16 +131,16 @@ class Mechanism:
         return Configuration(q.reshape(-1, m), jacobian.reshape(-1, m, n), drift)
 
     def along(self, motion: Motion) -> tuple[Motion, FloatArray]:
-        """Return the motion of the moving joints, and J of every sample, shape (N, m, n)."""
+        """Return the motion of the moving joints for that of the driven ones, and J, (N, m, n)."""
         q, jacobian, drift = self.states(motion.q, motion.dq)
         dq, ddq = (np.einsum('kmn,kn->km', jacobian, x) for x in (motion.dq, motion.ddq))
         return Motion(self.joints, motion.t, q, dq, ddq + drift), jacobian
 
     def _solved(self, u: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """
-        Return the moving joints and J for one state of the driven joints, with loops closed.
+        Close the loops for one pose of the driven joints; return positions and Jacobian J.
 
-        The third result, (m, 3 L), is the change of the moving joints that closes a gap of 1 m.
+        The third result, (m, 3 L), is the change of the moving joints per metre between the ends.
 
         """
         work, inside = _SCRATCH.of(self), np.clip(u, self.lower, self.upper)
@@ -156,7 +156,10 @@ class Mechanism:
                 by_p = by_q @ self.passive
                 _, inverse, failed = dposv(by_p.T @ by_p, by_p.T)
                 if failed:
-                    raise RobotError('the driven joints do not determine the passive ones')
+                    raise RobotError(
+                        'the positions of the driven joints do not determine the positions of the '
+                        'passive joints in a closed loop'
+                    )
                 step = inverse @ gap
                 p = p - step
                 if np.abs(step).max() < 1e-12:
@@ -174,7 +177,7 @@ class Mechanism:
     def _drift(
         self, q: FloatArray, jacobian: FloatArray, closing: FloatArray, du: FloatArray
     ) -> FloatArray:
-        """Return accelerations dJ/dt du that the motion of closed loops needs, shape (m,)."""
+        """Return the accelerations dJ/dt du of the moving joints in closed loops, shape (m,)."""
         data, world = _SCRATCH.of(self)[0], pin.LOCAL_WORLD_ALIGNED
         pin.forwardKinematics(self.model, data, q, jacobian @ du, np.zeros(len(q)))
         apart = [
@@ -185,7 +188,7 @@ class Mechanism:
         return np.asarray(-closing @ np.concatenate(apart))
 
     def _gap(self, data: pin.Data, q: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return the distances by which loops are open, (3 L,) [m], and their Jacobians."""
+        """Return the vectors between the two ends of each loop, (3 L,) [m], and their Jacobian."""
         pin.computeJointJacobians(self.model, data, q)
         pin.updateFramePlacements(self.model, data)
         world, gaps, slopes = pin.LOCAL_WORLD_ALIGNED, [], []
@@ -197,7 +200,7 @@ class Mechanism:
 
 
 class _Scratch(threading.local):
-    """Work space, last solution, and solutions of whole motions, for each mechanism and thread."""
+    """Pinocchio data, last solution and solved motions of each mechanism, for each thread."""
 
     def __init__(self) -> None:
         self._of: WeakKeyDictionary[Mechanism, list[Any]] = WeakKeyDictionary()

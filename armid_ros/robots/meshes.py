@@ -33,7 +33,7 @@ _QHULL_ERRORS = (RuntimeError, ValueError)  # errors that qhull raises for degen
 
 def find_mesh(name: str, urdf: Path | None) -> Path | None:
     """
-    Return the file of a mesh name in a URDF; None if the file is not found.
+    Return the path of a mesh file that a URDF names; None if the file is not found.
 
     'package://NAME/...' is searched in the `package_folders`. A relative path starts at the
     folder of the URDF.
@@ -96,7 +96,7 @@ def convex_bodies(path: Path, scale: FloatArray) -> tuple[coal.CollisionGeometry
 def _slabs(
     vertices: FloatArray, ends: npt.NDArray[np.intp], axis: FloatArray
 ) -> tuple[coal.ConvexBase, ...]:
-    """Return hulls of slabs across an axis; thin slabs are merged with the previous slab."""
+    """Cut a mesh into slabs across an axis, and return the convex hull of each slab."""
     along = vertices @ axis
     start, end = along[ends[:, 0]], along[ends[:, 1]]
     hulls: list[coal.ConvexBase] = []
@@ -112,7 +112,7 @@ def _slabs(
         try:
             hulls.append(_hull(points))
             thin = np.empty((0, 3))
-        except _QHULL_ERRORS:
+        except _QHULL_ERRORS:  # a flat slab becomes part of the next one
             thin = points
     if len(thin) > 0:
         hulls.append(_hull(np.vstack([hulls.pop().points(), thin])))
@@ -120,7 +120,7 @@ def _slabs(
 
 
 def _join(slabs: Sequence[coal.ConvexBase]) -> tuple[coal.ConvexBase, ...]:
-    """Merge neighbours, first the pair with the smallest increase of volume of the common hull."""
+    """Merge neighbouring hulls, first the pair whose common hull increases the volume least."""
     bodies = list(slabs)
     apart = [body.computeVolume() for body in bodies]
     common = [_common_hull(*pair) for pair in pairwise(bodies)]

@@ -30,7 +30,7 @@ _ROOT = re.compile(r'(?:\s|<\?(?>.*?\?>)|<!--(?>.*?-->))*+<mujoco[\s/>]', re.DOT
 
 
 def is_mjcf(text: str) -> bool:
-    """Return whether the root element of a text is that of an MJCF."""
+    """Return whether a text is an MJCF: whether its root element is <mujoco>."""
     return _ROOT.match(text) is not None
 
 
@@ -77,7 +77,7 @@ def urdf_of_mjcf(path: Path) -> tuple[str, tuple[str, ...]]:
 
 
 def _compiled(mujoco: ModuleType, path: Path, notes: list[str]) -> Any:
-    """Compile a file without textures and without missing meshes."""
+    """Compile an MJCF file with MuJoCo, without its textures and its missing meshes."""
     spec = mujoco.MjSpec.from_file(str(path))
     folder = Path(spec.modelfiledir) / spec.meshdir
     missing = {
@@ -100,7 +100,7 @@ def _compiled(mujoco: ModuleType, path: Path, notes: list[str]) -> Any:
 
 
 class _Writer:
-    """Writer of the URDF of one compiled model."""
+    """Conversion of one compiled MuJoCo model to URDF elements."""
 
     def __init__(self, mujoco: ModuleType, model: Any, path: Path, notes: list[str]) -> None:
         self.mujoco, self.model, self.path, self.notes = mujoco, model, path, notes
@@ -109,7 +109,7 @@ class _Writer:
         self.joints = _names('joint', [model.joint(k).name for k in range(model.njnt)])
 
     def urdf(self) -> ElementTree.Element:
-        """Return the URDF of all bodies that do not float."""
+        """Return the root element of a URDF of all bodies except floating ones."""
         model, afloat, anchors = self.model, set[int](), {0: np.zeros(3)}
         ElementTree.SubElement(self.root, 'link', name=self.bodies[0])
         self._shapes(self.root[-1], 0, anchors[0])
@@ -272,7 +272,7 @@ class _Writer:
             ElementTree.SubElement(element, 'mimic', values | {'offset': _number(offset)})
 
     def _loop(self, equality: int, anchors: Mapping[int, FloatArray]) -> bool:
-        """Write a connect equality as a loop; return False if it has no passive joints."""
+        """Write a connect equality as a closed loop; return False if it closes no such loop."""
         model, kinds = self.model, self.mujoco.mjtEq
         bodies = [int(model.eq_obj1id[equality]), int(model.eq_obj2id[equality])]
         of_bodies = model.eq_objtype[equality] == self.mujoco.mjtObj.mjOBJ_BODY
@@ -338,7 +338,7 @@ class _Writer:
 
 
 def _names(kind: str, given: list[str]) -> list[str]:
-    """Return the names; an element without a name gets its kind and number."""
+    """Return the names of bodies or joints; an unnamed element gets its kind and number."""
     return [one or _unused(f'{kind}_{number}', given) for number, one in enumerate(given)]
 
 

@@ -27,7 +27,7 @@ LIMIT_TOLERANCE = 1e-6
 @dataclass(frozen=True, eq=False)
 class Reference:
     """
-    Waypoints of a joint trajectory.
+    Joint trajectory of waypoints, and the smooth curve through them.
 
     Attributes
     ----------
@@ -60,7 +60,7 @@ class Reference:
         ]
         freeze(self, *names)
         if self.t.ndim != 1 or not len(self.t):
-            raise TrajectoryError('trajectory: it has no points')
+            raise TrajectoryError('trajectory: it has no waypoints')
         if len(set(self.joints)) != len(self.joints):
             raise TrajectoryError(f'trajectory: a joint is named twice: {", ".join(self.joints)}')
         expected = (len(self.t), len(self.joints))
@@ -79,7 +79,9 @@ class Reference:
                     f'{values[point, joint]}'
                 )
         if not self.t[0] >= 0.0:
-            raise TrajectoryError(f'trajectory: its first time is {self.t[0]} s, before 0')
+            raise TrajectoryError(
+                f'trajectory: its first waypoint is at {self.t[0]} s, but time begins at 0'
+            )
         late = np.flatnonzero(~((np.diff(self.t) > 0.0) & np.isfinite(self.t[1:])))
         if len(late):
             point = int(late[0]) + 1
@@ -159,7 +161,7 @@ class Reference:
         return self if self.joints == robot.joints else self.of_joints(robot.joints)
 
     def of_joints(self, joints: tuple[str, ...]) -> Reference:
-        """Return the reference of some of its joints, in the given order."""
+        """Return the reference of the named joints, in the given order."""
         order = [self.joints.index(joint) for joint in joints]
         return self._waypoints(joints, self.t, (slice(None), order))
 
@@ -226,7 +228,7 @@ class Reference:
         size = 20_000  # samples of a block
         blocks = [self.t, *np.split(t, np.arange(size, len(t), size))]
         for motion in map(self.sample, blocks):
-            for beyond, values, kind, unit in (
+            for beyond, values, kind, per_time in (
                 (motion.q < robot.lower - slack, motion.q, 'lower', ''),
                 (motion.q > robot.upper + slack, motion.q, 'upper', ''),
                 (np.abs(motion.dq) > fastest, motion.dq, 'velocity', '/s'),
@@ -239,11 +241,11 @@ class Reference:
                     'upper': robot.upper,
                     'velocity': robot.velocity_limit,
                 }[kind][joint]
-                what = f'{robot.position_units[joint]}{unit}'
+                unit = f'{robot.position_units[joint]}{per_time}'
                 raise TrajectoryError(
                     f"trajectory: joint '{robot.joints[joint]}' reaches "
-                    f'{values[sample, joint]:.4g} {what} at {motion.t[sample]:.3f} s, beyond its '
-                    f'{kind} limit of {limit:.4g} {what}'
+                    f'{values[sample, joint]:.4g} {unit} at {motion.t[sample]:.3f} s, beyond its '
+                    f'{kind} limit of {limit:.4g} {unit}'
                 )
 
 
@@ -254,7 +256,7 @@ def limit_slack(robot: Robot) -> FloatArray:
 
 
 def _curve(t: FloatArray, q: FloatArray, dq: FloatArray | None, ddq: FloatArray | None) -> PPoly:
-    """Return the piecewise polynomial through waypoints, with a shape (N, n) at N times."""
+    """Return the piecewise polynomial of all joint positions through the waypoints."""
     span, way = np.diff(t)[:, np.newaxis], np.diff(q, axis=0)
     c = np.zeros((6, *way.shape))  # coefficients of u^0 to u^5, u = (t - t_k) / (t_k+1 - t_k)
     c[0], c[1] = q[:-1], way

@@ -143,7 +143,7 @@ class Robot:
 
     @property
     def tip(self) -> str:
-        """Return the last moving joint; with coupled joints, the joint at the end of the arm."""
+        """Return the last moving joint; with coupled joints, the one farthest from the base."""
         if self.mechanism is None:
             return self.joints[-1]
         lengths = [np.linalg.norm(place.translation) for place in self.model.jointPlacements]
@@ -159,14 +159,14 @@ class Robot:
         return bool(own.prismatic[own.index(joint)])
 
     def body_of(self, joint: str) -> int:
-        """Return the index of the body of a driven joint, or the last body that a motor moves."""
+        """Return the index of the body that a joint moves; for a motor, of the last such body."""
         if self.mechanism is None or joint in self.moving:
             return self.moving.index(joint)
         return int(np.flatnonzero(self.mechanism.driven[:, self.index(joint)])[-1])
 
     @cached_property
     def tree(self) -> Robot:
-        """The robot whose driven joints are all moving joints; itself if no joints are coupled."""
+        """Return the robot with all moving joints driven; itself if no joints are coupled."""
         if self.mechanism is None:
             return self
         own = [self.description.by_name[name] for name in self.moving]
@@ -207,12 +207,12 @@ class Robot:
 
     @cached_property
     def description(self) -> Description:
-        """Links and joints of the URDF, driven or not."""
+        """Return the links and joints of the URDF, driven or not."""
         return parse_description(parse_xml(self.urdf))
 
     @cached_property
     def geometry(self) -> tuple[JointGeometry, ...]:
-        """Geometry of each moving joint."""
+        """Return axis and placement of each moving joint."""
         return tuple(JointGeometry.of(self.model, k) for k in range(len(self.links)))
 
     @property
@@ -339,7 +339,7 @@ class Robot:
 @dataclass(frozen=True, eq=False)
 class JointGeometry:
     """
-    A joint of one degree of freedom.
+    Axis and placement of a joint with one degree of freedom.
 
     Attributes
     ----------
@@ -367,7 +367,7 @@ class JointGeometry:
 
     @classmethod
     def of(cls, model: pin.Model, number: int) -> JointGeometry:
-        """Return the geometry of a joint of a model."""
+        """Return the geometry of the joint with a given number, from 0, in a Pinocchio model."""
         joint, placement = model.joints[number + 1], model.jointPlacements[number + 1]
         data = joint.createData()
         joint.calc(data, np.zeros(joint.nq))
@@ -386,7 +386,7 @@ class JointGeometry:
 
 
 def joint_fields(joints: Sequence[Joint]) -> dict[str, Any]:
-    """Return the fields of a `Robot` for some joints of a description."""
+    """Return names, limits and friction of joints as the fields of a `Robot`."""
     return {
         'joints': tuple(joint.name for joint in joints),
         'lower': np.array([joint.lower for joint in joints]),
@@ -401,7 +401,7 @@ def joint_fields(joints: Sequence[Joint]) -> dict[str, Any]:
 
 
 def position_range(lower: FloatArray, upper: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return position limits; an unlimited joint gets +-`UNLIMITED_HALF_RANGE`."""
+    """Return position limits, (n,); +-`UNLIMITED_HALF_RANGE` for an unlimited joint."""
     return (
         np.where(np.isfinite(lower), lower, -UNLIMITED_HALF_RANGE),
         np.where(np.isfinite(upper), upper, UNLIMITED_HALF_RANGE),

@@ -8,7 +8,7 @@ from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from armid_ros.errors import meant, RobotError
-from armid_ros.robots.description import Description, Joint
+from armid_ros.robots.description import Description, Joint, MOVABLE
 from armid_ros.robots.robot import Robot
 
 GRIPPER_WORDS = ('finger', 'gripper', 'jaw')
@@ -84,7 +84,7 @@ def driven_joints(description: Description, names: Sequence[str] | None) -> tupl
 
 
 def several_arms(description: Description, driven: Sequence[str]) -> tuple[str, ...]:
-    """Return a note if the driven joints belong to several arms; otherwise no note."""
+    """Return a note that lists the arms if the driven joints belong to several; else no note."""
     arms = _arms(description, driven)
     if len(arms) < 2:
         return ()
@@ -93,7 +93,7 @@ def several_arms(description: Description, driven: Sequence[str]) -> tuple[str, 
 
 
 def _arms(description: Description, joints: Sequence[str]) -> list[list[str]]:
-    """Return the arms among the driven joints: long chains from the last fork to a tip."""
+    """Return the arms: chains of three or more joints between the last fork and a tip."""
     carriers = {name: _carriers(description, [name]) for name in joints}
     kept = list(joints)
     while kept:
@@ -138,7 +138,7 @@ def joints_beside_arms(robot: Robot) -> tuple[str, ...]:
 def load_arms(
     load: Callable[[Sequence[str] | None], Robot], joints: Sequence[str] | None
 ) -> tuple[Robot, tuple[str, ...]]:
-    """Load a robot with the joints of its arms; return the other driven joints too."""
+    """Load a robot with only the joints of its arms driven; return the joints left out as well."""
     robot = load(joints)
     others = () if joints else joints_beside_arms(robot)
     if others:
@@ -147,7 +147,7 @@ def load_arms(
 
 
 def held_joints(robot: Robot) -> tuple[HeldJoint, ...]:
-    """Return the movable joints of the description that are locked."""
+    """Return the movable joints of the description that the model locks in place."""
     description = robot.description
     carriers = {name: _carriers(description, [name]) for name in robot.joints}
     return tuple(
@@ -164,7 +164,7 @@ def held_joints(robot: Robot) -> tuple[HeldJoint, ...]:
 
 
 def standing_position(description: Description, joint: Joint, known: Mapping[str, float]) -> float:
-    """Return the position of a joint that is not driven [rad or m]; by default nearest to 0."""
+    """Return the position of a locked joint [rad or m]: as given, or else nearest to zero."""
     factors, position = leaders(description, joint, known)
     for name, factor in factors.items():
         leader = description.by_name[name]
@@ -176,7 +176,7 @@ def leaders(
     description: Description, joint: Joint, stop: Collection[str], above: tuple[str, ...] = ()
 ) -> tuple[dict[str, float], float]:
     """
-    Return which joints a joint follows, as a sum that gives its position.
+    Return the position of a mimic joint as a weighted sum of independent joints and an offset.
 
     Parameters
     ----------
@@ -192,9 +192,9 @@ def leaders(
     Returns
     -------
     factors : dict of str to float
-        Factor of the position of each joint that follows none; the joint itself if it is one.
+        Factor of each independent joint; 1 for the joint itself if it follows none.
     offset : float
-        Position if those joints are at zero [rad or m].
+        Position if the independent joints are at zero [rad or m].
 
     Raises
     ------
@@ -220,7 +220,7 @@ def leaders(
 
 
 def _free(description: Description) -> list[Joint]:
-    """Return the joints that a user can drive."""
+    """Return the movable joints that follow no other joint and belong to no closed loop."""
     passive = description.passive
     return [j for j in description.movable() if not j.mimic and j.name not in passive]
 
@@ -233,7 +233,7 @@ def _by_name(description: Description, names: Sequence[str]) -> tuple[Joint, ...
             raise RobotError(
                 f"no joint is named '{name}'; joints to drive: {free}{meant(name, known)}"
             )
-        if not known[name].movable:
+        if known[name].kind not in MOVABLE:
             raise RobotError(f"joint '{name}' is fixed; joints to drive: {free}")
         if known[name].mimic:
             raise RobotError(
@@ -241,7 +241,8 @@ def _by_name(description: Description, names: Sequence[str]) -> tuple[Joint, ...
             )
         if name in description.passive:
             raise RobotError(
-                f"joint '{name}' is moved by a loop and cannot be driven; joints to drive: {free}"
+                f"joint '{name}' is passive in a closed loop and cannot be driven; joints to "
+                f'drive: {free}'
             )
         if name in named:
             raise RobotError(f"joint '{name}' is named twice among the driven joints")
@@ -250,7 +251,7 @@ def _by_name(description: Description, names: Sequence[str]) -> tuple[Joint, ...
 
 
 def _carriers(description: Description, joints: Iterable[str]) -> set[str]:
-    """Return the joints that carry one of the given joints."""
+    """Return the joints between the base and any of the given joints."""
     by_child = {joint.child: joint for joint in description.joints}
     found: set[str] = set()
     for joint in joints:

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Places of springs between links of two machines."""
+"""Ties: springs between links of two machines, such as an exoskeleton and its wearer."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _MOVED_BY = ('swing_knee', 'swing_hip', 'stance_knee', 'stance_ankle')
 @dataclass(frozen=True)
 class Tie:
     """
-    Place of a spring between two machines.
+    Spring between links of two machines, given by its end points.
 
     Attributes
     ----------

@@ -118,7 +118,7 @@ class TwoLinkParameters:
 
     def body(self, robot: Robot) -> Robot:
         """
-        Return the robot of two links with this alpha, beta and gamma.
+        Return a two-link robot with inertias that agree with alpha, beta and gamma.
 
         Masses, lengths and the centroid of the first link do not change. The centroid and inertia
         of the second link and the inertia of the first link are adapted.

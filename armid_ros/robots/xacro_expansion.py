@@ -131,7 +131,7 @@ def package_folders(
 
 
 def _packages(root: Path, name: str) -> Iterator[Path]:
-    """Yield packages of a name in a folder and in two levels of subfolders."""
+    """Yield folders with the package.xml of a package, in a folder and two levels below."""
     folders = [root]
     if root != root.parent:
         with suppress(OSError):
@@ -152,7 +152,7 @@ def _paths(variable: str) -> list[str]:
 
 
 def main() -> None:
-    """Limit memory and processor time, then read one request and write the answer."""
+    """Expand the xacro file that stdin requests, with limited memory and processor time."""
     request = json.load(sys.stdin)
     answers = os.fdopen(os.dup(1), 'w', encoding='utf-8')
     os.dup2(2, 1)  # output of the expansion must not mix with the answer
@@ -181,7 +181,7 @@ class _Arguments(dict[str, str]):
 
 
 def expanded(request: dict[str, Any]) -> dict[str, str]:
-    """Return the expanded text of a file, or the error message."""
+    """Return the expanded text of the requested xacro file, or an error message."""
     answer: dict[str, str] = {}
     missing: dict[str, str] = {}
     arguments = _Arguments(request['arguments'])
@@ -274,7 +274,7 @@ def _unknown_argument(name: str, arguments: _Arguments, request: dict[str, Any])
 
 
 def _place(xacro: Any) -> str:
-    """Return the file in expansion: the file of the macro, if a macro is expanded."""
+    """Return the path of the file, or of the macro's file, that xacro expands at present."""
     macros, files = xacro.macrostack, xacro.filestack
     return str(macros[-1].history[-1][-1] if macros else files[-1])
 

@@ -27,7 +27,7 @@ from armid_ros.identification.rows.regression import predictions
 from armid_ros.identification.rows.signals import conditioning
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.robots import Robot
-from armid_ros.robots.geometry import all_in_one, LinkShape, shapes_of, sticks
+from armid_ros.robots.geometry import combined_mesh_note, LinkShape, shapes_of, sticks
 from armid_ros.robots.meshes import load_mesh
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -218,7 +218,7 @@ def _log_bodies(stream: Any, robot: Robot, marked: Sequence[str]) -> list[str]:
         where, colour = place(joint)
         bar = rr.LineStrips3D([[np.zeros(3), end]], radii=0.02, colors=colour)
         stream.log(f'{where}/bar', bar, static=True)
-    return [*all_in_one(absent), *notes]
+    return [*combined_mesh_note(absent), *notes]
 
 
 def _entity(shape: LinkShape, colour: tuple[int, int, int]) -> Any:

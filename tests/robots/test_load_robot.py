@@ -199,7 +199,7 @@ class TestRefused:
             (robot(ARM, link('l'), joint('free', 'upper', 'l', 'floating')), "'free' is floating"),
             (robot(ARM, link('l'), joint('slide', 'upper', 'l', 'planar')), "'slide' is planar"),
             (robot(ARM, link('l'), joint('odd', 'upper', 'l', 'hinge')), "'odd'.* 'hinge'"),
-            (robot(ARM).replace('0 1 0', '0 0 0'), "axis of joint 'shoulder'"),
+            (robot(ARM).replace('0 1 0', '0 0 0'), "'shoulder'.* zero vector"),
             (robot(ARM).replace('0 1 0', '0 1'), "'shoulder': xyz='0 1'"),
             (robot(ARM).replace('lower="-1"', 'lower="3"'), "'shoulder'.* lower limit 3"),
             (robot(ARM).replace('"1.5"', '"heavy"'), "'upper': value='heavy'"),
