@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Arguments of the public functions: a path for a robot, a seed for a random generator."""
+"""Conversion of arguments of the public functions: names and paths to robots and recordings."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ USUAL = ','.join(USUAL_EFFECTS)
 
 
 def robot_of(robot: RobotLike) -> Robot:
-    """Return a robot, which is loaded if a name or path is given."""
+    """Return the robot of a model, or load a robot that is given by name or path."""
     if isinstance(robot, ArmModel):
         return robot.robot
     if isinstance(robot, Robot):
@@ -47,7 +47,7 @@ def robot_of(robot: RobotLike) -> Robot:
 
 
 def is_model(path: str | Path) -> bool:
-    """Return whether a path names a model.yaml rather than a description."""
+    """Return whether a path names a model.yaml rather than a robot description."""
     if not isinstance(path, str | Path):
         raise RobotError(
             f'a {type(path).__name__} was given in place of a robot; the robot comes before the '
@@ -57,7 +57,7 @@ def is_model(path: str | Path) -> bool:
 
 
 def source_of(robot: Robot) -> str:
-    """Return the text by which files refer to a robot: shipped name, path, or own name."""
+    """Return the text by which result files refer to a robot: shipped name, path or own name."""
     for name in shipped_robots():
         if robot.path == shipped_path(name):
             return name
@@ -65,7 +65,7 @@ def source_of(robot: Robot) -> str:
 
 
 def arm_of(arm: RobotLike, effects: str = USUAL) -> ArmModel:
-    """Return an arm model; a robot or its name or path gets the usual friction."""
+    """Return an arm model; a robot without a model gets the named effects, by default friction."""
     if isinstance(arm, ArmModel):
         return arm
     if not isinstance(arm, Robot) and is_model(arm):
@@ -74,7 +74,7 @@ def arm_of(arm: RobotLike, effects: str = USUAL) -> ArmModel:
 
 
 def drivable(arm: RobotLike) -> ArmModel:
-    """Return an arm model; raise TrajectoryError if a named robot has joints outside its arms."""
+    """Return an arm model; TrajectoryError if a robot named by text drives joints of no arm."""
     model = arm_of(arm)
     others = joints_beside_arms(model.robot) if isinstance(arm, str | Path) else ()
     if others:
@@ -87,11 +87,13 @@ def drivable(arm: RobotLike) -> ArmModel:
 
 
 def recordings_of(
-    recordings: RecordingLike | Sequence[RecordingLike], robot: Robot
+    recordings: RecordingLike | Sequence[RecordingLike], robot: Robot, *, required: bool = False
 ) -> list[Recording]:
-    """Return a list of recordings; those that are given as paths are read."""
+    """Return recordings as a list, and read those that are given as paths."""
     several = recordings if isinstance(recordings, Iterable) else [recordings]
     several = [recordings] if isinstance(recordings, RecordingLike) else list(several)
+    if required and not several:
+        raise RecordingError('no recordings: give at least one bag, table or Recording')
     for one in several:
         if not isinstance(one, RecordingLike):
             raise RecordingError(
@@ -109,18 +111,8 @@ def recordings_of(
     return read
 
 
-def some_recordings_of(
-    recordings: RecordingLike | Sequence[RecordingLike], robot: Robot
-) -> list[Recording]:
-    """Return recordings as `recordings_of` does; raise a RecordingError if there are none."""
-    found = recordings_of(recordings, robot)
-    if not found:
-        raise RecordingError('no recordings: give at least one bag, table or Recording')
-    return found
-
-
-def with_sources_apart(*groups: list[Recording]) -> tuple[list[Recording], ...]:
-    """Add numbers to sources of recordings that have the same name; existing paths stay."""
+def with_unique_sources(*groups: list[Recording]) -> tuple[list[Recording], ...]:
+    """Append numbers to equal source names of recordings, except paths of existing files."""
     taken: dict[str, int] = {}
 
     def named(recording: Recording) -> Recording:
@@ -134,7 +126,7 @@ def with_sources_apart(*groups: list[Recording]) -> tuple[list[Recording], ...]:
 
 
 def motion_of(recording: Recording, cutoff: float | None = None) -> Motion:
-    """Filter the longest unbroken stretch of a recording: see `Recording.motion`."""
+    """Return the filtered motion of the longest stretch without a gap; see `Recording.motion`."""
     measured = recording.tau is not None
     taken = recording if measured else replace(recording, tau=np.zeros_like(recording.q))
     used = conditioning([taken], SignalSettings(cutoff))
@@ -257,7 +249,7 @@ def read_recording(
 
 
 def topics_of(path: Path, settings: ReadSettings = DEFAULT) -> tuple[Topic, ...]:
-    """Return the topics of a bag; a table has none."""
+    """Return the topics of a bag; empty for a table."""
     return () if reader.is_table(path) else reader.topics(path, settings)
 
 

@@ -28,7 +28,7 @@ def baseline_recordings(
     diagnosed: Sequence[Recording],
 ) -> list[Recording]:
     """
-    Return the given baseline; by default the recordings of the identification.
+    Return the given baseline recordings; by default those of the model's identification.
 
     The default baseline is empty if one of its recordings is diagnosed.
 
@@ -57,7 +57,7 @@ def diagnosed_model(
     rng: Rng,
 ) -> tuple[RobotLike | IdentificationResult, ArmModel, Misfit | None, IdentificationResult | None]:
     """
-    Return the given or simulated arm, its model and misfit, and the identification of a simulator.
+    Return what is diagnosed: arm, model and misfit, and the identification of a simulator if any.
 
     The misfit is that of the model at its identification; None if it is unknown. The model of a
     simulator is identified from its recordings (`against`). Without given effects, it has the

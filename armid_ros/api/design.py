@@ -27,7 +27,6 @@ from armid_ros.identification import SignalSettings
 from armid_ros.identification.rows.signals import conditioning, segments
 from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording
-from armid_ros.robots import Robot
 import numpy as np
 
 
@@ -132,7 +131,13 @@ def design_excitation(
 
     """
     model = drivable(arm)
-    robot = _with_limits(model.robot, joint_limits, acceleration)
+    robot = model.robot
+    if isinstance(joint_limits, Mapping):
+        robot = with_joint_limits(robot, None, [f'{j}:={v}' for j, v in joint_limits.items()])
+    elif joint_limits is not None:
+        robot = with_joint_limits(robot, joint_limits)
+    if acceleration is not None:
+        robot = with_acceleration_limit(robot, acceleration)
     model = replace(model, robot=robot)
     # one search for an arm of many joints, as each step takes seconds
     searches, seconds = (1, 25.0) if robot.n_joints > 20 else (4, 120.0)
@@ -163,19 +168,6 @@ def design_excitation(
 excite = design_excitation  # name of the command
 
 
-def _with_limits(
-    robot: Robot,
-    joint_limits: str | Path | Mapping[str, float] | None,
-    acceleration: FloatArray | None,
-) -> Robot:
-    """Return the robot with given limits, which may only be narrower than its own."""
-    if isinstance(joint_limits, Mapping):
-        robot = with_joint_limits(robot, None, [f'{j}:={v}' for j, v in joint_limits.items()])
-    elif joint_limits is not None:
-        robot = with_joint_limits(robot, joint_limits)
-    return robot if acceleration is None else with_acceleration_limit(robot, acceleration)
-
-
 def _searched(
     model: ArmModel,
     settings: DesignSettings,
@@ -186,7 +178,7 @@ def _searched(
     rival: ArmModel | None,
     progress: Progress,
 ) -> ExcitationResult:
-    """Search for the trajectory, after a check that the start pose is free of collisions."""
+    """Check that the start pose is free of collisions, and search for the trajectory."""
     planner = TransferPlanner.of(model, scene, settings.speed)
     start = None if start is None else np.asarray(start, dtype=float)
     if start is None:
@@ -196,8 +188,8 @@ def _searched(
             f'start has shape {start.shape}, but the arm needs shape ({model.robot.n_joints},)'
         )
     elif fault := planner.fault(start):
-        degrees = '; are these degrees?' if not planner.fault(np.radians(start)) else ''
-        raise TrajectoryError(f'start: {fault}{degrees}')
+        hint = '; are these degrees?' if not planner.fault(np.radians(start)) else ''
+        raise TrajectoryError(f'start: {fault}{hint}')
     prior = None
     if earlier:  # information matrix of existing recordings
         used = conditioning(earlier, SignalSettings())

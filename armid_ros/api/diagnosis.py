@@ -15,9 +15,8 @@ from armid_ros.api.arguments import (
     recordings_of,
     Rng,
     RobotLike,
-    some_recordings_of,
     source_of,
-    with_sources_apart,
+    with_unique_sources,
 )
 from armid_ros.api.baseline import baseline_recordings, diagnosed_model
 from armid_ros.api.identification import IdentificationResult
@@ -215,7 +214,7 @@ class DiagnosisResult(ShownModel):
         ]
 
     def with_residual(self, seed: int) -> DiagnosisResult:
-        """Learn the unexplained residual as a map of the state, or add a note with the reason."""
+        """Learn the unexplained residual as a map, or add a note that states why none exists."""
         if self.verdict not in OPEN:
             note = f'nothing is learned for the verdict {self.verdict.replace("_", " ")}'
             return replace(self, notes=(*self.notes, note))
@@ -386,9 +385,10 @@ def diagnose(
         require_residual()
     arm, model, known, simulated = diagnosed_model(arm, effects, against, baseline, rng)
     robot = model.robot
-    diagnosed, held_out = some_recordings_of(recordings, robot), recordings_of(validate, robot)
+    diagnosed = recordings_of(recordings, robot, required=True)
+    held_out = recordings_of(validate, robot)
     before = baseline_recordings(arm, model, baseline, [*diagnosed, *held_out])
-    diagnosed, held_out, before = with_sources_apart(diagnosed, held_out, before)
+    diagnosed, held_out, before = with_unique_sources(diagnosed, held_out, before)
     require_once([*diagnosed, *before], held_out)
     misfit = misfit or known
     settings = DiagnosisSettings(
@@ -431,9 +431,9 @@ def require_residual() -> None:
     require_libraries()
 
 
-def _attempt(what: str, make: Callable[[], _Made]) -> tuple[_Made | None, tuple[str, ...]]:
-    """Run a step; return its result, or None and the reason of its failure."""
+def _attempt(name: str, make: Callable[[], _Made]) -> tuple[_Made | None, tuple[str, ...]]:
+    """Call a function; return its result, or None and a note with the reason of its failure."""
     try:
         return make(), ()
     except Exception as error:  # the diagnosis itself is valid after any error
-        return None, (f'there is no {what}: {error or type(error).__name__}',)
+        return None, (f'there is no {name}: {error or type(error).__name__}',)

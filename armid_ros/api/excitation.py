@@ -150,7 +150,7 @@ class ExcitationResult(Shown):
 
     @cached_property
     def run(self) -> Run:
-        """Return the trajectory and the motions to and from it; TrajectoryError without a path."""
+        """Return the trajectory with motions to and from it; TrajectoryError without free path."""
         excitation = self.core.excitation
         return plan_run(excitation, self.planner, self.start, WAYPOINT_RATE, seed=self.seed)
 
@@ -214,7 +214,7 @@ class ExcitationResult(Shown):
             scene=self.scene,
             isolability=self.isolability if self.with_isolability else None,
             start_reason=self.start_reason,
-            origin=self.stated(
+            origin=self.with_step(
                 replace(origin, step=self.fitness.remedy or origin.step), self.arm.robot
             ),
         )
@@ -248,39 +248,35 @@ class ExcitationResult(Shown):
 
     def summary(self) -> Summary:
         """Return a summary: identifiable parameters, and the used share of each joint's limits."""
-        shares = self.core.robot_limits_used(self.arm)
+        robot, shares = self.arm.robot, self.core.robot_limits_used(self.arm)
         rows = [
             (joint, *(f'{100 * share[k]:.0f} %' for share in shares.values()))
-            for k, joint in enumerate(self.arm.robot.joints)
+            for k, joint in enumerate(robot.joints)
         ]
-        seen = identifiable(self.core, self.arm.robot.links)
-        seen += [str(self.isolability)] if self.with_isolability else []
-        word, (first, *lines), remedy = self._of_run()
-        return Summary(
-            first,
-            word,
-            ('joint', *(f'{name} used' for name in shares)),
-            rows,
-            [*lines, *seen],
-            [remedy] if remedy else [],
-            then='' if word in (UNFIT, NO_WAY) else 'simulate',
-        )
-
-    def _of_run(self) -> tuple[str, list[str], str]:
-        """Return the verdict on the run, sentences on the run and its search, and the remedy."""
         try:
             run, fit = self.run, self.fitness
         except TrajectoryError as error:
-            found = f'There is no path to the trajectory: {error}.'
-            return NO_WAY, [found], 'Give another --start or --seed.'
-        robot = self.arm.robot
-        parts = zip(robot.joints, self.start, robot.position_units, strict=True)
-        pose = [f'{joint} {value:.3g} {unit}' for joint, value, unit in parts if value]
-        lines = fit.sentences()
-        lines.append(
-            f'starts at rest at {", ".join(pose) or "zero"}, is on the trajectory after '
-            f'{run.approach.duration:.1f} s and back after {run.duration:.1f} s'
+            word, remedy = NO_WAY, 'Give another --start or --seed.'
+            lines = [f'There is no path to the trajectory: {error}.']
+        else:
+            word, remedy, lines = fit.word, fit.remedy, fit.sentences()
+            parts = zip(robot.joints, self.start, robot.position_units, strict=True)
+            pose = [f'{joint} {value:.3g} {unit}' for joint, value, unit in parts if value]
+            lines.append(
+                f'starts at rest at {", ".join(pose) or "zero"}, is on the trajectory after '
+                f'{run.approach.duration:.1f} s and back after {run.duration:.1f} s'
+            )
+            lines += [self.start_reason] if self.start_reason else []
+            early = f'stopped early ({self.core.stopped}): another run with this seed may differ'
+            lines += [early] if self.core.stopped else []
+        lines += identifiable(self.core, robot.links)
+        lines += [str(self.isolability)] if self.with_isolability else []
+        return Summary(
+            lines[0],
+            word,
+            ('joint', *(f'{name} used' for name in shares)),
+            rows,
+            lines[1:],
+            [remedy] if remedy else [],
+            then='' if word in (UNFIT, NO_WAY) else 'simulate',
         )
-        lines += [self.start_reason] if self.start_reason else []
-        early = f'stopped early ({self.core.stopped}): another run with this seed may differ'
-        return fit.word, [*lines, early] if self.core.stopped else lines, fit.remedy

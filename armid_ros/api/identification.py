@@ -17,10 +17,9 @@ from armid_ros.api.arguments import (
     recordings_of,
     Rng,
     RobotLike,
-    some_recordings_of,
     source_of,
     USUAL,
-    with_sources_apart,
+    with_unique_sources,
 )
 from armid_ros.api.table import aligned, data_frame, ResidualPart, ShownModel, Summary
 from armid_ros.arm import ArmModel, Misfit, save_model
@@ -141,7 +140,7 @@ class IdentificationResult(ShownModel):
 
     @property
     def misfit(self) -> Misfit:
-        """Return the residual of the model, with the information on its parameters."""
+        """Return the misfit of the model on its recordings, and the information matrix."""
         known = parameters_of(self.arm.robot.name, self.document())
         information = known.information(self.arm.parameters)
         unusable = self.grade == 'unusable'
@@ -163,7 +162,7 @@ class IdentificationResult(ShownModel):
 
     def predict(self, recordings: RecordingLike | Sequence[RecordingLike]) -> tuple[Fit, ...]:
         """Predict the torques of other recordings."""
-        return self.core.predict(some_recordings_of(recordings, self.arm.robot))
+        return self.core.predict(recordings_of(recordings, self.arm.robot, required=True))
 
     def plot(self) -> npt.NDArray[np.object_]:
         """
@@ -291,7 +290,7 @@ class IdentificationResult(ShownModel):
         )
 
     def _parameters(self) -> list[str]:
-        """Return a table with one line for each parameter: its value and its described value."""
+        """Return the lines of a table with value and described value of each parameter."""
         estimate, links = self.estimate, self.arm.robot.links
         described = self.core.base.values(self.description.theta)
         rows = []
@@ -374,8 +373,9 @@ def identify(
 
     """
     model = arm_of(arm, effects)
-    training, held_out = with_sources_apart(
-        some_recordings_of(recordings, model.robot), recordings_of(validate, model.robot)
+    training, held_out = with_unique_sources(
+        recordings_of(recordings, model.robot, required=True),
+        recordings_of(validate, model.robot),
     )
     require_once(training, held_out)
     check_held_out(model.robot, held_out)

@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Any, TYPE_CHECKING
 
 from armid_ros.api.arguments import (
-    arm_of,
     RecordingLike,
     recordings_of,
     Rng,
@@ -23,7 +22,8 @@ from armid_ros.api.arguments import (
 from armid_ros.api.identification import identify
 from armid_ros.api.table import data_frame, Shown, Summary
 from armid_ros.arm import ArmModel
-from armid_ros.errors import RecordingError
+from armid_ros.errors import ArmidError, RecordingError
+from armid_ros.identification.rows.checks import MIN_CORRELATION, torque_factors
 from armid_ros.inspection import (
     check_links,
     description_remarks,
@@ -33,6 +33,7 @@ from armid_ros.inspection import (
     Remark,
 )
 from armid_ros.inspection import inspect as look
+from armid_ros.inspection.facts import TrialFit
 from armid_ros.inspection.inspect import SCHEMA
 from armid_ros.recording import Recording, Topic
 from armid_ros.recording.reader import read_recording
@@ -101,7 +102,7 @@ class InspectionResult(Shown):
 
     def page(self, origin: ResultOrigin = DEFAULT_ORIGIN) -> str:
         """Return inspection.html with all curves."""
-        return inspection_report(self.core, self.stated(origin))
+        return inspection_report(self.core, self.with_step(origin))
 
     def summary(self) -> Summary:
         """Return a summary: verdict, table of joints, remarks and sampling."""
@@ -184,9 +185,20 @@ def inspect(
     else:
         topics = topics_of(Path(recording)) if topics is None else topics
         read = read_recording(recording)
-    arm = None if described is None else arm_of(described)
-    found = look(read, arm, topics=topics or (), rng=np.random.default_rng(rng))
-    return InspectionResult(found)
+    trial = None if described is None else _trial_fit(described, read, rng)
+    return InspectionResult(look(read, described, trial, topics=topics or ()))
+
+
+def _trial_fit(robot: Robot, recording: Recording, rng: Rng) -> TrialFit:
+    """Identify a robot from one recording; return the quality of the fit, or the refusal."""
+    try:
+        found = identify(robot, recording, physical=False, rng=rng)
+        motions = [fit.motion for fit in found.core.training]
+        factors, correlation = torque_factors(ArmModel(robot), motions)
+        scale = np.where(np.abs(correlation) > MIN_CORRELATION, factors, np.nan)
+        return TrialFit.of(found.core, found.graded, recording, scale)
+    except ArmidError as refusal:
+        return TrialFit(refused=str(refusal))
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -214,7 +226,7 @@ class CheckResult(Shown):
 
     @property
     def finding(self) -> str:
-        """Return what the check found, in one sentence."""
+        """Return the result of the check in one sentence."""
         return headline(self.remarks, self.links)[0]
 
     @property
@@ -237,7 +249,9 @@ class CheckResult(Shown):
 
     def page(self, origin: ResultOrigin = DEFAULT_ORIGIN) -> str:
         """Return report.html with a table of the links."""
-        return description_check_report(self.remarks, self.links, self.stated(origin, self.robot))
+        return description_check_report(
+            self.remarks, self.links, self.with_step(origin, self.robot)
+        )
 
     def summary(self) -> Summary:
         """Return a summary: the finding and the links, with any measured values."""
@@ -312,5 +326,5 @@ def check(
     found = identify(described, read, effects=effects, physical=False, rng=rng)
     graded = found.graded
     fault = next(iter(graded.faults), graded.reasons[0] if graded.word == 'unusable' else '')
-    links = check_links(found.core, found.description, found.grade, fault)
+    links = check_links(found.core, described, found.grade, fault)
     return CheckResult(described, remarks, links)

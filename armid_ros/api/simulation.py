@@ -80,7 +80,7 @@ def simulate(
 
 
 def recording_of(run: SimulatedRun, temperature: Temperatures | None = None) -> Recording:
-    """Return the readings of the sensors in a simulated run, with temperatures of the joints."""
+    """Return the recording of the simulated sensors, with temperatures of the joints if known."""
     return Recording(
         joints=run.joints,
         t=run.t,

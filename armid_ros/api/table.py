@@ -100,8 +100,8 @@ class Shown(ABC):
     def summary(self) -> Summary:
         """Return the summary of the result."""
 
-    def stated(self, origin: ResultOrigin, robot: Robot | None = None) -> ResultOrigin:
-        """Return the origin with robot name and next step, which is a sentence or a command."""
+    def with_step(self, origin: ResultOrigin, robot: Robot | None = None) -> ResultOrigin:
+        """Return an origin with the next step for the user, and the name of a robot if given."""
         shown, known = self.summary(), origin if robot is None else origin.of(source_of(robot))
         step = origin.step or ''.join(shown.steps[:1]) or f'armid {shown.then}'
         return replace(known, step=step)
@@ -189,7 +189,7 @@ class ShownModel(Shown):
 
 
 def aligned(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
-    """Return the lines of a table, names left, other columns right; single cells may be longer."""
+    """Return the lines of a text table; the first column is left-aligned, others right-aligned."""
     if not heads:
         return []
     table = [tuple(heads), *(tuple(row) for row in rows)]

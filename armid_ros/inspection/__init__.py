@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Inspection of a recording: contents, faults, and whether a model can be fitted.
+Inspection of a recording: contents, faults, and suitability for identification.
 
 Inspection does not change the data; curves show the unchanged signals of the file.
 

@@ -16,11 +16,10 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 
-from armid_ros.arm import ArmModel
 from armid_ros.identification import Identification, Score
 from armid_ros.identification.physical.fit_among_bodies import THINNEST
 from armid_ros.inspection.inspect import notes_on, Remark, worst_first
-from armid_ros.motion import FloatArray, Motion
+from armid_ros.motion import FloatArray
 from armid_ros.robots import NO_MASS, Robot
 from armid_ros.robots.description import MOVABLE, parse_xml
 from armid_ros.robots.geometry import collision_geometry, combined_mesh_note
@@ -39,7 +38,7 @@ _MIN_SHARE, _MAX_CHI_SQUARED = 0.5, 10.0
 @dataclass(frozen=True, eq=False)
 class LinkCheck:
     """
-    The n links of a description compared with an identification.
+    Comparison of the n described links of a robot with an identification.
 
     Attributes
     ----------
@@ -54,19 +53,20 @@ class LinkCheck:
     measured_centre, centre_std : ndarray, shape (n, 3)
         Estimated centre of mass and its standard deviation [m]; NaN as for the mass.
     explains : ndarray, shape (n,)
-        Share of the weighted difference that each link alone explains.
+        Share of the chi-squared difference that each link alone explains, 0 to 1.
     wrong : tuple of int
-        Links that together explain the difference, the most important first; empty for none.
+        Indices of the links whose errors together explain the difference, the most important
+        first; empty for none.
     explained : float
-        Share of the weighted difference that the wrong links explain together.
+        Share of the chi-squared difference that the wrong links explain together.
     error_percent, fitted_error_percent : float
-        Torque error with the described links and with fitted ones; friction fitted in both.
+        Torque error with the described links and with fitted links; friction is fitted in both.
     grade : str
         Grade of the identification: good, poor or unusable.
     fault : str
         Why the recording cannot check the links; empty if it can.
     rivals : tuple of int
-        Other links that explain as much as the single wrong link.
+        Indices of other links that explain as much as the single wrong link.
 
     """
 
@@ -105,14 +105,14 @@ def description_remarks(robot: Robot) -> tuple[Remark, ...]:
     """
     found = [Remark('bad', text) for text in robot.description.inertia_doubts()]
     found += _thin_inertias(robot)
-    found += [*_of_joints(robot), *_of_sizes(robot), *_of_shapes(robot)]
+    found += [*_joint_remarks(robot), *_limit_remarks(robot), *_shape_remarks(robot)]
     known = {remark.text for remark in found}
     others = [note for note in notes_on(robot) if note not in known]
     return worst_first([*found, *(Remark('note', note) for note in others)])
 
 
 def _thin_inertias(robot: Robot) -> Iterator[Remark]:
-    """Find inertias of bodies that are thinner than `THINNEST` of their length."""
+    """Yield a remark on each inertia of a body thinner than `THINNEST` times its length."""
     for link, inertial in robot.description.links.items():
         if inertial is None or inertial.doubt():
             continue
@@ -123,13 +123,13 @@ def _thin_inertias(robot: Robot) -> Iterator[Remark]:
             values = ', '.join(f'{moment:.2g}' for moment in moments)
             yield Remark(
                 'doubt',
-                f"link '{link}': principal moments {values} kg m^2 are those of a body thinner "
-                f'than {THINNEST:g} of its length; correct its inertia',
+                f"link '{link}': principal moments {values} kg m^2 belong to a body thinner than "
+                f'{THINNEST:g} of its length; correct its inertia',
             )
 
 
-def _of_joints(robot: Robot) -> Iterator[Remark]:
-    """Check limits, and axes that are not unit vectors in the file; the model normalises them."""
+def _joint_remarks(robot: Robot) -> Iterator[Remark]:
+    """Yield remarks on limits that may be in degrees, and on axes that are no unit vectors."""
     for k, name in enumerate(robot.joints):
         if robot.prismatic[k]:
             continue
@@ -150,11 +150,15 @@ def _of_joints(robot: Robot) -> Iterator[Remark]:
             )
 
 
-def _of_sizes(robot: Robot) -> Iterator[Remark]:
-    """Compare limits of effort and velocity with weight, reach and the other joints."""
+def _limit_remarks(robot: Robot) -> Iterator[Remark]:
+    """Yield remarks on effort and velocity limits that weight or other joints contradict."""
     if robot.mechanism is not None:  # not every pose of the driven joints exists
         return
-    weight, speeds, efforts = _largest_weight(robot), robot.velocity_limit, robot.torque_limit
+    # largest torque of each joint that holds the arm in random poses [N m]
+    poses = np.random.default_rng(0).uniform(*robot.position_range(), (200, robot.n_joints))
+    data, still = robot.model.createData(), np.zeros(robot.n_joints)
+    weight = np.max([np.abs(robot.inverse_dynamics(data, q, still, still)) for q in poses], axis=0)
+    speeds, efforts = robot.velocity_limit, robot.torque_limit
     turns = [k for k in range(robot.n_joints) if not robot.prismatic[k]]
     apart = 4.0  # ratio to the limits of other joints from which a limit is doubtful
     for k in turns:
@@ -187,16 +191,9 @@ def _of_sizes(robot: Robot) -> Iterator[Remark]:
             )
 
 
-def _largest_weight(robot: Robot) -> FloatArray:
-    """Return the largest torque of each joint that holds the arm in random poses, (n,) [N m]."""
-    size = (200, robot.n_joints)
-    q = np.random.default_rng(0).uniform(*robot.position_range(), size)
-    still = Motion.of_states(robot.joints, q, 0.0, 0.0)
-    return np.asarray(np.abs(ArmModel(robot).load(still)).max(axis=0))
-
-
-def _of_shapes(robot: Robot) -> Iterator[Remark]:
-    """Check size and density of links with shapes; shapes overlap, so volumes are upper bounds."""
+def _shape_remarks(robot: Robot) -> Iterator[Remark]:
+    """Yield remarks on sizes of shapes, densities of links and links without collision shape."""
+    # shapes of a link may overlap, so volumes are upper bounds
     geometry, missing = collision_geometry(robot, other='visual')
     volume = dict.fromkeys(robot.description.links, 0.0)
     corners: dict[str, list[FloatArray]] = {link: [] for link in volume}
@@ -215,7 +212,7 @@ def _of_shapes(robot: Robot) -> Iterator[Remark]:
             )
     for link, inertial in robot.description.links.items():
         if inertial is not None and link not in missing:
-            yield from _of_centre(link, np.array(inertial.xyz), corners[link])
+            yield from _centre_remarks(link, np.array(inertial.xyz), corners[link])
         fixed = inertial is None and link not in robot.links  # the link that carries it has mass
         if volume[link] <= 0.0 or link in missing or fixed:
             continue
@@ -241,12 +238,16 @@ def _of_shapes(robot: Robot) -> Iterator[Remark]:
         yield Remark('note', f'{text}: armid excite checks only their joint origins')
 
 
-def _of_centre(link: str, centre: FloatArray, corners: Sequence[FloatArray]) -> Iterator[Remark]:
-    """Check that a centre of mass is not far from the box of the shapes of its link."""
+def _centre_remarks(
+    link: str, centre: FloatArray, corners: Sequence[FloatArray]
+) -> Iterator[Remark]:
+    """Yield a remark if a centre of mass lies far outside the bounding box of a link's shapes."""
     if not corners:
         if np.linalg.norm(centre) > _MAX_LENGTH:
             yield Remark(
-                'bad', f"link '{link}': centre above {_MAX_LENGTH:g} m away; millimetres?"
+                'bad',
+                f"link '{link}': centre of mass more than {_MAX_LENGTH:g} m from the link's "
+                'frame; is it in millimetres?',
             )
         return
     low, high = np.min(corners, axis=0), np.max(corners, axis=0)
@@ -255,37 +256,37 @@ def _of_centre(link: str, centre: FloatArray, corners: Sequence[FloatArray]) -> 
         yield Remark('doubt', f"link '{link}': centre of mass {outside:.3g} m outside its shape")
 
 
-def check_links(found: Identification, described: ArmModel, grade: str, fault: str) -> LinkCheck:
+def check_links(found: Identification, robot: Robot, grade: str, fault: str) -> LinkCheck:
     """
-    Find the links of a description that explain its difference from an identification.
+    Find the described links whose errors explain the difference from an identification.
 
     Parameters
     ----------
     found : Identification
         The identification, without constraints of physical consistency: its covariance is that of
         the data.
-    described : ArmModel
-        The description, with the effects of the identification.
+    robot : Robot
+        The robot as described.
     grade, fault : str
         Grade of the identification, and the fault of the recording if there is one.
 
     """
-    robot, size = described.robot, PER_LINK
-    rigid = len(robot.rigid_parameters)
-    difference = found.estimate.values - found.base.values(described.theta)
+    size, rigid = PER_LINK, len(robot.rigid_parameters)
+    theta = np.concatenate([robot.rigid_parameters, np.zeros(len(found.arm.theta) - rigid)])
+    difference = found.estimate.values - found.base.values(theta)
     factor = np.linalg.cholesky(found.estimate.covariance)
     rows = np.linalg.solve(factor, np.column_stack([found.base.grouping, difference]))
-    # change of the effects' parameters that explains most of the difference without the links
-    change = np.linalg.lstsq(rows[:, rigid:-1], rows[:, -1])[0]
+    # parameters of the effects that explain most of the difference without errors of links
+    effect_values = np.linalg.lstsq(rows[:, rigid:-1], rows[:, -1])[0]
     nuisance, _ = np.linalg.qr(rows[:, rigid:-1])
     rows = np.delete(rows, np.s_[rigid:-1], axis=1)
     rows -= nuisance @ (nuisance.T @ rows)
     spread = robot.described_spread.ravel()
     total = float(rows[:, -1] @ rows[:, -1])
-    theta = np.concatenate([described.theta[:rigid], found.arm.theta[rigid:]])
-    if total <= _MAX_CHI_SQUARED * len(rows):  # effects such as rotors, grouped with links
-        theta[rigid:] = described.theta[rigid:] + change
-    error, fitted_error = _errors(found, described.with_theta(theta))
+    # effects such as rotors are grouped with links
+    effects_suffice = total <= _MAX_CHI_SQUARED * len(rows)
+    theta[rigid:] = effect_values if effects_suffice else found.arm.theta[rigid:]
+    error, fitted_error = _errors(found, theta)
     wrong = [] if error - fitted_error < _MIN_IMPROVEMENT else _selected(rows, spread, total)
     changes, covariance, rest = _fit(rows, spread, wrong)
     freedom = max(1, len(rows) - nuisance.shape[1] - size * len(wrong))
@@ -328,8 +329,9 @@ def check_links(found: Identification, described: ArmModel, grade: str, fault: s
     )
 
 
-def _errors(found: Identification, before: ArmModel) -> tuple[float, float]:
-    """Return the torque errors with the described links and with the fitted ones [%]."""
+def _errors(found: Identification, theta: FloatArray) -> tuple[float, float]:
+    """Return the torque errors with other parameters theta, and with the fitted parameters [%]."""
+    before = found.arm.with_theta(theta)
     fits = [
         replace(
             fit,
@@ -342,7 +344,7 @@ def _errors(found: Identification, before: ArmModel) -> tuple[float, float]:
 
 
 def _selected(rows: FloatArray, spread: FloatArray, total: float) -> list[int]:
-    """Return the wrong links by forward selection, without a link that became redundant."""
+    """Select the wrong links by forward selection; drop a link that became redundant."""
     every = range(len(spread) // PER_LINK)
     wrong: list[int] = []
     rest = total
@@ -363,7 +365,7 @@ def _selected(rows: FloatArray, spread: FloatArray, total: float) -> list[int]:
 def _fit(
     rows: FloatArray, spread: FloatArray, links: Sequence[int]
 ) -> tuple[FloatArray, FloatArray, float]:
-    """Return change, covariance and remaining chi-squared of links that may be wrong."""
+    """Fit the parameters of some links; return change, covariance and remaining chi-squared."""
     size = PER_LINK
     own = [size * k + i for k in links for i in range(size)]
     columns, target = rows[:, own] * spread[own], rows[:, -1]

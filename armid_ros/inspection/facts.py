@@ -1,18 +1,16 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Facts about a recording: its sampling, its joints, and a trial identification."""
+"""Statistics of a recording: time stamps, joints, and the quality of a trial identification."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
-from armid_ros.arm import ArmModel
-from armid_ros.errors import ArmidError
-from armid_ros.identification import identify, Score
-from armid_ros.identification.assess.grade import beyond_noise, grade
+from armid_ros.identification import Grade, Identification, Score
+from armid_ros.identification.assess.grade import beyond_noise
 from armid_ros.identification.assess.grade_limits import LIMITS
 from armid_ros.identification.assess.sensor_faults import held_elsewhere, velocity_ratio
-from armid_ros.identification.rows.checks import MIN_CORRELATION, REST_RANGE, torque_factors
+from armid_ros.identification.rows.checks import REST_RANGE
 from armid_ros.identification.rows.period import find_period, refined_period
 from armid_ros.identification.rows.regression import REST_SPEED
 from armid_ros.motion import FloatArray
@@ -57,11 +55,11 @@ class Sampling:
 
     @staticmethod
     def of(recording: Recording) -> Sampling:
-        """Return the sampling of a recording."""
+        """Return the statistics of the time stamps of a recording."""
         steps = np.diff(recording.t)
         median = float(np.median(steps))
         ordinary = steps[steps <= GAP_PERIODS * median]
-        period = find_repetition(recording)
+        period = repetition_period(recording)
         return Sampling(
             recording.duration,
             1.0 / median,
@@ -73,8 +71,8 @@ class Sampling:
         )
 
 
-def find_repetition(recording: Recording) -> float | None:
-    """Return the period of the motion [s]; None if the motion is not periodic."""
+def repetition_period(recording: Recording) -> float | None:
+    """Return the period with which a recorded motion repeats [s]; None if it does not repeat."""
     # at most 20 Hz and 3000 samples
     rate = min(20.0, 1.0 / recording.period, 3000 / max(recording.duration, 1e-9))
     t = np.arange(recording.t[0], recording.t[-1], 1.0 / rate)
@@ -139,7 +137,7 @@ class JointFacts:
 
 
 def joint_facts(recording: Recording) -> tuple[JointFacts, ...]:
-    """Return the facts of every joint of a recording."""
+    """Return range, speed, resolution and efforts of every joint of a recording."""
     speeds = np.abs(_derivative(recording))
     found = []
     for j, (name, ratio, fit) in enumerate(
@@ -169,7 +167,7 @@ def joint_facts(recording: Recording) -> tuple[JointFacts, ...]:
 
 
 def _derivative(recording: Recording) -> FloatArray:
-    """Return velocities from positions, by parabolas through neighbours in even steps."""
+    """Differentiate the positions of a recording by local parabolas, shape (N, n)."""
     half = 5  # samples on either side
     if len(recording) <= 2 * half + 1:
         return np.gradient(recording.q, recording.t, axis=0)
@@ -185,7 +183,7 @@ def _derivative(recording: Recording) -> FloatArray:
 @dataclass(frozen=True)
 class TrialFit:
     """
-    Result of a trial identification.
+    Quality of a trial identification from one recording.
 
     Attributes
     ----------
@@ -206,9 +204,9 @@ class TrialFit:
     notes : tuple of str
         Notes of the identification.
     elsewhere : tuple of str
-        Joints without drive that moved, or stood at another position than described.
+        Messages on undriven joints that moved, or stood at another position than described.
     poor : tuple of str
-        Joints whose torque the fit hardly describes, each with its error.
+        Joints whose torque error is poor, each with this error.
     grade : str
         Grade by ``identify``: good, poor or unusable; empty if the recording is refused.
     reasons : tuple of str
@@ -232,47 +230,30 @@ class TrialFit:
     reasons: tuple[str, ...] = ()
     faults: tuple[str, ...] = ()
 
-
-def try_identification(arm: ArmModel, recording: Recording, rng: np.random.Generator) -> TrialFit:
-    """
-    Try an identification and collect measures of its quality.
-
-    Parameters
-    ----------
-    arm : ArmModel
-        Description, with the effects to fit.
-    recording : Recording
-        Recording of the joints of the arm.
-    rng : numpy.random.Generator
-        Random numbers for the identification.
-
-    """
-    robot = arm.robot
-    try:
-        result = identify(arm, [recording], rng=rng)
-        graded = grade(result, arm, [recording], {})
-    except ArmidError as refusal:
-        return TrialFit(refused=str(refusal))
-    motions = [fit.motion for fit in result.training]
-    factors, correlation = torque_factors(ArmModel(robot), motions)
-    score = Score.of(result.training)
-    errors = score.joint_relative_error_percent
-    beyond = beyond_noise(errors, result.training, result.used)  # noise does not reduce the grade
-    return TrialFit(
-        relative_error_percent=score.relative_error_percent,
-        rank=result.base.rank,
-        theory=result.theory.rank,
-        condition_number=result.condition_number,
-        cutoff_hz=result.used.cutoff_hz,
-        scale=np.where(np.abs(correlation) > MIN_CORRELATION, factors, np.nan),
-        notes=result.notes,
-        elsewhere=tuple(one.text for one in held_elsewhere(robot, [recording], motions)),
-        poor=tuple(
-            f'{error:.0f} % of the efforts of {joint}'
-            for joint, error, excess in zip(robot.joints, errors, beyond, strict=True)
-            if excess > LIMITS.poor
-        ),
-        grade=graded.word,
-        reasons=graded.reasons,
-        faults=graded.faults,
-    )
+    @classmethod
+    def of(
+        cls, found: Identification, graded: Grade, recording: Recording, scale: FloatArray
+    ) -> TrialFit:
+        """Return the quality of an identification from one recording, with its `scale`."""
+        robot, motions = found.arm.robot, [fit.motion for fit in found.training]
+        score = Score.of(found.training)
+        errors = score.joint_relative_error_percent
+        beyond = beyond_noise(errors, found.training, found.used)  # noise may exceed the limit
+        return cls(
+            relative_error_percent=score.relative_error_percent,
+            rank=found.base.rank,
+            theory=found.theory.rank,
+            condition_number=found.condition_number,
+            cutoff_hz=found.used.cutoff_hz,
+            scale=scale,
+            notes=found.notes,
+            elsewhere=tuple(one.text for one in held_elsewhere(robot, [recording], motions)),
+            poor=tuple(
+                f'{error:.0f} % of the efforts of {joint}'
+                for joint, error, excess in zip(robot.joints, errors, beyond, strict=True)
+                if excess > LIMITS.poor
+            ),
+            grade=graded.word,
+            reasons=graded.reasons,
+            faults=graded.faults,
+        )

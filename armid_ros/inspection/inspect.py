@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Inspection of a recording: facts, remarks and verdict."""
+"""Inspection of a recording: its statistics, remarks for the user, and a verdict."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any, get_args, Literal
 
-from armid_ros.arm import ArmModel
 from armid_ros.identification.assess.sensor_faults import encoder_faults, velocity_faults
 from armid_ros.identification.rows.checks import beyond_limits, SILENT, too_short_to_tell
 from armid_ros.identification.rows.stamps import rounded_stamps, two_senders
@@ -17,7 +16,6 @@ from armid_ros.inspection.facts import (
     JointFacts,
     Sampling,
     TrialFit,
-    try_identification,
 )
 from armid_ros.recording import Recording, Topic
 from armid_ros.robots import driven_in_words, held_joints, Robot
@@ -30,7 +28,7 @@ Weight = Literal['bad', 'doubt', 'note']
 @dataclass(frozen=True)
 class Remark:
     """
-    A remark about a recording or a description.
+    A remark for the user on a recording or a robot description.
 
     Attributes
     ----------
@@ -48,7 +46,7 @@ class Remark:
 @dataclass(frozen=True)
 class Inspection:
     """
-    The result of an inspection.
+    The result of the inspection of a recording.
 
     Attributes
     ----------
@@ -79,7 +77,7 @@ class Inspection:
 
     @property
     def verdict(self) -> str:
-        """Return one sentence on whether the recording is suitable for identification."""
+        """Return one sentence that states whether the recording is fit for identification."""
         if self.trial is None:
             if self.recording.tau is None:
                 return 'No efforts: nothing can be identified from motion alone.'
@@ -90,8 +88,8 @@ class Inspection:
             return 'Refused by `armid identify`.'
         if self.trial.grade != 'good':
             reason = self.trial.reasons[0]
-            stated = _contains_any(reason, [remark.text for remark in self.remarks])
-            why = '.' if stated else f': {reason}'
+            known = _contains_any(reason, [remark.text for remark in self.remarks])
+            why = '.' if known else f': {reason}'
             return f'Graded {self.trial.grade} by `armid identify`{why}'
         return (
             f'Ready for `armid identify`: {self.trial.rank} of {self.trial.theory} parameters are '
@@ -100,7 +98,7 @@ class Inspection:
 
     @property
     def units(self) -> tuple[str, ...]:
-        """Return the unit of each position."""
+        """Return the unit of each joint position, 'rad' or 'm'."""
         if self.robot is None:
             return ('rad',) * self.recording.n_joints
         return self.robot.position_units
@@ -108,34 +106,32 @@ class Inspection:
 
 def inspect(
     recording: Recording,
-    arm: ArmModel | None = None,
+    robot: Robot | None = None,
+    trial: TrialFit | None = None,
     *,
     topics: tuple[Topic, ...] = (),
-    rng: np.random.Generator,
 ) -> Inspection:
     """
-    Inspect a recording.
+    Inspect a recording: its time stamps, units, motion and efforts.
 
     Parameters
     ----------
     recording : Recording
-        The recording. With an arm, its joints are those of the arm, in the same order.
-    arm : ArmModel, optional
-        Description, for the check of limits and units, and effects for a trial identification.
+        The recording. With a robot, its joints are those of the robot, in the same order.
+    robot : Robot, optional
+        The described robot, for checks of limits and units.
+    trial : TrialFit, optional
+        Quality of a trial identification of the robot from the recording.
     topics : tuple of Topic, optional
         Topics of the bag.
-    rng : numpy.random.Generator
-        Random numbers for the identification.
 
     """
     sampling, joints = Sampling.of(recording), joint_facts(recording)
-    robot = None if arm is None else arm.robot
-    trial = None if arm is None else try_identification(arm, recording, rng)
     found = [
-        *_of_time(recording, sampling),
-        *_of_units(recording, joints, robot),
-        *_of_motion(joints, sampling),
-        *_of_efforts(joints, trial),
+        *_time_remarks(recording, sampling),
+        *_unit_remarks(recording, joints, robot),
+        *_motion_remarks(joints, sampling),
+        *_effort_remarks(joints, trial),
     ]
     mixed = two_senders(recording)
     if trial is None and mixed:
@@ -146,7 +142,7 @@ def inspect(
     if trial is not None and trial.refused:
         found.insert(0, Remark('bad', trial.refused.removeprefix(f'{recording.source}: ')))
     elif trial is not None:
-        found += _of_fit(trial, [remark.text for remark in found])
+        found += _fit_remarks(trial, [remark.text for remark in found])
         found += [Remark('doubt', text) for text in trial.elsewhere]
         known = {remark.text for remark in found}
         found += [Remark('note', note) for note in trial.notes if note not in known]
@@ -182,7 +178,7 @@ def inspection_document(found: Inspection) -> dict[str, Any]:
 
 
 def notes_on(robot: Robot) -> list[str]:
-    """Return warnings and notes on a description, with one note on all undriven joints."""
+    """Return the warnings and notes on a described robot, with one note on undriven joints."""
     held = {f"joint '{joint.name}'" for joint in held_joints(robot)}
     others = [note for note in robot.notes if note.partition(': not')[0] not in held]
     return list(
@@ -196,12 +192,12 @@ def worst_first(remarks: Iterable[Remark]) -> tuple[Remark, ...]:
 
 
 def _contains_any(text: str, others: Iterable[str]) -> bool:
-    """Return whether a text contains one of several words, regardless of case."""
+    """Return whether a text contains one of several other texts, regardless of case."""
     return any(other.casefold() in text.casefold() for other in others)
 
 
-def _of_fit(trial: TrialFit, known: Sequence[str]) -> Iterator[Remark]:
-    """Yield faults that `identify` found and that no remark names yet."""
+def _fit_remarks(trial: TrialFit, known: Sequence[str]) -> Iterator[Remark]:
+    """Yield remarks on faults that a trial identification found and no other remark names."""
     weight: Weight = 'bad' if trial.grade == 'unusable' else 'doubt'
     others = [*known, *trial.elsewhere]
     yield from (
@@ -215,7 +211,8 @@ def _of_fit(trial: TrialFit, known: Sequence[str]) -> Iterator[Remark]:
         )
 
 
-def _of_time(recording: Recording, sampling: Sampling) -> Iterator[Remark]:
+def _time_remarks(recording: Recording, sampling: Sampling) -> Iterator[Remark]:
+    """Yield remarks on damage, time stamps, gaps, jitter and repetition of a recording."""
     report = recording.report
     if report.damage:
         yield Remark('doubt', report.damage)
@@ -228,7 +225,8 @@ def _of_time(recording: Recording, sampling: Sampling) -> Iterator[Remark]:
     elif lost or report.malformed or report.unstamped or report.incomplete:
         yield Remark('doubt', report.describe())
     if report.unwrapped:
-        yield Remark('note', f'jumps by whole turns were removed: {", ".join(report.unwrapped)}')
+        joints = ', '.join(report.unwrapped)
+        yield Remark('note', f'position jumps by whole turns were removed: {joints}')
     if sampling.gaps:
         yield Remark(
             'doubt',
@@ -251,9 +249,10 @@ def _of_time(recording: Recording, sampling: Sampling) -> Iterator[Remark]:
         )
 
 
-def _of_units(
+def _unit_remarks(
     recording: Recording, joints: tuple[JointFacts, ...], robot: Robot | None
 ) -> Iterator[Remark]:
+    """Yield remarks on units of positions, and on velocities that contradict positions."""
     if robot is not None:
         yield from (Remark('doubt', text) for text in beyond_limits(robot, [recording]))
     turned = [
@@ -264,9 +263,9 @@ def _of_units(
     ]
     if turned:
         named = ', '.join(f'{j.name} reaches {max(-j.lower, j.upper):.4g}' for j in turned[:3])
-        yield Remark('doubt', f'{named}: are positions in degrees, or of motors?')
+        yield Remark('doubt', f'{named}: are positions in degrees, or of motors before a gear?')
     if recording.dq is None:
-        yield Remark('note', 'no velocities; they are not needed, positions are differentiated')
+        yield Remark('note', 'no velocities; they are computed from positions')
         return
     for fault in velocity_faults(recording):
         yield Remark('doubt' if fault.word == 'good' else 'bad', fault.what)
@@ -275,10 +274,11 @@ def _of_units(
         yield Remark('doubt', f'velocities of {", ".join(empty)} are zero while they move')
 
 
-def _of_motion(joints: tuple[JointFacts, ...], sampling: Sampling) -> Iterator[Remark]:
+def _motion_remarks(joints: tuple[JointFacts, ...], sampling: Sampling) -> Iterator[Remark]:
+    """Yield remarks on joints at rest, and on joints whose encoder readings repeat."""
     still = [joint.name for joint in joints if joint.still]
     if len(still) == len(joints):
-        yield Remark('bad', 'nothing moves')
+        yield Remark('bad', 'no joint moves')
     elif still:
         yield Remark('note', f'at rest throughout: {", ".join(still)}')
     coarse = [j.name for j in joints if j.repeated > 0.5]
@@ -290,7 +290,8 @@ def _of_motion(joints: tuple[JointFacts, ...], sampling: Sampling) -> Iterator[R
         )
 
 
-def _of_efforts(joints: tuple[JointFacts, ...], trial: TrialFit | None) -> Iterator[Remark]:
+def _effort_remarks(joints: tuple[JointFacts, ...], trial: TrialFit | None) -> Iterator[Remark]:
+    """Yield remarks on missing or constant efforts, and on factors to described torques."""
     if joints[0].effort_rms is None:
         yield Remark('bad', 'no efforts: nothing can be identified; is JointState.effort filled?')
         return
@@ -306,6 +307,6 @@ def _of_efforts(joints: tuple[JointFacts, ...], trial: TrialFit | None) -> Itera
         named = ', '.join(f'{joints[k].name} {trial.scale[k]:.3g}' for k in off)
         yield Remark(
             'doubt',
-            f'efforts follow the description with other factors ({named}): currents, torques '
-            'before the gear, or wrong masses of the description; --current-gain scales them',
+            f'efforts are multiples of the described torques ({named}): they may be currents or '
+            'motor torques, or described masses are wrong; --current-gain scales efforts',
         )

@@ -4,12 +4,11 @@
 
 from dataclasses import replace
 
-from armid_ros.api.arguments import arm_of
+import armid_ros as ar
 from armid_ros.arm import ArmModel
 from armid_ros.effects import make_effect, USUAL_EFFECTS
 from armid_ros.identification import identify
 from armid_ros.identification.assess.grade import grade
-from armid_ros.inspection import inspect
 from armid_ros.inspection.facts import Sampling
 from armid_ros.motion import Motion
 from armid_ros.recording import ReadReport, Recording
@@ -46,12 +45,12 @@ def clean(robot):
 
 def remarks(recording, robot=None):
     """Return what an inspection remarks, each with its weight in front."""
-    found = inspect(recording, robot and arm_of(robot), rng=np.random.default_rng(0))
+    found = ar.inspect(robot, recording).core
     return [f'{remark.weight}: {remark.text}' for remark in found.remarks]
 
 
 def test_of_a_clean_recording_nothing_is_said(clean, robot):
-    found = inspect(clean, arm_of(robot), rng=np.random.default_rng(0))
+    found = ar.inspect(robot, clean).core
     assert found.remarks == ()
     assert found.trial.rank == found.trial.theory
     assert found.trial.relative_error_percent < 3.0
@@ -86,7 +85,7 @@ def jittering(clean):
         (lambda run: replace(run, dq=0 * run.dq), 'are zero'),
         (lambda run: replace(run, tau=None), 'bad: no efforts'),
         (lambda run: replace(run, tau=0 * run.tau + 1.0), 'bad: efforts'),
-        (lambda run: replace(run, q=0 * run.q + 0.2, dq=0 * run.dq), 'bad: nothing'),
+        (lambda run: replace(run, q=0 * run.q + 0.2, dq=0 * run.dq), 'bad: no joint'),
         (lambda run: run.select(np.r_[0:800, 860:2000]), '0.61 s'),
         (jittering, 'vary by'),
         (lambda run: replace(run, q=np.repeat(run.q[::4], 4, axis=0)), 'repeat in'),
@@ -157,7 +156,7 @@ def test_what_identify_calls_unusable_is_not_taken(clean, robot):
     arm = ArmModel.of(robot, effects=USUAL_EFFECTS)
     result = identify(arm, [other], rng=np.random.default_rng(0))
     graded = grade(result, arm, [other], {})
-    found = inspect(other, arm_of(robot), rng=np.random.default_rng(0))
+    found = ar.inspect(robot, other).core
     assert graded.word != 'good'
     assert (found.trial.grade, found.trial.reasons) == (graded.word, graded.reasons)
     assert graded.word in found.verdict and graded.reasons[0] in found.verdict

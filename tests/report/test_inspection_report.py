@@ -17,7 +17,7 @@ def html():
     t = np.delete(np.arange(0.0, 20.0, 0.01), slice(500, 600))
     q = np.column_stack([np.sin(t), np.cos(1.3 * t)])
     recording = Recording(joints=JOINTS, t=t, q=q, tau=3 * q, source='<i>run</i>.mcap')
-    return inspection_report(inspect(recording, rng=np.random.default_rng(0)))
+    return inspection_report(inspect(recording))
 
 
 def test_a_browser_draws_every_curve_within_the_window(charts_drawn, html):
