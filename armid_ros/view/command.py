@@ -18,16 +18,22 @@ import click
 @click.option(
     '--model',
     type=parameters.ModelPath(path_type=Path),
-    help='A model.yaml, or the folder that identify or diagnose wrote: its torque is predicted, '
-    'and joints that the diagnosis names are coloured.',
+    help='A model.yaml, or the folder that identify or diagnose wrote. The torque of the model is '
+    'shown, and the joints of named effects are coloured.',
 )
-@parameters.robot_described(help='Shipped name or path; that of the model by default.')
-@click.option('--out', type=click.Path(path_type=Path), help='File to write, .rrd; no window.')
+@parameters.robot_described(
+    help='Shipped name or path of the robot; by default the robot of the model.'
+)
+@click.option(
+    '--out',
+    type=click.Path(path_type=Path),
+    help='File to write (.rrd) in place of a window.',
+)
 @click.option(
     '--mark',
     metavar='A,B,...',
     callback=parameters.names,
-    help='Joints to colour; default: those named.',
+    help='Joints to colour; by default the joints of named effects.',
 )
 @columns.options
 @parameters.topic
@@ -44,10 +50,9 @@ def view(
     mark: tuple[str, ...],
     topic: str | None,
 ) -> None:
-    """Show a recording in rerun: the moving arm, torques, and the residual of a model."""
+    """Show a recording in rerun: moving arm, measured and predicted torques, and residuals."""
     from armid_ros import ArmModel
     from armid_ros.cli import options
-    from armid_ros.files import write_file
     from armid_ros.view.rerun_log import log_recording, open_stream
 
     if model is None:
@@ -63,14 +68,16 @@ def view(
             mark = tuple(dict.fromkeys(joint for one in effects for joint in one['joints']))
     for joint in mark:
         arm.robot.index(joint)
-    with TemporaryDirectory() as folder:
+    name = Path(recording.source).name or arm.robot.name
+    if out is not None:
+        out.parent.mkdir(parents=True, exist_ok=True)
+    with TemporaryDirectory(dir=None if out is None else out.parent) as folder:
         file = None if out is None else Path(folder) / 'run.rrd'
-        stream = open_stream(Path(recording.source).name or arm.robot.name, file)
+        stream = open_stream(name, file)
         notes = log_recording(stream, arm, recording, mark)
         stream.disconnect()
         if file is not None and out is not None:
-            out.parent.mkdir(parents=True, exist_ok=True)
-            write_file(out, file.read_bytes())
+            file.replace(out)  # the file appears when it is complete
     for note in notes:
         say(f'note: {note}')
     if out is not None:

@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Display of a recording in rerun: curves and arm on one timeline, in a window or a file.
+Display of a recording in rerun: curves and moving arm on one timeline, in a window or a file.
 
 Entities are ``arm/<joint>``, ``torque/<joint>/measured`` and ``predicted``, ``residual/<joint>``,
 ``position/<joint>`` and ``velocity/<joint>``.
@@ -38,15 +38,7 @@ _HOST, _PORT = '127.0.0.1', 9876
 
 
 def rerun() -> ModuleType:
-    """
-    Import and return the module rerun.
-
-    Raises
-    ------
-    ArmidError
-        If it is not installed.
-
-    """
+    """Import and return the module of the viewer rerun; ArmidError if it is not installed."""
     try:
         import rerun
     except ImportError:
@@ -60,7 +52,7 @@ def rerun() -> ModuleType:
 
 def open_stream(name: str, out: Path | None = None) -> Any:
     """
-    Open a window or a file for the logged data.
+    Open a window of rerun or a file for the data of a recording.
 
     Parameters
     ----------
@@ -83,7 +75,7 @@ def open_stream(name: str, out: Path | None = None) -> Any:
     # a window needs a display server on Linux
     screen = os.environ.get('DISPLAY') or os.environ.get('WAYLAND_DISPLAY')
     if out is None and sys.platform.startswith('linux') and not screen:
-        raise ArmidError('there is no screen for a window; --out run.rrd writes a file instead')
+        raise ArmidError('no screen for a window was found; write a file with --out run.rrd')
     stream = rr.RecordingStream('armid', recording_id=None)
     stream.send_recording_name(name)
     if out is None:
@@ -94,7 +86,7 @@ def open_stream(name: str, out: Path | None = None) -> Any:
 
 
 def _started_viewer() -> str:
-    """Start a viewer on the local interface unless one is running; return its URL."""
+    """Return the URL of a rerun viewer on this machine; start the viewer if none is running."""
     command = [sys.executable, '-P', '-m', 'rerun_cli', '--expect-data-soon']
     deadline, viewer = time.monotonic() + 20.0, None
     while True:
@@ -104,7 +96,7 @@ def _started_viewer() -> str:
         except OSError as error:
             ended = viewer is not None and viewer.poll() is not None
             if ended or time.monotonic() > deadline:
-                raise ArmidError(f'the viewer of rerun does not start: {error}') from error
+                raise ArmidError(f'the rerun viewer does not start: {error}') from error
         if viewer is None:
             viewer = subprocess.Popen(
                 [*command, '--bind', _HOST, '--port', str(_PORT)], start_new_session=True
@@ -116,7 +108,7 @@ def log_recording(
     stream: Any, arm: ArmModel, recording: Recording, marked: Sequence[str] = ()
 ) -> list[str]:
     """
-    Log arm, curves and the layout of the window; return notes on links without drawing.
+    Send moving arm, curves and window layout to rerun; return notes on links without shapes.
 
     Parameters
     ----------
@@ -127,12 +119,12 @@ def log_recording(
     recording : Recording
         The recording; torque is predicted if the recording has torque.
     marked : sequence of str
-        Joints to be coloured.
+        Joints to colour.
 
     """
     rr, robot = rerun(), arm.robot
     notes = _log_bodies(stream, robot, marked)
-    t, q = poses(recording)
+    t, q = interpolated_poses(recording)
     frames = ArmModel(robot).link_frames(Motion.of_states(robot.joints, q, 0.0, 0.0)).frames
     curves = [('position/{}', recording.t, recording.q)]
     if recording.dq is not None:
@@ -168,8 +160,8 @@ def log_recording(
     return notes
 
 
-def poses(recording: Recording) -> tuple[FloatArray, FloatArray]:
-    """Interpolate about thirty poses per second; return times, (K,) [s], and poses, (K, n)."""
+def interpolated_poses(recording: Recording) -> tuple[FloatArray, FloatArray]:
+    """Interpolate a recording at about 30 Hz; return times, (K,) [s], and positions, (K, n)."""
     t = recording.t
     count = max(2, int((t[-1] - t[0]) * 30.0) + 1)  # poses per second
     at = np.linspace(t[0], t[-1], min(count, len(t)))
@@ -181,7 +173,7 @@ def poses(recording: Recording) -> tuple[FloatArray, FloatArray]:
 
 
 def _log_bodies(stream: Any, robot: Robot, marked: Sequence[str]) -> list[str]:
-    """Log the shapes of links: visual ones; without these, collision ones; or else bars."""
+    """Send the visual shapes of all links, or else collision shapes or bars; return notes."""
     rr, drawn = rerun(), 0
     notes: list[str] = []
     absent: list[str] = []
@@ -222,7 +214,7 @@ def _log_bodies(stream: Any, robot: Robot, marked: Sequence[str]) -> list[str]:
 
 
 def _entity(shape: LinkShape, colour: tuple[int, int, int]) -> Any:
-    """Convert a shape, in its own frame, to an entity of rerun; RobotError for an invalid mesh."""
+    """Convert a link shape to an entity of rerun; raise a RobotError for an invalid mesh."""
     rr = rerun()
     if shape.path is not None:
         load_mesh(shape.path, np.ones(3))  # the viewer ignores invalid meshes without a message
@@ -240,7 +232,7 @@ def _entity(shape: LinkShape, colour: tuple[int, int, int]) -> Any:
 
 
 def _layout(joints: Sequence[str], marked: Sequence[str]) -> Any:
-    """Return the layout of the window: the arm, torques of each joint, residuals, positions."""
+    """Return the layout of the window: the arm, and tabs with the curves of each joint."""
     import rerun.blueprint as layout
 
     def plots(kind: str, names: Sequence[str]) -> list[Any]:
@@ -248,9 +240,7 @@ def _layout(joints: Sequence[str], marked: Sequence[str]) -> Any:
             layout.TimeSeriesView(
                 origin=f'{kind}/{_part(joint)}',
                 name=joint,
-                plot_legend=layout.PlotLegend(
-                    visible=number == 0
-                ),  # the legend is the same in all views
+                plot_legend=layout.PlotLegend(visible=number == 0),  # the same in all views
             )
             for number, joint in enumerate(names)
         ]
@@ -268,12 +258,11 @@ def _layout(joints: Sequence[str], marked: Sequence[str]) -> Any:
 
 
 def _part(name: str) -> str:
-    """Escape a name for the path of an entity."""
+    """Escape the name of a joint or link for the path of a rerun entity."""
     return str(rerun().escape_entity_path_part(name))
 
 
 def _times(t: FloatArray) -> Any:
-    """Return the time column: dates if times count from 1970, else durations."""
-    # times above this count from 1970, times below from the start of the recording
-    kind = 'timestamp' if t[0] > 1e8 else 'duration'
+    """Return the time column for rerun: dates if times count from 1970, else durations."""
+    kind = 'timestamp' if t[0] > 1e8 else 'duration'  # 1e8 s after 1970 is 1973
     return rerun().TimeColumn(TIMELINE, **{kind: t})

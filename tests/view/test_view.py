@@ -15,7 +15,7 @@ import sys
 import armid_ros as ar
 from armid_ros.cli import main
 from armid_ros.view import rerun_log
-from armid_ros.view.rerun_log import log_recording, open_stream, poses
+from armid_ros.view.rerun_log import interpolated_poses, log_recording, open_stream
 from click.testing import CliRunner
 import numpy as np
 import pinocchio as pin
@@ -88,7 +88,7 @@ def test_the_marked_joint_has_another_colour(found):
 
 
 def test_poses_are_those_of_the_arm(model, recording, found):
-    t, q = poses(recording)
+    t, q = interpolated_poses(recording)
     data = model.robot.model.createData()
     k = len(t) // 2
     pin.forwardKinematics(model.robot.model, data, q[k])

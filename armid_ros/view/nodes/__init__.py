@@ -1,3 +1,3 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Nodes that show a moving arm."""
+"""ROS 2 node that draws residuals on a moving arm."""

@@ -31,7 +31,7 @@ _SHAFT, _LETTER = 0.015, 0.05
 
 class ResidualMarkersNode(ListeningNode):
     """
-    Draws the residual of the online identifier on the joints, for RViz and Foxglove.
+    Node that draws the residuals of the online identifier on the joints, for RViz and Foxglove.
 
     At each joint, the length of an arrow along the axis shows the present residual. The colour of
     a sphere shows the ratio of residual to torque, as root mean squares over two seconds. The
@@ -58,7 +58,7 @@ class ResidualMarkersNode(ListeningNode):
     )
 
     def __init__(self, **kwargs: Any) -> None:
-        """Make the node with keyword arguments of rclpy's Node."""
+        """Create the node; keyword arguments are those of rclpy's Node."""
         super().__init__('residual_markers', **kwargs)
         self._summary = ''
         self._markers = self.create_publisher(MarkerArray, '~/markers', STREAM)
@@ -74,7 +74,7 @@ class ResidualMarkersNode(ListeningNode):
         self.look_every(1.0 / self.value('rate'), self.draw)
 
     def condition(self) -> tuple[str, Mapping[str, object]]:
-        """Return the missing inputs, and the ratio of residual to torque that sets each colour."""
+        """Return the missing inputs, and the ratio of residual to torque of each joint."""
         if self.robot is None:
             return self.awaited, {}
         if not np.isfinite(self._q).all():
@@ -83,7 +83,7 @@ class ResidualMarkersNode(ListeningNode):
         return '', {f'residual share {joint}': float(share) for joint, share in shares}
 
     def draw(self) -> None:
-        """Publish the markers of the arm at its present position."""
+        """Publish the markers of all joints at the present position of the arm."""
         if self.robot is None or not np.isfinite(self._q).all():
             return
         stamp = self.get_clock().now().to_msg()
@@ -101,11 +101,9 @@ class ResidualMarkersNode(ListeningNode):
     def _of_joints(self, robot: Robot) -> Sequence[Marker]:
         pose = Motion.of_states(robot.joints, self._q, 0.0, 0.0)
         frames = ArmModel(robot).link_frames(pose).frames
-        full = max(
-            2.0 * float(np.sqrt(self._residual.max())), 1e-9
-        )  # residual of the longest arrow
-        # the longest arrow is a quarter of the reach
-        lengths = 0.25 * self._reach * np.clip(self._now / full, -1.0, 1.0)
+        # the longest arrow, a quarter of the reach, shows twice the largest residual (rms)
+        largest = max(2.0 * float(np.sqrt(self._residual.max())), 1e-9)
+        lengths = 0.25 * self._reach * np.clip(self._now / largest, -1.0, 1.0)
         markers = []
         for j, (joint, share) in enumerate(zip(robot.joints, self._shares(), strict=True)):
             body = robot.body_of(joint)
@@ -138,7 +136,7 @@ class ResidualMarkersNode(ListeningNode):
         return np.asarray(np.sqrt(self._residual / np.maximum(self._torque, 1e-12)))
 
     def take_description(self, urdf: str) -> None:
-        """Use the robot of robot_description."""
+        """Draw on the robot that the topic robot_description describes."""
         self._draw_on(robot_from_urdf(urdf, joints=self.value('joints') or None))
 
     def _draw_on(self, robot: Robot) -> None:
@@ -155,9 +153,9 @@ class ResidualMarkersNode(ListeningNode):
         self._reach = max(float(np.linalg.norm(steps, axis=1).sum()), 0.1)
 
     def take_sample(self, sample: JointSample) -> None:
-        """Store the position of a joint state, and average its torque."""
+        """Store the positions of a joint state, and update the mean square of its torques."""
         self._q = sample.q
-        self._torque = self._averaged('torque', sample.t, self._torque, sample.tau)
+        self._torque = self._mean_square('torque', sample.t, self._torque, sample.tau)
 
     def _on_residual(self, message: JointState) -> None:
         if self.robot is None or tuple(message.name) != self.robot.joints:
@@ -165,15 +163,16 @@ class ResidualMarkersNode(ListeningNode):
         stamp = message.header.stamp
         self._now = np.array(message.effort)
         t = stamp.sec + 1e-9 * stamp.nanosec
-        self._residual = self._averaged('residual', t, self._residual, self._now)
+        self._residual = self._mean_square('residual', t, self._residual, self._now)
 
     def _on_diagnosis(self, message: Diagnosis) -> None:
         self._summary = f'{message.verdict.replace("_", " ")}: {message.summary}'
 
-    def _averaged(self, what: str, t: float, before: FloatArray, values: FloatArray) -> FloatArray:
-        """Update a running mean square with a sample."""
-        step, self._seen[what] = t - self._seen[what], t
-        # averaging time of 2 s
+    def _mean_square(
+        self, signal: str, t: float, before: FloatArray, values: FloatArray
+    ) -> FloatArray:
+        """Return the running mean square over about 2 s, updated with the values at time t [s]."""
+        step, self._seen[signal] = t - self._seen[signal], t
         share = 1.0 if not before.any() else float(np.clip(step / 2.0, 0.0, 1.0))
         return np.asarray(before + share * (values**2 - before))
 
