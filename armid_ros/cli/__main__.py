@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""`python -m armid_ros.cli` is `armid`."""
+"""Program of `python -m armid_ros.cli`, which is the command `armid`."""
 
 from armid_ros.cli import main
 

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Calls to a running excitation publisher."""
+"""The command `armid call`: services of a running excitation publisher."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Lists of the shipped robots and of the effects."""
+"""The commands `armid robots` and `armid effects`: lists of shipped robots and of effects."""
 
 from __future__ import annotations
 
@@ -18,12 +18,13 @@ def robots(as_json: bool) -> None:
     from armid_ros.files import json_text
     from armid_ros.robots import shipped_robots
 
-    rows = [{'name': name, 'what it is': text} for name, text in shipped_robots().items()]
+    shipped = shipped_robots()
     if as_json:
+        rows = [{'name': name, 'what it is': text} for name, text in shipped.items()]
         click.echo(json_text(rows, indent=1))
         return
-    for row in rows:
-        _say_wrapped(f'{row["name"]}: {row["what it is"]}')
+    for name, text in shipped.items():
+        _say_wrapped(f'{name}: {text}')
 
 
 @click.command(epilog='Example: armid effects --json')

@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Choices of options, copied from the packages, so help needs no import.
+Values of command options, copied from other packages, so that help imports none of them.
 
 A test compares each copy with its original in the package.
 

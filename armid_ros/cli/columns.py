@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Options for the content of a recording: columns of a table, and units."""
+"""Command options that state the columns of a table, units and signs of a recording."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ META = 'armid.columns'
 
 
 def _kept(ctx: click.Context, parameter: click.Parameter, value: Any) -> Any:
-    """Store the value of an option for `settings`."""
+    """Store the value of an option in the context, for `settings`."""
     ctx.meta.setdefault(META, {})[parameter.name] = value
     return value
 
@@ -32,7 +32,7 @@ def _option(*names: str, **facts: Any) -> Callable[[Any], Any]:
 
 
 def _rules(ctx: click.Context, parameter: click.Parameter, value: Any) -> Any:
-    """Store the pairs OLD:NEW of --rename; raise an error for malformed pairs."""
+    """Store the pairs OLD:NEW of --rename; raise a RecordingError for a malformed pair."""
     rules = []
     for text in value:
         old, *new = listed(text, ':')

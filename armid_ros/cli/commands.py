@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The group of all commands, and the error message for bad input."""
+"""The program `armid`: the group of all commands, and error messages for bad input."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ import sys
 import tomllib
 from typing import Any
 
-from armid_ros.cli.node import lacking
+from armid_ros.cli.node import install_hint
 from armid_ros.errors import ArmidError, meant, visible
 from armid_ros.files import read_text
 from armid_ros.plug_ins import load_plug_in, plug_ins
@@ -46,7 +46,7 @@ COMMANDS = {
 
 #: Defaults of options, in the current folder.
 FILE = 'armid.toml'
-#: Context key of notes, which are printed on stderr after the work; an error prints one line.
+#: Context key of notes, which are printed on stderr after a command succeeds.
 NOTES = 'armid.notes'
 #: Context key of the arguments as typed.
 TYPED = 'armid.typed'
@@ -60,7 +60,7 @@ class Commands(click.Group):
         return [*COMMANDS, *sorted(plug_ins('commands').keys() - COMMANDS)]
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
-        """Import a command."""
+        """Import and return the command of a name; None if there is no such command."""
         if cmd_name in COMMANDS or cmd_name in plug_ins('commands'):
             return _imported(cmd_name)
         return None
@@ -105,13 +105,13 @@ class Commands(click.Group):
         return [*names, *click.Command.shell_complete(self, ctx, incomplete)]
 
     def invoke(self, ctx: click.Context) -> Any:
-        """Run a command, and report bad input."""
+        """Run a command and print its notes; print an error message for bad input."""
         try:
             result = super().invoke(ctx)
-            _tell_notes(ctx)
+            _print_notes(ctx)
             return result
         except click.exceptions.Exit:  # keeps its exit code
-            _tell_notes(ctx)
+            _print_notes(ctx)
             raise
         except KeyboardInterrupt:
             click.echo('armid: interrupted', err=True)
@@ -120,7 +120,7 @@ class Commands(click.Group):
             click.echo(f'armid: {" ".join(str(error).split())}', err=True)
             sys.exit(2)
         except ModuleNotFoundError as error:
-            remedy = lacking(error)
+            remedy = install_hint(error)
             if remedy is None:
                 raise
             click.echo(f'armid: {remedy}', err=True)
@@ -134,14 +134,14 @@ class Commands(click.Group):
             sys.exit(2)
 
 
-def _tell_notes(context: click.Context) -> None:
+def _print_notes(context: click.Context) -> None:
     for note in context.meta.get(NOTES, ()):
         click.echo(note, err=True)
 
 
 @cache
 def _imported(name: str) -> click.Command:
-    """Import a command; its options accept finite numbers only."""
+    """Import the command of a name, and let its options accept finite numbers only."""
     command: click.Command
     if name in COMMANDS:
         module = import_module(f'armid_ros.cli.{COMMANDS[name]}')
@@ -153,7 +153,7 @@ def _imported(name: str) -> click.Command:
 
 
 def _refuse_infinite(command: click.Command) -> None:
-    """Restrict numbers in options of a command and its subcommands to finite numbers."""
+    """Let the options of a command and of its subcommands accept finite numbers only."""
     for below in command.commands.values() if isinstance(command, click.Group) else ():
         _refuse_infinite(below)
     for parameter in command.params:
@@ -167,7 +167,7 @@ def _finite(
     parameter: click.Parameter,
     value: Any,
 ) -> Any:
-    """Check the numbers of an option before its own callback."""
+    """Raise BadParameter for a number that is not finite; else call the option's own callback."""
     for number in value if isinstance(value, tuple) else (value,):
         if number is not None and not math.isfinite(number):
             raise click.BadParameter(f'{number} is not a finite number', context, parameter)

@@ -59,17 +59,18 @@ def convert(
     if robot_source is not None:
         robot = options.open_robot(robot_source, 'earth', joints)
     if all(is_table(path) for path in files):
-        _table(files, robot, joints, None if dry_run else out)
+        _convert_tables(files, robot, joints, None if dry_run else out)
         return
     if len(files) > 1:
         named = ', '.join(str(path) for path in files)
-        raise RecordingError(f'{named}: only tables can be merged; convert bags one by one')
-    _bag(files[0], None if dry_run else out)
+        raise RecordingError(f'{named}: only tables can be joined; convert bags one by one')
+    _convert_bag(files[0], None if dry_run else out)
 
 
-def _table(
+def _convert_tables(
     files: tuple[Path, ...], robot: Robot | None, joints: str | None, out: Path | None
 ) -> None:
+    """Join tables and write them as a bag; without an output path, only print the columns."""
     from armid_ros.files.cells import listed
     from armid_ros.recording import write_recording
     from armid_ros.recording.reader import read_tables
@@ -96,7 +97,8 @@ def _table(
     say(f'{out}: {len(recording)} samples of {recording.n_joints} joints')
 
 
-def _bag(path: Path, out: Path | None) -> None:
+def _convert_bag(path: Path, out: Path | None) -> None:
+    """Copy a ROS 1 bag to a ROS 2 bag, and print the copied topics."""
     from armid_ros.cli import options
     from armid_ros.recording import copy_bag, topics
     from armid_ros.recording.bag import is_ros1
@@ -105,11 +107,11 @@ def _bag(path: Path, out: Path | None) -> None:
     refuse_columns(path, columns.settings(), copied=True)
     if out is None:
         raise RecordingError(
-            f'{path}: this is a bag; --dry-run is for tables, armid inspect for bags'
+            f'{path}: this is a bag, but --dry-run shows tables only; use armid inspect {path}'
         )
     if not is_ros1(path):
         topics(path)  # raises an error if the path is not a bag
-        raise RecordingError(f'{path}: there is nothing to do, as this is a bag of ROS 2 already')
+        raise RecordingError(f'{path}: this is a bag of ROS 2 already; it needs no conversion')
     copied = copy_bag(path, out, options.read_settings())
     for topic in copied.topics:
         say(f'  {topic.name} ({topic.type_name}): {topic.count} messages')

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Diagnosis of bags: the effects that a model lacks."""
+"""The command `armid diagnose`: effects that a model lacks, found from recordings."""
 
 from __future__ import annotations
 
@@ -211,7 +211,7 @@ def diagnose(
 
 
 def _identified_from(model: Path, diagnosed: list[Path]) -> tuple[Path, ...]:
-    """Return the recordings of the identification as the baseline; none if one is diagnosed."""
+    """Return the recordings that a model was identified from, unless one of them is diagnosed."""
     from armid_ros.identification.output import identified_from, require_as_identified
 
     found = identified_from(model)
@@ -224,7 +224,7 @@ def _identified_from(model: Path, diagnosed: list[Path]) -> tuple[Path, ...]:
 
 
 def _model_of(path: Path, robot: Robot) -> ArmModel:
-    """Read a model; ArmidError if its description exists and has other kinematics."""
+    """Read a model.yaml; raise an ArmidError if the kinematics of its description differ."""
     from armid_ros.arm import load_model
     from armid_ros.cli import options
     from armid_ros.identification.output import kinematics_digest
@@ -246,7 +246,7 @@ def open_partner(
     source: str | None, ties: Sequence[str], robot: Robot, gravity: str
 ) -> Partner | None:
     """
-    Load the machine that --partner names, with the ties of --tie; None without --partner.
+    Load the machine of --partner with the possible ties to the arm; None without --partner.
 
     Raises
     ------
@@ -289,7 +289,7 @@ def read_together(
     partner: Partner,
     topic: str | None,
 ) -> list[Recording]:
-    """Add the motion of the partner, from the same bags, to recordings of the arm."""
+    """Return the recordings of the arm with the motion of the partner, read from the same bags."""
     from armid_ros.cli import options
     from armid_ros.recording import read_recording, recorded_together
 

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Design of an excitation trajectory."""
+"""The command `armid excite`: design of an excitation trajectory."""
 
 from __future__ import annotations
 
@@ -20,10 +20,9 @@ if TYPE_CHECKING:
     from armid_ros.motion import FloatArray
     from armid_ros.robots import Robot
 
-
 #: Kinds of trajectories for elastic joints.
 COURSES = ('multisine', 'steps')
-#: Common options of designs and of trajectories for elastic joints; the latter also have --share.
+#: Options of every --kind of trajectory; trajectories for elastic joints also have --share.
 _SHARED = {
     'robot_source', 'out', 'kind', 'duration', 'clearance', 'environment', 'floor', 'gravity',
     'joints', 'seed', 'force', 'crc', 'memory_limit',
@@ -31,7 +30,7 @@ _SHARED = {
 
 
 def _speed(context: click.Context, parameter: click.Parameter, value: Any) -> str | float:
-    """Return a speed class, or a share of the velocity and acceleration limits."""
+    """Return --speed as a speed class, or as a share of the velocity and acceleration limits."""
     try:
         return str(value) if value in SPEED_CLASSES else float(value)
     except ValueError:
@@ -274,16 +273,16 @@ def excite(
             if staged.alone:
                 staged.keep()
                 held = f'{staged.out / "excitation.yaml"} holds the design'
+            remedy = 'try another --start or --seed'
             raise TrajectoryError(
-                f'{held}, but no path to the trajectory was found: {error}; take another --start, '
-                'or another --seed'
+                f'{held}, but no path to the trajectory was found: {error}; {remedy}'
             ) from error
     if result.core.stopped == INTERRUPTED:
         raise KeyboardInterrupt
 
 
 def _refuse_other_options(context: click.Context, kind: str) -> None:
-    """Raise a UsageError for an option that the kind does not have."""
+    """Raise a UsageError for a given option that this --kind of trajectory does not have."""
     for option in context.command.params:
         name = str(option.name)
         fits = name in _SHARED or (name == 'share') == (kind in COURSES)
@@ -293,7 +292,7 @@ def _refuse_other_options(context: click.Context, kind: str) -> None:
 
 
 def _driven(source: str, gravity: str, joints: str | None, bags: tuple[Path, ...]) -> Robot:
-    """Load the robot; joints that belong to no arm are driven only if they are named."""
+    """Load the robot; joints that belong to no arm are driven only if --joints names them."""
     from armid_ros.cli import options
     from armid_ros.files.cells import listed
     from armid_ros.robots import load_arms
@@ -309,7 +308,7 @@ def _driven(source: str, gravity: str, joints: str | None, bags: tuple[Path, ...
 
 
 def require_free(folder: Path) -> None:
-    """Raise a RecordingError if the recording exists, before the design begins."""
+    """Raise a RecordingError if the output folder is or contains a recording to keep."""
     from armid_ros.api.excitation import BAG
     from armid_ros.files.output import is_plan
 
@@ -324,7 +323,7 @@ def require_free(folder: Path) -> None:
 def write_course(
     kind: str, space: CollisionScene, duration: float, share: float, seed: int, out: Path
 ) -> None:
-    """Write a trajectory that makes elastic joints identifiable, as a bag."""
+    """Design a trajectory for the identification of elastic joints, and write it as a bag."""
     from armid_ros.api.excitation import BAG, ExcitationResult
     from armid_ros.cli import options
     from armid_ros.excitation import ClearanceModel

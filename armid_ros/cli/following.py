@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The next command after a command, with the same robot, bags and reading options."""
+"""Suggestion of the next command line, with the robot, bags and options of the last one."""
 
 from __future__ import annotations
 
@@ -36,14 +36,14 @@ _ALONE = ('excite', 'simulate')
 _OWN = {'robot_source', 'out', 'as_json', 'strict', 'every', 'no_baseline'}
 
 
-def following(then: str, result: Shown) -> str:
+def next_command(then: str, result: Shown) -> str:
     """
-    Return the command line that follows the running command.
+    Return the command line to run next, with arguments of the running command.
 
     Parameters
     ----------
     then : str
-        Name of the command that follows.
+        Name of the next command.
     result : Shown
         Result of the running command.
 

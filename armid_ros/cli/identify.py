@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Identification of a model with uncertainties from bags."""
+"""The command `armid identify`: an arm model with uncertainties, identified from recordings."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Inspection of a recording, and check of a description."""
+"""The commands `armid inspect` (a recording) and `armid check` (a robot description)."""
 
 from __future__ import annotations
 
@@ -125,7 +125,7 @@ def check(
 def _described(
     context: click.Context, arguments: tuple[str, ...], robot: str | None
 ) -> tuple[str, tuple[Path, ...]]:
-    """Return the description and the recordings; a description as the first argument wins."""
+    """Return description and recordings; a description as first argument replaces --robot."""
     from armid_ros.robots import shipped_robots
 
     first = ''.join(arguments[:1])
@@ -137,5 +137,5 @@ def _described(
         robot, arguments = first, arguments[1:]
     source = parameters.with_packages(context, robot)
     if source is None:
-        raise click.UsageError("Missing argument 'R', the description.")
+        raise click.UsageError("Missing argument 'R', the robot description.")
     return source, tuple(map(Path, arguments))

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Layouts of plotters for one robot."""
+"""The command `armid layout`: window layouts of plotting tools for one robot."""
 
 from __future__ import annotations
 

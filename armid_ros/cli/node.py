@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Entry point of the executables of the nodes, with an error if ROS 2 is missing."""
+"""Entry point of the executables of all nodes, with install instructions if ROS 2 is missing."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def main(name: str | None = None) -> int | None:
         else:
             node = import_module(f'armid_ros.nodes.{name}')
     except ModuleNotFoundError as error:
-        remedy = lacking(error)
+        remedy = install_hint(error)
         if remedy is None:
             raise
         print(f'{name}: {remedy}', file=sys.stderr)
@@ -34,7 +34,7 @@ def main(name: str | None = None) -> int | None:
     return code
 
 
-def lacking(error: ModuleNotFoundError) -> str | None:
+def install_hint(error: ModuleNotFoundError) -> str | None:
     """Return install instructions for a missing ROS 2 module; None for other modules."""
     module = (error.name or '').partition('.')[0]
     if module == 'armid_msgs':

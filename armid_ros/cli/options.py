@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Values of options that several commands have."""
+"""Work that several commands share: reading their inputs, and writing and printing results."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from armid_ros.api.table import Shown, Summary
 from armid_ros.arm import ArmModel, load_model
 from armid_ros.cli import columns
 from armid_ros.cli.commands import NOTES
-from armid_ros.cli.following import following
+from armid_ros.cli.following import next_command
 from armid_ros.cli.parameters import CRC, FORCE, MEMORY
 from armid_ros.cli.terminal import say
 from armid_ros.effects import make_effect
@@ -107,7 +107,7 @@ def deliver(
 
     """
     document, shown = None, summary or result.summary()
-    step = following(shown.then, result) if shown.then else ''
+    step = next_command(shown.then, result) if shown.then else ''
     if staged is not None:
         document = result.fill(staged.folder, replace(origin, step=step))
         staged.keep()
@@ -191,7 +191,7 @@ def origin(
     *,
     source: str = '',
 ) -> ResultOrigin:
-    """Return the origin of a result: --robot, its name in model.yaml, and the `provenance`."""
+    """Return the origin of a result: --robot, its name in model.yaml, and its provenance."""
     return ResultOrigin(robot, source, provenance(paths, seed=seed))
 
 
@@ -204,7 +204,7 @@ def read_settings() -> ReadSettings:
 
 
 def tell_damage(*recordings: Recording) -> None:
-    """Report damage of recording files on stderr, without repeats."""
+    """Print the damage of recording files on stderr, each line once."""
     for text in dict.fromkeys(
         f'{r.source}: {r.report.damage}' for r in recordings if r.report.damage
     ):
@@ -218,7 +218,7 @@ def open_robot(
     bags: Sequence[Path] = (),
     tell: bool = True,
 ) -> Robot:
-    """Load the robot of --robot, --gravity and --joints; warn of doubtful values."""
+    """Load the robot that the options name; keep notes on doubtful values for the end."""
     named = listed(joints) if isinstance(joints, str) else joints
     if source != '-':
         robot = load_robot(source, gravity=gravity, joints=named or None)
@@ -325,7 +325,7 @@ def read(
 
 
 def kept_source(source: str, robot: Robot, out: Path) -> str:
-    """Return how files refer to the robot; a description in a bag is written to the folder."""
+    """Return the text by which result files refer to a robot; save a description from a bag."""
     if source == '-':
         write_file(out / 'robot.urdf', robot.urdf)
         return 'robot.urdf'

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Options that several commands have."""
+"""Declarations of the options that several commands have."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class OutPath(click.Path):
     """Output path; an empty path, which would be the current folder, is an error."""
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        """Return the path."""
+        """Return the output path; fail if it is empty."""
         if not str(value).strip():
             self.fail('the path is empty; name a folder, or . for this one', param, ctx)
         return super().convert(value, param, ctx)
@@ -45,13 +45,13 @@ class ModelPath(click.Path):
     """Path of a model.yaml, or of the folder with it that identify or diagnose wrote."""
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        """Return the path of the file."""
+        """Return the path of the model file; for a folder, of the model.yaml in it."""
         path = Path(str(super().convert(value, param, ctx)))
         return path / 'model.yaml' if path.is_dir() else path
 
 
 def completed(_: click.Context, parameter: click.Parameter, incomplete: str) -> list[str]:
-    """Complete the last name of a list: a shipped robot, an effect, or a word of the option."""
+    """Return shell completions for the last name in a list: robots, effects or option words."""
     before, sign, last = incomplete.rpartition('=' if parameter.name == 'priors' else ',')
     words = {'gravity': ('earth', 'moon'), 'speed': SPEED_CLASSES, 'priors': HOW_OFTEN}
     names: Iterable[str] = words.get(str(parameter.name), ())
@@ -155,8 +155,6 @@ seed = click.option(
 setting = together(gravity, joints, seed, reading)
 every = click.option('--all', 'every', is_flag=True, help='Print all values.')
 as_json = click.option('--json', 'as_json', is_flag=True, help='Print the result as JSON.')
-
-
 packages = click.option(
     '--package',
     multiple=True,
@@ -182,7 +180,7 @@ def robot_described(**values: Any) -> Callable[[_Command], _Command]:
 
 
 def with_packages(context: click.Context, source: str | None) -> str | None:
-    """Append the packages to the path of the description."""
+    """Return --robot with the folders of --package as further arguments of the description."""
     written = []
     for text in context.meta.get(PACKAGES, []):
         name, _, folder = text.partition('=')
@@ -190,7 +188,7 @@ def with_packages(context: click.Context, source: str | None) -> str | None:
             raise click.BadParameter(f"'{text}' has to be PACKAGE=FOLDER", param_hint='--package')
         if source in (None, '-'):
             raise click.BadParameter(
-                f"'{text}': packages need a file of a description, --robot FILE",
+                f"'{text}': a package folder needs a description file, --robot FILE",
                 param_hint='--package',
             )
         written.append(shlex.quote(f'package:{name}:={Path(folder).resolve()}'))

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Simulated recordings, and repair of bags whose writer was killed."""
+"""The commands `armid simulate`, and `armid recover` for bags whose writer was killed."""
 
 from __future__ import annotations
 
@@ -104,7 +104,7 @@ def simulate(
     else:
         arm, drives = options.model_of(model, robot), None
     for text in texts:
-        arm = arm.with_effect(*_of_some_size(text, robot))
+        arm = arm.with_effect(*_parse_effect(text, robot))
     with progress('designing a trajectory') as tick:
         reference = reference_of(robot, trajectory, rng, options.read_settings())
         course = None
@@ -125,7 +125,7 @@ def simulate(
     say(f'{out}: {done}, {reference.duration:.1f} s')
 
 
-def _of_some_size(text: str, robot: Robot) -> tuple[Effect, FloatArray]:
+def _parse_effect(text: str, robot: Robot) -> tuple[Effect, FloatArray]:
     """Parse --effect; raise a ModelError if its size is zero, warn of an impossible payload."""
     from armid_ros.effects import parse_effect
     from armid_ros.simulation.plant import possible_loads

@@ -15,7 +15,7 @@ Tick = Callable[..., None]
 
 
 def say(text: str, colour: str | None = None) -> None:
-    """Print a line, coloured on a terminal."""
+    """Print a line on stdout, coloured on a terminal."""
     shown = visible(text)
     click.echo(shown if colour is None else click.style(shown, fg=colour))
 
@@ -23,7 +23,7 @@ def say(text: str, colour: str | None = None) -> None:
 @contextmanager
 def progress(what: str) -> Iterator[Tick]:
     """
-    Show a progress bar; yields tick(share, what=None).
+    Show a progress bar during a block; yield a function of the completed share and step name.
 
     Without a terminal there is a line on stderr at most every ten seconds.
 

@@ -75,4 +75,4 @@ def test_a_command_without_ros_says_so_in_a_line(pytestconfig, tmp_path):
 
 
 def test_another_missing_module_is_a_defect(monkeypatch):
-    assert node.lacking(ModuleNotFoundError(name='numpy')) is None
+    assert node.install_hint(ModuleNotFoundError(name='numpy')) is None

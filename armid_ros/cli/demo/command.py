@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The main job from end to end on the shipped arm, over real topics."""
+"""The command `armid demo`: excite, identify and diagnose a simulated arm over ROS topics."""
 
 from __future__ import annotations
 

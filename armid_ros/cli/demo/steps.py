@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The arm of the demo: true values, sensors, runs over topics, and a hidden change."""
+"""Steps of the demo: the true arm, a hidden change of it, its recordings and its diagnosis."""
 
 from __future__ import annotations
 
@@ -50,12 +50,12 @@ def true_arm(robot: Robot) -> ArmModel:
 
 def hidden_change(arm: ArmModel, rng: np.random.Generator, hide: str = '') -> ArmModel:
     """
-    Return an arm with a further effect, its last one, that a diagnosis has to find.
+    Return an arm with a hidden effect added as the last one, for a diagnosis to find.
 
     Parameters
     ----------
     arm : ArmModel
-        The arm without it.
+        The arm without the hidden effect.
     rng : numpy.random.Generator
         Draws one of the changes that are shipped.
     hide : str
@@ -90,7 +90,7 @@ def diagnose_hidden(
     rate: float,
 ) -> DiagnosisResult:
     """
-    Record a changed arm over topics, and diagnose it with the model from before.
+    Record an arm with a hidden effect over ROS topics, and diagnose it with the earlier model.
 
     Parameters
     ----------
@@ -155,7 +155,7 @@ def outcome(changed: ArmModel, diagnosed: DiagnosisResult) -> str:
 
 
 def story(changed: ArmModel, diagnosed: DiagnosisResult) -> dict[str, Any]:
-    """Return a JSON document: hidden effect, verdict, and whether the effect was found."""
+    """Return a JSON document with the hidden effect, the verdict, and whether it is right."""
     effect = changed.effects[-1]
     return {
         'hidden': {

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The joint torque tau = f(q, dq, ddq) of an arm as code without dependencies."""
+"""Export of the joint torque tau = f(q, dq, ddq) of an arm as code without dependencies."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ DEAD_BAND = 1e-3
 
 def torque_tables(arm: ArmModel) -> tuple[dict[str, npt.NDArray[Any]], tuple[str, ...]]:
     """
-    Return the constants of the torque of an arm, joint by joint.
+    Return the constants of the joint torque function of an arm, as tables of n joints.
 
     Returns
     -------
@@ -66,7 +66,7 @@ def torque_tables(arm: ArmModel) -> tuple[dict[str, npt.NDArray[Any]], tuple[str
 
 def torque_code(arm: ArmModel, language: str, source: str) -> tuple[str, tuple[str, ...]]:
     """
-    Return code for the torque of an arm, and lines on parameters that it omits.
+    Return code that computes the joint torques of an arm, and lines on omitted parameters.
 
     The language is 'cpp', a C++17 header with torque(q, dq, ddq, tau), or 'python', a module with
     torque(q, dq, ddq) that returns tau; neither needs more than the standard library. A

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The payload of a model as the load data of robot controllers."""
+"""Export of the payload of a model as load data of robot controllers."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ import pinocchio as pin
 @dataclass(frozen=True)
 class CarriedLoad:
     """
-    A body fixed to a link of the robot.
+    Payload fixed to a link of the robot.
 
     Attributes
     ----------
@@ -109,8 +109,8 @@ def load_of(arm: ArmModel, joint: str | None = None, frame: str | None = None) -
 
 
 def _flange(joint: str, links: Collection[str]) -> str:
-    """Return the link with the usual name of a flange, or the only link; else a ModelError."""
-    # names of the frame of a flange by ROS-Industrial
+    """Return the link named tool0 or flange, or the only link; raise a ModelError otherwise."""
+    # names that ROS-Industrial gives to the frame of a flange
     usual = [name for name in ('tool0', 'flange') if name in links]
     if not usual and len(links) != 1:
         raise ModelError(

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Means and standard deviations of a model as ranges for domain randomisation."""
+"""Export of the parameters of a model as ranges for domain randomisation."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _HEAD = """\
 
 def ranges_text(arm: ArmModel, known: ParameterFile, spread: float, source: str) -> str:
     """
-    Return a YAML with name, joint, unit, mean, std, low, high and from of each parameter.
+    Return YAML text with name, joint, unit, mean, std, low, high and source of each parameter.
 
     Rows are masses and centres of mass of links, in the frames of their joints, and the parameters
     of effects. The information comes from the recordings: combinations with a covariance, or
@@ -70,7 +70,7 @@ def ranges_text(arm: ArmModel, known: ParameterFile, spread: float, source: str)
 def _masses_and_centres(
     arm: ArmModel,
 ) -> tuple[tuple[ParameterName, ...], FloatArray, FloatArray, FloatArray]:
-    """Return names (D,), values (D,), their derivatives (D, P), and the lowest values (D,)."""
+    """Return name, value, gradient by all parameters and lower bound of the D exported values."""
     names, found = list(arm.parameters), arm.theta.copy()
     slopes, kept = np.eye(len(found)), np.ones(len(found), dtype=bool)
     rigid = np.tile(np.where(np.arange(PER_LINK) == 0, 0.0, -np.inf), len(arm.robot.links))
