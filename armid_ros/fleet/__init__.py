@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Many arms and many bags: identified, watched over time and diagnosed on a cluster.
+Identification, monitoring over time and diagnosis of many arms with many bags, on a cluster.
 
 Dask schedules tasks, fsspec opens stores, and pyarrow reads and writes tables. A task compresses a
 bag to normal equations of fixed size. The normal equations of an arm give its estimate, and

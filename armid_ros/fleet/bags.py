@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The list of bags, and the arm and day of each."""
+"""Search for the bags of a fleet, and the arm and day of each bag."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ _VERSIONS = ('ETag', 'etag', 'md5Hash', 'mtime', 'LastModified', 'updated', 'cre
 @dataclass(frozen=True, order=True)
 class BagFile:
     """
-    A bag of a fleet.
+    Bag of a fleet, with its arm, day and version.
 
     Attributes
     ----------
@@ -56,18 +56,18 @@ class BagFile:
 
     @property
     def name(self) -> str:
-        """Name of the files of the bag in the results: name and digest of the URL."""
+        """Return the name of the bag's files in the results: bag name and hash of the URL."""
         last = self.url.rstrip('/').rsplit('/', 1)[-1]
         return f'{re.sub(r"[^A-Za-z0-9_.-]", "_", last)}-{digest(self.url, size=10)}'
 
 
 def digest(*parts: str, size: int = 16) -> str:
-    """Return the first ``size`` hexadecimal digits of a hash of texts."""
+    """Return the first ``size`` hexadecimal digits of the SHA-256 hash of texts."""
     return hashlib.sha256('\n'.join(parts).encode()).hexdigest()[:size]
 
 
 def folder_of(arm: str) -> str:
-    """Return the folder of an arm's partition."""
+    """Return the name of an arm's folder in the partitioned results."""
     return f'arm={file_name(arm)}'
 
 
@@ -101,7 +101,9 @@ def find_bags(patterns: Sequence[str], arm_pattern: str | None = None) -> list[B
     except re.error as error:
         raise FleetError(f'--arm {arm_pattern}: {error}') from error
     if regular is not None and regular.groups < 1:
-        raise FleetError(f"--arm {arm_pattern}: has no group, as in 'robots/([^/]+)/'")
+        raise FleetError(
+            f"--arm {arm_pattern}: has no group for the name of the arm, as in 'robots/([^/]+)/'"
+        )
     found: dict[str, BagFile] = {}
     for pattern in patterns:
         filesystem, path = opened(pattern)
@@ -126,8 +128,9 @@ def find_bags(patterns: Sequence[str], arm_pattern: str | None = None) -> list[B
             length = len(file_name(arm).encode())
             if not 0 < length <= _MAX_NAME:
                 raise FleetError(
-                    f'{url}: its arm is named {arm!r}, of {length} bytes in a path; a name has '
-                    f"1 to {_MAX_NAME}: choose a part of the path with --arm 'robots/([^/]+)/'"
+                    f'{url}: the name of its arm, {arm!r}, takes {length} bytes as a file name, '
+                    f'but has to take 1 to {_MAX_NAME}; name the arm by another part of the path '
+                    "with --arm 'robots/([^/]+)/'"
                 )
             plain = at if url.startswith('file://') else url
             found[plain] = BagFile(arm, plain, _day(at), size, version)
@@ -137,23 +140,23 @@ def find_bags(patterns: Sequence[str], arm_pattern: str | None = None) -> list[B
 def _bags(
     filesystem: Any, listed: Mapping[str, Mapping[str, Any]]
 ) -> Iterator[tuple[str, int, str]]:
-    """Yield path, size and version of all bags; files in a bag directory are not bags."""
+    """Yield path, size [bytes] and version of each bag among listed files and directories."""
 
     def version(info: Mapping[str, Any]) -> str:
         found = [str(info[name]) for name in _VERSIONS if info.get(name)][:1]
         return '/'.join([str(info.get('name')), str(info.get('size')), *found])
 
-    whole: list[str] = []
+    directories: list[str] = []
     for path, info in sorted(listed.items()):
         path = path.rstrip('/')
-        if any(path.startswith(f'{folder}/') for folder in whole[-1:]):
-            continue
+        if any(path.startswith(f'{folder}/') for folder in directories[-1:]):
+            continue  # a file in a bag directory
         if info.get('type') == 'directory':
             inside = [
                 one for one in filesystem.ls(path, detail=True) if one['name'].endswith(SUFFIXES)
             ]
             if inside:
-                whole.append(path)
+                directories.append(path)
                 versions = [version(one) for one in sorted(inside, key=lambda one: one['name'])]
                 size = sum(int(one.get('size') or 0) for one in inside)
                 yield path, size, digest(*versions)
@@ -162,7 +165,7 @@ def _bags(
 
 
 def _arm(pattern: str, path: str) -> str:
-    """Return the part that the first wildcard matches; the folder if that part is the bag."""
+    """Return the arm of a bag: the path part of the first wildcard, or the folder of the bag."""
     wild = [k for k, part in enumerate(pattern.split('/')) if _WILDCARD.search(part)]
     parts = path.rstrip('/').split('/')
     last = len(parts) - 1
@@ -171,7 +174,7 @@ def _arm(pattern: str, path: str) -> str:
 
 
 def _day(path: str) -> str:
-    """Return the last date in a path."""
+    """Return the last date in a path, such as 2026-01-31; empty if there is none."""
     for year, _, month, day in reversed(_DATE.findall(path)):
         try:
             return datetime.date(int(year), int(month), int(day)).isoformat()

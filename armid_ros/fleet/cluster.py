@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Workers: processes of this machine, or a Dask cluster with a given address."""
+"""Connection to workers: processes of this machine, or a Dask cluster with a given address."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ _DASK_SETTINGS = {
 @contextmanager
 def connected(scheduler: str | None, workers: int | None = None) -> Iterator[Client]:
     """
-    Connect to a cluster; a context manager.
+    Yield a client of a Dask cluster, or of worker processes on this machine.
 
     Parameters
     ----------
@@ -71,7 +71,7 @@ def connected(scheduler: str | None, workers: int | None = None) -> Iterator[Cli
 
 @contextmanager
 def _local(count: int) -> Iterator[Client]:
-    """Connect to processes of this machine."""
+    """Yield a client of worker processes on this machine."""
     before = os.environ.get('PYTHONSAFEPATH', '')
     os.environ['PYTHONSAFEPATH'] = '1'  # workers do not import modules from the current folder
     try:

@@ -52,7 +52,7 @@ class _Fleet(click.Group):
     """Command group that first checks for missing packages."""
 
     def invoke(self, ctx: click.Context) -> Any:
-        """Run a command of the group."""
+        """Raise a FleetError for missing packages; otherwise run a command of the group."""
         missing = [n for n in ('dask', 'distributed', 'fsspec', 'pyarrow') if not find_spec(n)]
         if missing:
             raise FleetError(
@@ -72,7 +72,7 @@ def fleet() -> None:
 
 @contextmanager
 def _results(out: str, doing: str) -> Iterator[tuple[Store, Callable[..., None]]]:
-    """Lock a folder of results while a command runs, and show the progress."""
+    """Lock the folder of results during a command; yield the store and a progress function."""
     from armid_ros.files import result_folder
     from armid_ros.fleet.plan import SCHEMA
     from armid_ros.fleet.store import Store, StoreError
@@ -90,8 +90,8 @@ def _results(out: str, doing: str) -> Iterator[tuple[Store, Callable[..., None]]
 
 
 def _print_shown(lines: Sequence[str], rest: str) -> None:
-    """Print the first lines, and the file that has the others."""
-    most = 8  # the results contain all of them
+    """Print the first eight lines, and the name of the file that contains all of them."""
+    most = 8
     for line in lines[:most]:
         say(line)
     if len(lines) > most:
@@ -169,8 +169,7 @@ def identify(
 
     if (robot_source is None) == (table is None):
         raise FleetError(
-            'no robot was named: name the robot of all arms with --robot, or a table of robots '
-            'with --robots'
+            'give either the robot of all arms with --robot, or a table of robots with --robots'
         )
     robots = read_table(table) if table is not None else str(robot_source)
     fit = FleetSettings(
@@ -228,7 +227,7 @@ def identify(
 @_alpha
 @options.as_json
 def watch(out: str, alpha: float, as_json: bool) -> None:
-    """Find changes and wear over time, and draw the overview."""
+    """Find changes and wear of all arms over time, and write the overview page."""
     from armid_ros.fleet.pages import write_pages
     from armid_ros.fleet.watch import change_rows, watch_fleet, write_watch
 

@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Diagnosis of the arms that changed, with earlier bags of the same arm as baseline.
+Diagnosis of the arms that changed, with earlier bags of each arm as its baseline.
 
 The model is identified from the last bags before the change. The diagnosis uses the first bags
 after the change, and a further bag is held out for validation. Results:
@@ -51,7 +51,7 @@ DIAGNOSES = pa.schema(
 
 def cases(found: Watch, arms: Sequence[str] = (), everyone: bool = False) -> list[Case]:
     """
-    Choose the bags for the diagnosis of each arm.
+    Choose the baseline bags and the bags to diagnose for each arm, before and after its change.
 
     Parameters
     ----------
@@ -77,7 +77,7 @@ def cases(found: Watch, arms: Sequence[str] = (), everyone: bool = False) -> lis
     by_name = {arm.arm: arm for arm in found.arms}
     for name in set(arms) - by_name.keys():
         known = ', '.join(sorted(by_name)[:5])
-        raise FleetError(f"there is no arm '{name}'; there are {known} ...")
+        raise FleetError(f'--arm {name}: the results have no such arm; arms are {known} ...')
     chosen = [by_name[name] for name in arms]
     if not arms:
         chosen = [arm for arm in found.arms if arm.named or everyone]
@@ -101,10 +101,10 @@ def diagnose_fleet(
     store: Store,
     chosen: Sequence[Case],
     found: Watch,
-    tell: Callable[[int, int], None] = lambda ended, of: None,
+    report: Callable[[int, int], None] = lambda finished, arms: None,
 ) -> list[dict[str, Any]]:
     """
-    Diagnose arms on a cluster; return a row of ``watch/diagnoses.parquet`` for each.
+    Diagnose arms on a cluster, and return a row of ``watch/diagnoses.parquet`` for each arm.
 
     Rows of other arms in the table are kept.
 
@@ -126,7 +126,7 @@ def diagnose_fleet(
         done = future.status == 'finished'
         found_of_arm = future.result() if done else _failed(future.exception())
         rows.append(futures[future] | found_of_arm)
-        tell(len(rows), len(futures))
+        report(len(rows), len(futures))
     rows.sort(key=lambda row: str(row['arm']))
     table = store.read_table('watch/diagnoses.parquet')
     new = {row['arm'] for row in rows}
@@ -139,7 +139,7 @@ def diagnose_fleet(
 def one_arm(
     case: Case, model: ArmModel, filters: Conditioning, topic: str | None, out: str
 ) -> dict[str, Any]:
-    """Task: identify an arm from its baseline, diagnose its later bags, and return the result."""
+    """Task: identify an arm from its baseline, diagnose its later bags; return the table row."""
     store = Store(out)
     try:
         with ExitStack() as stack:
@@ -161,11 +161,11 @@ def one_arm(
                 cutoff=filters.cutoff_hz,
                 decimation=filters.decimation,
             )
-            report = f'reports/{folder_of(str(case["arm"]))}/diagnosis'
+            place = f'reports/{folder_of(str(case["arm"]))}/diagnosis'
             folder = result.save(stack.enter_context(TemporaryDirectory(prefix='armid-report-')))
             # report.html is written last, because pages link to it
             for file in sorted(folder.iterdir(), key=lambda file: file.name == 'report.html'):
-                store.write(f'{report}/{file.name}', file.read_bytes())
+                store.write(f'{place}/{file.name}', file.read_bytes())
     except ArmidError as error:
         return _failed(error)
     gap = result.core.gap
@@ -174,7 +174,7 @@ def one_arm(
         'summary': result.core.summary,
         'effects': list(dict.fromkeys(result.names)),
         'closed': None if gap is None else float(gap.closed),
-        'report': f'{report}/report.html',
+        'report': f'{place}/report.html',
     }
 
 

@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-From bags to estimates: summaries of bags, sums of normal equations, fits, standard deviations.
+Estimates from bags: compression of bags to normal equations, their sums, fits and covariance.
 
 Standard deviations follow from the spectrum of the residuals, which normal equations do not
 contain. A second pass over the bags therefore computes the noise products at the estimate of the
@@ -40,7 +40,7 @@ import numpy as np
 @dataclass(frozen=True)
 class Refused:
     """
-    A bag that is not used.
+    A bag that is left out of the identification, and the reason.
 
     Attributes
     ----------
@@ -61,7 +61,7 @@ class Refused:
 @dataclass(frozen=True, eq=False)
 class FleetEstimate:
     """
-    The estimate from one bag, or from all bags of an arm.
+    Parameter estimate from one bag, or from all bags of an arm.
 
     Attributes
     ----------
@@ -89,7 +89,7 @@ class FleetEstimate:
 @dataclass(frozen=True, eq=False)
 class FleetFit:
     """
-    A fit of the parameters, before its standard deviations are known.
+    Least-squares fit of the parameters, before its standard deviations are known.
 
     Attributes
     ----------
@@ -117,7 +117,7 @@ class FleetFit:
         return cls(base, tuple(kept), replace(fit, values=values))
 
     def noise(self, rows: Iterable[Regression]) -> FloatArray:
-        """Return the covariance of the products of columns and residuals of rows, (r, r)."""
+        """Return the covariance of the sums of column times residual over the rows, (r, r)."""
         products = np.zeros((len(self.kept), len(self.kept)))
         for part in rows:
             some = part.restrict(self.kept)
@@ -127,7 +127,7 @@ class FleetFit:
         return products
 
     def estimate(self, normal: NormalEquations, noise: FloatArray) -> FleetEstimate:
-        """Return the estimate, given the noise products of the same rows."""
+        """Return the estimate, with standard deviations from the noise products of its rows."""
         some, inverse = normal.restrict(self.kept), self.fit.inverse
         return FleetEstimate(
             self.base.parameters,
@@ -142,7 +142,7 @@ class FleetFit:
 @dataclass(frozen=True, eq=False)
 class MergedBags:
     """
-    Merged bags of one arm.
+    Sum of the normal equations of several bags of one arm.
 
     Attributes
     ----------
@@ -167,7 +167,7 @@ class MergedBags:
 
     @classmethod
     def of(cls, bags: Sequence[BagSummary | Refused]) -> MergedBags:
-        """Merge the normal equations of bags, in order."""
+        """Return the sum over summaries of bags, and list the bags that are left out."""
         used = [one for one in bags if isinstance(one, BagSummary)]
         parts = [
             cls(one.normal, one.seconds, ((one.bag.url, one.bag.version),), not one.computed)
@@ -178,7 +178,7 @@ class MergedBags:
 
     @classmethod
     def together(cls, parts: Sequence[MergedBags]) -> MergedBags:
-        """Merge several groups of bags, in order."""
+        """Return the sum over several groups of bags."""
         known = [part.normal for part in parts if part.normal is not None]
         return cls(
             sum(known[1:], known[0]) if known else None,
@@ -192,7 +192,7 @@ class MergedBags:
 @dataclass(frozen=True, eq=False)
 class BagSummary:
     """
-    The summary of a bag.
+    A bag compressed to normal equations, with its own estimate.
 
     Attributes
     ----------
@@ -228,7 +228,7 @@ class BagSummary:
     rows: tuple[Regression, ...] | None = None
 
     def rows_again(self, job: Job) -> Iterator[Regression]:
-        """Yield the rows of the bag from memory, or read the bag again."""
+        """Yield the regression rows of the bag from memory, or read the bag again."""
         if self.rows is not None:
             yield from self.rows
             return
@@ -239,7 +239,7 @@ class BagSummary:
 
 def prepare(bag: BagFile, job: Job, bags_of_arm: int = 1) -> BagSummary | Refused:
     """
-    Read a bag and compress it; return the reason if the bag cannot be used.
+    Read a bag and compress it to normal equations; return a `Refused` if it cannot be used.
 
     Parameters
     ----------
@@ -267,7 +267,7 @@ def prepare(bag: BagFile, job: Job, bags_of_arm: int = 1) -> BagSummary | Refuse
 
 
 def pieces(path: str, job: Job) -> Iterator[tuple[Recording, Sequence[Regression]]]:
-    """Yield the pieces of a bag, each with its rows."""
+    """Yield successive pieces of a bag, each with its regression rows."""
     yield from streamed(
         path,
         job.arm,

@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-The pages of a fleet: index.html with the health of all arms, and one page per arm.
+HTML pages of a fleet: index.html with the health of all arms, and one page per arm.
 
 Pages load no other files and use relative links, so the folder can be moved.
 
@@ -41,7 +41,7 @@ from armid_ros.report.page import Page, Section, Templated
 from markupsafe import escape, Markup
 import numpy as np
 
-#: Verdicts of a diagnosis that name what changed.
+#: Verdicts of a diagnosis that name an effect.
 _EXPLAINED = ('named', 'ambiguous', 'partial')
 
 Diagnoses = Mapping[str, Mapping[str, Any]]
@@ -57,7 +57,7 @@ def write_pages(store: Store, found: Watch) -> None:
 
 
 def _overview(found: Watch, diagnoses: Diagnoses) -> str:
-    """Return the overview page with all arms and their diagnoses."""
+    """Return index.html with the health and the diagnosis of every arm."""
     heads = ('Arm', 'Health', 'What', 'Bags', 'Refused', 'Error')
     rows = [_arm_row(arm, diagnoses.get(arm.arm)) for arm in found.arms]
     hint = (
@@ -85,7 +85,7 @@ def _overview(found: Watch, diagnoses: Diagnoses) -> str:
 
 
 def _arm_page(found: Watch, arm: WatchedArm, diagnoses: Diagnoses) -> str:
-    """Return the page of an arm."""
+    """Return the page of an arm: its changes, diagnosis, parameters over time, wear and bags."""
     texts = [pretty(row['text']) for row in change_rows(arm)]
     diagnosis = diagnoses.get(arm.arm)
     diagnosed = _diagnosed(arm, diagnosis)
@@ -148,7 +148,7 @@ def _arm_page(found: Watch, arm: WatchedArm, diagnoses: Diagnoses) -> str:
 
 
 def _step(arm: WatchedArm, is_diagnosed: bool, fault: str) -> str:
-    """Return the next step for an arm."""
+    """Return the next step for the user on the page of an arm."""
     if not (arm.named or fault):
         first = 'Record more' if arm.health == 'too few bags' else 'After the next'
         return f'{first} recordings, run armid fleet identify and armid fleet watch again.'
@@ -158,6 +158,7 @@ def _step(arm: WatchedArm, is_diagnosed: bool, fault: str) -> str:
 
 
 def _verdict(found: Watch, diagnoses: Diagnoses) -> VerdictSection:
+    """Return the first section of index.html: how many arms changed, and why."""
     counts = Counter(arm.health for arm in found.arms)
     blamed = [arm.arm for arm in found.arms if _diagnosed(arm, diagnoses.get(arm.arm))]
     ill = counts['changed'] + counts['wearing']
@@ -171,7 +172,15 @@ def _verdict(found: Watch, diagnoses: Diagnoses) -> VerdictSection:
             f'{counts["changed"]} changed suddenly, {counts["wearing"]} gradually. At most '
             f'{100.0 * found.alpha:g} % of the named arms are false alarms, on average.',
         ]
-        sentences[1:1] = _explained(found, diagnoses)
+        explained = []  # effects that diagnoses name for changed arms
+        for arm in found.arms:
+            diagnosis = diagnoses.get(arm.arm)
+            if arm.named and diagnosis is not None and diagnosis['verdict'] in _EXPLAINED:
+                lead = pretty(diagnosis['summary']).partition('. ')[0].rstrip('.')
+                day = change_rows(arm)[0]['first_day']
+                since = f', since {day}' if arm.named[0].kind == 'step' else ''
+                explained.append(f'{arm.arm}{since}: {lead}.')
+        sentences[1:1] = explained[:3]
     if blamed:
         names = ', '.join(blamed)
         some = names if len(names) < longest else counted(len(blamed), 'arm')
@@ -188,28 +197,15 @@ def _verdict(found: Watch, diagnoses: Diagnoses) -> VerdictSection:
     return VerdictSection(grade, tone, sentences, beware, step=step)
 
 
-def _explained(found: Watch, diagnoses: Diagnoses) -> list[str]:
-    """Return up to three sentences on what the diagnoses of changed arms name."""
-    sentences = []
-    for arm in found.arms:
-        diagnosis = diagnoses.get(arm.arm)
-        if arm.named and diagnosis is not None and diagnosis['verdict'] in _EXPLAINED:
-            lead = pretty(diagnosis['summary']).partition('. ')[0].rstrip('.')
-            day = change_rows(arm)[0]['first_day']
-            since = f', since {day}' if arm.named[0].kind == 'step' else ''
-            sentences.append(f'{arm.arm}{since}: {lead}.')
-    return sentences[:3]
-
-
 def _diagnosed(arm: WatchedArm, diagnosis: Mapping[str, Any] | None) -> str:
-    """Return the verdict of a diagnosis that found a gap and named no change, else ''."""
+    """Return the verdict of a diagnosis that found a fault in an arm without change, else ''."""
     if arm.named or diagnosis is None or diagnosis['verdict'] in ('consistent', 'failed'):
         return ''
     return str(diagnosis['verdict']).replace('_', ' ')
 
 
 def _arm_row(arm: WatchedArm, diagnosis: Mapping[str, Any] | None) -> list[str]:
-    """Return the cells of an arm in the overview."""
+    """Return the table cells of an arm on the overview page."""
     page = f'pages/{quote(file_name(arm.arm))}.html'
     what = Markup('')
     if diagnosis is not None and diagnosis['verdict'] != 'failed':
@@ -288,7 +284,7 @@ def _table(
     numbers: Sequence[int] = (),
     hint: str = '',
 ) -> ContentSection:
-    """Return a table with links and curves in its cells, and with numeric columns."""
+    """Return a section with a table, whose cells may hold links and curves."""
     words = [k for k in range(len(heads)) if k not in numbers]
     table = DataTable(heads, rows, words, 'fleet')
     return ContentSection(title, [table, *([Paragraph(hint, 'hint')] if hint else [])])
@@ -307,7 +303,7 @@ def _drawing(
     links: Sequence[str] = (),
     title: str = '',
 ) -> tuple[Markup, tuple[float, float]]:
-    """Draw a series as a line, or as points with links; return drawing and ordinate range."""
+    """Draw values over time as a line, or as points with links; return SVG and ordinate range."""
     # [px]; a large curve has intervals
     (width, height), wide = ((250, 74), HALF_WIDTH) if links else ((84, 20), 0.0)
     low, high = float(np.min(values - wide * std)), float(np.max(values + wide * std))

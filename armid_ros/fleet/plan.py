@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-The plan of a fleet: settings, the robot of each arm, filters and job of each kind of arm.
+Plan of the identification of a fleet: robot of each arm, filters and job of each kind of arm.
 
 fleet.json stores the plan, so that later runs use the same filters.
 
@@ -130,7 +130,7 @@ class Job:
 
     @cached_property
     def facts(self) -> dict[str, Any]:
-        """Return the entry of fleet.json: settings on which the results of a bag depend."""
+        """Return the settings on which the results of a bag depend, an entry of fleet.json."""
         robot, effects = self.arm.robot, self.arm.effects
         return {
             'robot': robot.name,
@@ -147,13 +147,13 @@ class Job:
 
     @cached_property
     def digest(self) -> str:
-        """Return a hash of the facts."""
+        """Return a hash of the settings and kinematics on which the results of a bag depend."""
         facts = {**self.facts, 'kinematics': kinematics_digest(self.arm.robot)}
         return digest(json.dumps(facts, sort_keys=True))
 
     @property
     def samples(self) -> int:
-        """Return the number of samples of a bag that are held in memory together."""
+        """Return the number of samples of a bag that are read into memory at once."""
         joints = self.arm.robot.n_joints
         rows = 16_000_000 // (joints * self.theory.rank)  # larger columns are read in pieces
         return min(rows * self.filters.decimation, 1_400_000 // joints)
@@ -165,7 +165,7 @@ SCHEMA = 'armid/fleet/1'
 @dataclass(frozen=True)
 class Entry:
     """
-    An arm in the table of robots.
+    Robot and settings of one arm in the table of robots (--robots).
 
     Attributes
     ----------
@@ -184,7 +184,7 @@ class Entry:
 
 def read_table(url: str) -> dict[str, Entry]:
     """
-    Read a CSV with the columns arm and robot; gravity, joints and effects are optional.
+    Read the table of robots: a CSV with columns arm, robot, and optional settings of each arm.
 
     Raises
     ------
@@ -202,13 +202,13 @@ def read_table(url: str) -> dict[str, Entry]:
         names = rows.fieldnames or []
         if not {'arm', 'robot'} <= set(names):
             raise FleetError(
-                f'its first line has to name the columns arm and robot; it has {", ".join(names)}'
+                f'the first line has to name the columns arm and robot; it is {", ".join(names)}'
             )
         table: dict[str, Entry] = {}
         for number, row in enumerate(rows, start=2):
             arm, robot = (str(row[name] or '').strip() for name in ('arm', 'robot'))
             if not arm or not robot:
-                raise FleetError(f'line {number}: has no arm or no robot')
+                raise FleetError(f'line {number}: the column arm or robot is empty')
             if arm in table:
                 raise FleetError(f'line {number}: arm {arm} appears twice')
             rest = (str(row.get(n) or '').strip() for n in ('gravity', 'joints', 'effects'))
@@ -282,17 +282,20 @@ def plan_fleet(
 
 
 def kind_arm(store: Store, facts: Mapping[str, Any], key: str) -> ArmModel:
-    """Return the arm model of a kind of arm in fleet.json."""
+    """Return the arm model for a key of the entry `kinds` in fleet.json."""
     urdf = store.read(f'robots/{key}.urdf')
     if urdf is None:
-        raise FleetError(f'{store.url}/robots/{key}.urdf: there is no such description')
+        raise FleetError(
+            f'{store.url}/robots/{key}.urdf: the robot description is missing; run `armid fleet '
+            'identify` again'
+        )
     robot = load_robot(urdf.decode(), gravity=facts['gravity'], joints=facts['joints'])
     return ArmModel.of(robot, effects=facts['effects'])
 
 
 def document(store: Store) -> dict[str, Any]:
     """
-    Return fleet.json; empty if there is none.
+    Return the content of fleet.json; empty if there is no such file.
 
     Raises
     ------
@@ -306,7 +309,9 @@ def document(store: Store) -> dict[str, Any]:
     with reading(f'{store.url}/fleet.json', FleetError):
         found: Mapping[str, Any] = json.loads(data.decode())
         if found['schema'] != SCHEMA:
-            raise FleetError(f'holds {found["schema"]}, not {SCHEMA}; name another folder')
+            raise FleetError(
+                f'the file has the schema {found["schema"]}, not {SCHEMA}; name another --out'
+            )
     return dict(found)
 
 
@@ -314,7 +319,7 @@ def choose_filters(
     arm: ArmModel, theory: BaseParameters, bags: Sequence[BagFile], settings: FleetSettings
 ) -> Conditioning:
     """
-    Choose the filters for a kind of arm from a few of its bags.
+    Choose cut-off and decimation for one kind of arm from up to four of its bags.
 
     All bags of all days use these filters: with different filters, estimates differ by more than
     noise.

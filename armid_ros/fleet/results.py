@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-The tables of results: their columns, and the rows of a bag or an arm.
+Parquet tables of the results of a fleet: their columns, and the rows of each bag and arm.
 
     bags/arm=A/day=D/BAG.parquet         one row: what was recorded, its fit and normal equations
     parameters/arm=A/day=D/BAG.parquet   one row per parameter: estimate of the single bag
@@ -88,12 +88,12 @@ REFUSED = pa.schema(
 
 
 def _part(data_set: str, bag: BagFile, day: str) -> str:
-    """Return the path of the file of a bag in a data set with partitions by arm and day."""
+    """Return the path of a bag's file in a data set that is partitioned by arm and day."""
     return f'{data_set}/{folder_of(bag.arm)}/day={day}/{bag.name}.parquet'
 
 
 def write_summary(store: Store, summary: BagSummary, job: Job) -> None:
-    """Write the summary of a bag to the tables."""
+    """Write the summary of a bag and its estimate to the tables `bags` and `parameters`."""
     bag, own = summary.bag, summary.own
     start = datetime.datetime.fromtimestamp(summary.start_ns * 1e-9, datetime.UTC)
     robot = job.arm.robot
@@ -128,7 +128,7 @@ def write_summary(store: Store, summary: BagSummary, job: Job) -> None:
 
 def find_summary(store: Store, bag: BagFile, job: Job) -> BagSummary | Refused | None:
     """
-    Return the stored result of a bag, if bag and settings are the same.
+    Return the stored result of a bag; None if there is none for this version and these settings.
 
     Results of an earlier run are used only if the job resumes.
 
@@ -155,7 +155,7 @@ def find_summary(store: Store, bag: BagFile, job: Job) -> BagSummary | Refused |
 
 
 def write_refused(store: Store, refused: Refused, job: Job) -> None:
-    """Write the reason why a bag is not used."""
+    """Write the reason why a bag is left out to the table `refused`."""
     row = {
         'bag': refused.bag.url,
         'version': refused.bag.version,
@@ -173,7 +173,7 @@ def write_refused(store: Store, refused: Refused, job: Job) -> None:
 def write_arm(
     store: Store, arm: str, estimate: FleetEstimate, merged: MergedBags, job: Job
 ) -> None:
-    """Write the estimate of all bags of an arm together."""
+    """Write the estimate from all bags of an arm to the table `arms`."""
     common = {
         'settings': job.digest,
         'versions': _versions(merged.versions),
@@ -189,7 +189,7 @@ def write_arm(
 
 def arm_is_done(store: Store, arm: str, bags: Sequence[BagFile], job: Job) -> list[Refused] | None:
     """
-    Check whether the stored estimate of an arm is from exactly these bags, except refused ones.
+    Check whether the stored estimate of an arm is from exactly the given bags.
 
     Returns
     -------
@@ -215,7 +215,7 @@ def arm_is_done(store: Store, arm: str, bags: Sequence[BagFile], job: Job) -> li
 
 
 def _versions(versions: Sequence[tuple[str, str]]) -> str:
-    """Return a hash of the versions of some bags."""
+    """Return a hash of the URLs and versions of bags."""
     return digest(*sorted('\t'.join(pair) for pair in versions))
 
 

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""A run over a fleet: the tasks of every arm, and the outcome for every bag."""
+"""Identification of a fleet on a cluster: Dask tasks of every arm, and the outcomes."""
 
 from __future__ import annotations
 
@@ -84,12 +84,12 @@ class FleetOutcome:
 
     @property
     def found(self) -> int:
-        """Number of these bags that an earlier run had read."""
+        """Number of bags in the estimates that an earlier run had read."""
         return sum(arm.found for arm in self.arms)
 
     @property
     def refused(self) -> tuple[Refused, ...]:
-        """Bags that are not used."""
+        """Bags that are left out, in the order of arms and URLs."""
         return tuple(sorted((one for a in self.arms for one in a.refused), key=lambda r: r.bag))
 
 
@@ -100,7 +100,7 @@ Fitted = tuple[MergedBags, FleetFit | None]
 
 
 def take(bags: Group, job: Job, bags_of_arm: int) -> tuple[BagSummary | Refused, ...]:
-    """Task: find the summaries of bags in the results, or read the bags and write summaries."""
+    """Task: return summaries of bags from the results, or read the bags and write summaries."""
     store, taken = Store(job.out), []
     for bag in bags:
         one = find_summary(store, bag, job)
@@ -120,13 +120,13 @@ def same(job: Job) -> Job:
 
 
 def fit(groups: Sequence[MergedBags], job: Job) -> Fitted:
-    """Task: merge the groups of an arm, and fit all its bags."""
+    """Task: sum the normal equations of all groups of an arm, and fit its parameters."""
     merged = MergedBags.together(groups)
     return merged, None if merged.normal is None else FleetFit.of(merged.normal, job)
 
 
 def noise(taken: Sequence[BagSummary | Refused], fitted: Fitted, job: Job) -> FloatArray | None:
-    """Task: compute the noise products of a group at the estimate of its arm."""
+    """Task: compute the noise products of a group of bags at the estimate of their arm."""
     known, found = fitted[1], None
     for one in taken:
         if known is not None and isinstance(one, BagSummary):
@@ -216,7 +216,7 @@ class _Waiting:
 
 @dataclass
 class _UnderWay:
-    """The tasks of an arm, in the order of its groups."""
+    """Submitted tasks of an arm, in the order of its groups of bags."""
 
     arm: _Waiting
     prepared: list[Future]
@@ -226,7 +226,7 @@ class _UnderWay:
 
 
 class _Run:
-    """Arms that wait, and the outcomes of finished arms."""
+    """State of the identification of a fleet: waiting arms, and outcomes of finished arms."""
 
     def __init__(
         self,

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Access to bags and results in a folder, an object store, or any store of fsspec."""
+"""Access to bags and results in a local folder, an object store, or any store of fsspec."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ def fetched(url: str) -> Iterator[str]:
 @dataclass(frozen=True)
 class Store:
     """
-    A folder of results.
+    Folder of results in a local or remote file system.
 
     Attributes
     ----------

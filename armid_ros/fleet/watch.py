@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-History of a fleet: results over time, changes and alarms.
+Changes and wear of the arms of a fleet, from their estimates over time.
 
     watch/arms.parquet      one row per arm: health and adjusted p-value
     watch/changes.parquet   one row per significant change of an arm
@@ -24,7 +24,6 @@ from armid_ros.changes.histories import (
     Judged,
     named,
     ParameterHistory,
-    Spread,
     spreads,
     wear,
     without_days,
@@ -52,12 +51,12 @@ CHANGES = pa.schema(
         ('unit', pa.string()),
         ('last_day', pa.string()),  # last bag before a step; first bag of a trend
         ('first_day', pa.string()),  # first bag after a step; last bag of a trend
-        ('bag', pa.string()),  # that bag
-        ('level', pa.float64()),  # before
-        ('size', pa.float64()),  # of a step, or of a trend in a month
+        ('bag', pa.string()),  # URL of the bag on first_day
+        ('level', pa.float64()),  # value before the change
+        ('size', pa.float64()),  # change of the value by a step, or in a month of a trend
         ('std', pa.float64()),
-        ('p', pa.float64()),  # of this series
-        ('adjusted_p', pa.float64()),  # of the arm, over all arms
+        ('p', pa.float64()),  # p-value of this parameter
+        ('adjusted_p', pa.float64()),  # p-value of the arm, corrected for the number of arms
         ('text', pa.string()),
     ]
 )
@@ -87,7 +86,7 @@ ARMS = pa.schema(
 @dataclass(frozen=True, eq=False)
 class WatchedArm:
     """
-    The estimates of an arm so far, and the changes in them.
+    The estimates of an arm over time, and their significant changes.
 
     Attributes
     ----------
@@ -158,7 +157,7 @@ class Watch:
 
 def watch_fleet(store: Store, alpha: float = 0.05) -> Watch:
     """
-    Test the results of a fleet for changes over time.
+    Test the parameter estimates of all arms of a fleet for changes over time.
 
     Raises
     ------
@@ -192,7 +191,10 @@ def watch_fleet(store: Store, alpha: float = 0.05) -> Watch:
         for one, other in zip(group, without, strict=True):
             own.setdefault(one.arm, []).append(one)
             if one.name in wearing and len(other.values) > 1:
-                worn.setdefault(one.arm, []).append(_wear_row(other, spread[other.parameter]))
+                slope, std = wear(other, spread[other.parameter])
+                row = {'arm': one.arm, 'name': one.name, 'joint': one.joint, 'unit': one.unit}
+                ends = {'lower': slope - HALF_WIDTH * std, 'upper': slope + HALF_WIDTH * std}
+                worn.setdefault(one.arm, []).append({**row, 'per_month': slope, **ends})
     for judged in judge(kinds):
         name = judged.arm
         arms.append(
@@ -211,7 +213,7 @@ def watch_fleet(store: Store, alpha: float = 0.05) -> Watch:
 
 
 def write_watch(store: Store, found: Watch) -> None:
-    """Write the tables of changes, wear and arms, and the alarms."""
+    """Write the Parquet tables of changes, wear and arms, and alarms.jsonl."""
     changes = [row for arm in found.arms for row in change_rows(arm)]
     arms = [
         {
@@ -235,7 +237,7 @@ def write_watch(store: Store, found: Watch) -> None:
 
 
 def change_rows(arm: WatchedArm) -> list[dict[str, Any]]:
-    """Return the significant changes of an arm as rows, the smallest p-value first."""
+    """Return the significant changes of an arm as table rows, the smallest p-value first."""
     rows = []
     for change in arm.named:
         series = change.series
@@ -261,21 +263,8 @@ def change_rows(arm: WatchedArm) -> list[dict[str, Any]]:
     return rows
 
 
-def _wear_row(series: ParameterHistory, spread: Spread) -> dict[str, Any]:
-    slope, std = wear(series, spread)
-    return {
-        'arm': series.arm,
-        'name': series.name,
-        'joint': series.joint,
-        'unit': series.unit,
-        'per_month': slope,
-        'lower': slope - HALF_WIDTH * std,
-        'upper': slope + HALF_WIDTH * std,
-    }
-
-
 def sentence(change: HistoryChange) -> str:
-    """Return a sentence on a change: parameter, size with 95 % interval, and date."""
+    """Describe a change in a sentence: parameter, size with 95 % interval, and date."""
     series = change.series
     what = parameter_label(*series.parameter)
     if series.name == RESIDUAL:
@@ -301,13 +290,13 @@ def sentence(change: HistoryChange) -> str:
 
 
 def day_text(days: float) -> str:
-    """Return the date of a number of days since 1970."""
+    """Return a number of days since 1970 as a date, such as 2026-01-31."""
     moment = datetime.datetime.fromtimestamp(86_400.0 * days, datetime.UTC)
     return moment.date().isoformat()
 
 
 def parameter_label(name: str, joint: str) -> str:
-    """Return the label of a series, such as 'viscous coefficient of elbow'."""
+    """Return the label of a parameter's history, such as 'viscous coefficient of elbow'."""
     if name == RESIDUAL:
         return f'residual torque of {joint}'
     if name.isidentifier() and '_' in name:
@@ -323,7 +312,7 @@ def _table(store: Store, data_set: str) -> pa.Table:
 
 
 def _by_arm(table: pa.Table | None) -> dict[str, list[dict[str, Any]]]:
-    """Return the rows of a table by their arm."""
+    """Return the rows of a table, grouped by the name of the arm."""
     rows: dict[str, list[dict[str, Any]]] = {}
     for row in [] if table is None else table.to_pylist():
         rows.setdefault(str(row['arm']), []).append(row)
@@ -333,7 +322,7 @@ def _by_arm(table: pa.Table | None) -> dict[str, list[dict[str, Any]]]:
 def _series(
     parameters: pa.Table, bags: Mapping[str, list[dict[str, Any]]]
 ) -> list[ParameterHistory]:
-    """Return the histories of all parameters and of the logarithms of residuals of all arms."""
+    """Return the histories of all parameters and of the log residuals of all arms."""
     found = []
     for arm, own in sorted(bags.items()):
         fitted = [row for row in own if row['residual_std']]
