@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The command ``armid positions``: drives, friction and tool without torque measurements."""
+"""The command ``armid positions``: drives, friction and tool, identified without torque."""
 
 from __future__ import annotations
 
@@ -106,7 +106,7 @@ def positions(
 
 
 def gains_of(text: str, robot: Robot) -> FloatArray:
-    """Parse --gains: kp and kd of each joint, shape (2, n); RobotError if it is malformed."""
+    """Return --gains as kp and kd of each joint, shape (2, n); RobotError if malformed."""
     from armid_ros.errors import RobotError
     from armid_ros.files import reading
     from armid_ros.files.regular import read_text

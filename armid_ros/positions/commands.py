@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Read the commands of a position-controlled arm, recorded with its positions."""
+"""Reading of the commanded positions that were recorded together with measured positions."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def read_commands(
     settings: ReadSettings = DEFAULT,
 ) -> CommandedMotion:
     """
-    Read the commands of a recording.
+    Read the commanded positions that were recorded together with measured positions.
 
     Parameters
     ----------
@@ -51,7 +51,7 @@ def read_commands(
     columns : ColumnSettings, optional
         Columns and units of the positions.
     settings : ReadSettings
-        How bags are read.
+        Settings for checksums and memory when bags are read.
 
     Raises
     ------
@@ -62,7 +62,7 @@ def read_commands(
     columns = columns or ColumnSettings()
     if is_table(path):
         if name is None:
-            raise RecordingError(f'{path}: a table needs its columns of commands: give --commands')
+            raise RecordingError(f'{path}: give --commands, the columns of commanded positions')
         columns = replace(columns, position=name, velocity='none', effort='none')
         topic = None
     else:
@@ -82,6 +82,7 @@ def read_commands(
 
 
 def _topic(path: Path, recording: Recording, name: str | None, settings: ReadSettings) -> Topic:
+    """Return the topic of commanded positions in a bag: the named topic, or the only one."""
     with Bag(path, settings) as bag:
         topics = bag.topics()
     if name is None:
@@ -97,17 +98,17 @@ def _topic(path: Path, recording: Recording, name: str | None, settings: ReadSet
         found = [one for one in topics if one.name.strip('/') == name.strip('/')]
     if len(found) != 1:
         raise RecordingError(
-            f'{path}: {"several topics" if found else "no topic"} of commands; name a topic of '
-            f'{JOINT_STATE} or {_STATE} with --commands: {listed(topics)}'
+            f'{path}: {"several topics" if found else "no topic"} of commanded positions; name a '
+            f'topic of {JOINT_STATE} or {_STATE} with --commands: {listed(topics)}'
         )
     return found[0]
 
 
 def _controller_state(path: Path, robot: Robot, topic: Topic, settings: ReadSettings) -> Recording:
-    """Return the references in the states of a controller."""
-    where, rows = f'{path}: {topic.name}', []
+    """Read the reference positions in the state messages of a joint_trajectory_controller."""
+    source, rows = f'{path}: {topic.name}', []
     store = store_for(topic.message_type)
-    with Bag(path, settings) as bag, reading(where, RecordingError):
+    with Bag(path, settings) as bag, reading(source, RecordingError):
         for block in bag.blocks(topic.name):
             for k in range(len(block)):
                 state: Any = store.deserialize_cdr(block.message(k), topic.type_name)
@@ -115,14 +116,14 @@ def _controller_state(path: Path, robot: Robot, topic: Topic, settings: ReadSett
                 stamp, names = state.header.stamp, list(state.joint_names)
                 missing = set(robot.joints) - set(names)
                 if missing:
-                    raise RecordingError(f'its messages do not name {", ".join(sorted(missing))}')
+                    raise RecordingError(f'messages lack the joints {", ".join(sorted(missing))}')
                 order = [names.index(joint) for joint in robot.joints]
                 q, dq = (np.array(x) for x in (point.positions, point.velocities))
                 if len(q) == len(names):
                     speed = dq[order] if len(dq) == len(q) else np.zeros(len(order))
                     rows.append((stamp.sec * 10**9 + stamp.nanosec, q[order], speed))
     if not rows:
-        raise RecordingError(f'{where} has no messages with positions')
+        raise RecordingError(f'{source} has no messages with positions')
     stamps, index = np.unique([row[0] for row in rows], return_index=True)
     sampled = 1e-9 * (stamps - stamps[0])
     t = np.arange(0.0, sampled[-1], 1e-3)  # the controller interpolates, too

@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Drives, friction, delay and tool from commanded and measured positions: output error.
+Output-error fit of drives, friction, delay and tool to commanded and measured positions.
 
 The simulated loop of `LoopModel` is fitted to the measured positions by Gauss-Newton iterations
 with a trust region. The described links are taken as exact. Sensitivities are differences of
@@ -18,7 +18,6 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 from armid_ros import ArmModel
-from armid_ros.api.arguments import motion_of
 from armid_ros.errors import IdentificationError
 from armid_ros.estimate import ParameterName
 from armid_ros.motion import FloatArray
@@ -31,7 +30,7 @@ from scipy.optimize import least_squares, nnls
 #: Prior standard deviation of a parameter, relative to the size with which it alone explains the
 #: torque.
 _PRIOR_STD = 3.0
-#: Residual over noise of a joint, above which a law of the joint is missing or a gain is wrong.
+#: Ratio of residual to noise of a joint above which an effect is missing or a gain is wrong.
 MAX_RESIDUAL_TO_NOISE = 1.3
 
 #: A recording and its commands.
@@ -41,7 +40,7 @@ Run = tuple[Recording, CommandedMotion]
 @dataclass(frozen=True)
 class PositionFit:
     """
-    Fit of a position-controlled arm.
+    Result of the output-error fit of a position-controlled arm.
 
     Attributes
     ----------
@@ -78,8 +77,7 @@ class PositionFit:
 
     def of(self, name: str, joint: str = '') -> tuple[float, float]:
         """Return value and standard error of a parameter."""
-        names = [(one.name, one.joint) for one in self.parameters]
-        place = names.index((name, joint))
+        place = [(one.name, one.joint) for one in self.parameters].index((name, joint))
         return float(self.values[place]), float(self.std[place])
 
 
@@ -87,7 +85,7 @@ def fit_positions(
     model: LoopModel, runs: Sequence[Run], gains: FloatArray | None = None
 ) -> PositionFit:
     """
-    Fit a loop to recordings.
+    Fit a simulated position-control loop to recordings.
 
     Parameters
     ----------
@@ -114,14 +112,14 @@ def fit_positions(
     free = np.ones(len(start), dtype=bool)
     free[1 : 2 * model.robot.n_joints + 1] = gains is None
     problem = _Problem(model, windows, start, size)
-    return _judged(problem, problem.solved(free), free)
+    return _fit_at(problem, problem.solved(free), free)
 
 
 def start_values(
     model: LoopModel, runs: Sequence[Run], gains: FloatArray | None
 ) -> tuple[FloatArray, FloatArray]:
     """
-    Return start values, and sizes with which each value alone explains the torque, (P,) each.
+    Return start values of the fit, and the size at which each value explains the torque, (P,).
 
     The torque balance of each joint is linear in gains, rotor inertia and friction. It is solved
     for nonnegative values and several delays. The result has the delay with the smallest
@@ -129,7 +127,7 @@ def start_values(
 
     """
     robot, n = model.robot, model.robot.n_joints
-    motions = [motion_of(recording) for recording, _ in runs]
+    motions = [recording.motion() for recording, _ in runs]
     # 2000 samples of a recording are enough for start values
     motions = [one.select(slice(None, None, len(one) // 2000 + 1)) for one in motions]
     body = ArmModel(robot)
@@ -171,8 +169,8 @@ def start_values(
         values, effort = more * values, more * effort
     mass = float(robot.rigid_parameters[::10].sum())
     sizes = np.array([effort / error, effort / speed, effort / rate, effort / speed, effort])
-    radius = 0.02  # of gyration of a tool [m]
-    # delay [s], joints, mass of the tool [kg], its centre and radius [m]
+    radius = 0.02  # radius of gyration of a tool [m]
+    # sizes of delay [s], parameters of joints, mass [kg], centre and radius of the tool [m]
     size = np.concatenate([[0.03], sizes.ravel(), [mass / _PRIOR_STD], 3 * [0.1], [radius]])
     # move start values off the limits, as the solver hardly leaves a limit
     values[free] = np.maximum(values, 0.02 * sizes)[free]
@@ -181,7 +179,7 @@ def start_values(
 
 @dataclass(eq=False)
 class _Problem:
-    """Least-squares problem of a loop model over windows, with priors around the start values."""
+    """Least-squares problem of simulated minus measured positions, with weak priors."""
 
     model: LoopModel
     windows: list[Window]
@@ -195,35 +193,35 @@ class _Problem:
         return np.concatenate(simulated) - np.concatenate(measured)
 
     def slopes(self, x: FloatArray, places: npt.NDArray[np.intp]) -> FloatArray:
-        """Differentiate positions by some parameters, relative to their sizes, (M, n, places)."""
-        share = 1e-3  # of the size of a parameter
+        """Return position derivatives by chosen parameters, relative to their sizes, (M, n, k)."""
+        share = 1e-3  # step of a parameter, as a share of its size
         now, steps = self.residual(x), share * np.diag(self.size)[places]
         columns = [(self.residual(x + step) - now) / share for step in steps]
         return np.stack(columns, axis=-1)
 
     def solved(self, free: npt.NDArray[np.bool_]) -> FloatArray:
-        """Fit the free parameters, with repeated estimates of the noise of the joints."""
+        """Fit the free parameters by least squares, weighted by the residual of each joint."""
         x, places = self.start.copy(), np.flatnonzero(free)
         lower, upper = np.zeros(len(x)), np.full(len(x), np.inf)
-        lower[0], upper[0] = -0.05, 0.3  # the delay [s]; negative if the clocks differ
-        lower[-4:-1], upper[-4:] = -1.0, 1.0  # of the tool [m]
+        lower[0], upper[0] = -0.05, 0.3  # delay [s]; it is negative if the clocks differ
+        lower[-4:-1], upper[-4:] = -1.0, 1.0  # centre and radius of the tool [m]
         size, prior = self.size[places], np.eye(len(places)) / _PRIOR_STD
 
-        def whole(z: FloatArray) -> FloatArray:
+        def parameters(z: FloatArray) -> FloatArray:
             found = self.start.copy()
             found[places] = size * z
             return found
 
         def weighted(z: FloatArray) -> FloatArray:
-            return np.append(self.residual(whole(z)) / sigma, (z - begin) / _PRIOR_STD)
+            return np.append(self.residual(parameters(z)) / sigma, (z - begin) / _PRIOR_STD)
 
         def jacobian(z: FloatArray) -> FloatArray:
-            slopes = self.slopes(whole(z), places) / sigma[:, np.newaxis]
+            slopes = self.slopes(parameters(z), places) / sigma[:, np.newaxis]
             return np.concatenate([slopes.reshape(-1, len(places)), prior])
 
         begin, bounds = self.start[places] / size, (lower[places] / size, upper[places] / size)
         sigma = np.sqrt(np.mean(self.residual(x) ** 2, axis=0)) + 1e-9
-        for _ in range(3):  # each with a new estimate of the noise of the joints
+        for _ in range(3):  # each iteration has a new estimate of the noise of the joints
             found = least_squares(
                 weighted,
                 x[places] / size,
@@ -234,7 +232,7 @@ class _Problem:
                 xtol=1e-5,
                 max_nfev=25,
             )
-            x, before = whole(found.x), sigma
+            x, before = parameters(found.x), sigma
             sigma = np.sqrt(np.mean(self.residual(x) ** 2, axis=0)) + 1e-9
             if np.all(np.abs(before / sigma - 1.0) < 0.1):
                 break
@@ -244,7 +242,7 @@ class _Problem:
 def _errors(
     information: FloatArray, scores: FloatArray, some: npt.NDArray[np.intp]
 ) -> tuple[FloatArray, FloatArray]:
-    """Return covariance and standard errors of some parameters, relative to their sizes."""
+    """Return covariance and standard errors of chosen parameters, relative to their sizes."""
     inside = information[np.ix_(some, some)] + np.eye(len(some)) / _PRIOR_STD**2
     covariance = np.linalg.inv(inside)
     blocks = len(scores)
@@ -254,15 +252,16 @@ def _errors(
     return np.asarray(covariance), np.sqrt(np.maximum(np.diag(covariance), robust))
 
 
-def _judged(problem: _Problem, x: FloatArray, free: npt.NDArray[np.bool_]) -> PositionFit:
-    """Return the fit at the solution, with the standard errors of its parameters."""
+def _fit_at(problem: _Problem, x: FloatArray, free: npt.NDArray[np.bool_]) -> PositionFit:
+    """Return the fit at fitted parameters x, with standard errors and reasons for missing ones."""
     model, n, count = problem.model, problem.model.robot.n_joints, len(x)
     residuals = problem.residual(x)
     sigma = np.sqrt(np.mean(residuals**2, axis=0)) + 1e-9
     weighted = problem.slopes(x, np.arange(count)) / sigma[:, np.newaxis]
     gradients = np.einsum('mjp,mj->mp', weighted, residuals / sigma)
     t = np.concatenate([k * 1e6 + window.t for k, window in enumerate(problem.windows)])
-    _, block = np.unique(np.floor(t / 0.5), return_inverse=True)  # of correlated residuals
+    # residuals are correlated within blocks of 0.5 s
+    _, block = np.unique(np.floor(t / 0.5), return_inverse=True)
     scores = np.zeros((block.max() + 1, count))
     np.add.at(scores, block, gradients)
     information = np.einsum('mjp,mjr->pr', weighted, weighted)
@@ -274,7 +273,7 @@ def _judged(problem: _Problem, x: FloatArray, free: npt.NDArray[np.bool_]) -> Po
     limit = 0.3 * _PRIOR_STD  # larger standard errors are reported as infinite
     std[fitted] = own * problem.size[fitted]
     for k, place in enumerate(fitted):
-        if own[k] < limit or place == count - 1:  # the prior of the radius is real
+        if own[k] < limit or place == count - 1:  # the radius, the last one, has a real prior
             continue
         std[place] = np.inf
         correlation = np.abs(covariance[k]) / np.sqrt(np.diag(covariance))
@@ -291,9 +290,9 @@ def _judged(problem: _Problem, x: FloatArray, free: npt.NDArray[np.bool_]) -> Po
     if not free[1]:
         values, deviation = x.copy(), np.zeros(count)
         with_kp = free | (np.arange(count) <= n)
-        if np.any(residual > MAX_RESIDUAL_TO_NOISE * noise):  # far from the optimum
+        if np.any(residual > MAX_RESIDUAL_TO_NOISE * noise):  # too far for a linear step
             again = replace(problem, start=x).solved(with_kp)
-            refitted = _judged(problem, again, with_kp)
+            refitted = _fit_at(problem, again, with_kp)
             values, deviation = refitted.values, refitted.std
         else:  # one Gauss-Newton step with kp free as well
             some = np.flatnonzero(with_kp)

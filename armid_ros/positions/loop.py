@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-An arm in a closed loop of position control, simulated in windows of a recording.
+Simulation of an arm under position control, in windows of a recording.
 
 tau = kp (u(t - delay) - q) + kd (du(t - delay) - dq), where u is the commanded position, and du
 is the commanded velocity or zero. The loop is evaluated at the middle of each step of
@@ -54,13 +54,13 @@ class CommandedMotion:
 
     @classmethod
     def of(cls, commanded: Recording, recording: Recording) -> CommandedMotion:
-        """Return the commands that were recorded together with a recording."""
+        """Return the commanded motion on the time base of a recording of measured positions."""
         t = commanded.t + 1e-9 * (commanded.start_ns - recording.start_ns)
         dq = np.zeros_like(commanded.q) if commanded.dq is None else commanded.dq
         return cls(t, commanded.q, dq)
 
     def mean(self, edges: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return mean positions and velocities between successive times, each (len - 1, n)."""
+        """Return mean commanded positions and velocities between successive times, (K - 1, n)."""
         ends = min(self.t[0], edges[0]) - 1.0, max(self.t[-1], edges[-1]) + 1.0
         t = np.concatenate([ends[:1], self.t, ends[1:]])
         values = np.hstack([self.q, self.dq])
@@ -99,10 +99,10 @@ class Window:
 
 
 def windows_of(recording: Recording, commands: CommandedMotion) -> Iterator[Window]:
-    """Yield windows without gaps in a recording, as long as there are commands."""
+    """Yield the windows of about 5 s without a gap in a recording and in its commands."""
     t = recording.t
-    length, lead = 5.0, 0.5  # of a window, and before it for errors of the initial state [s]
-    around = 0.03  # half width of the positions that determine an initial state by a parabola [s]
+    length, lead = 5.0, 0.5  # of a window, and of the time before it to forget the start state [s]
+    around = 0.03  # half of the time over which a parabola gives the start state [s]
     known = (t >= commands.t[0]) & (t <= commands.t[-1] + _COMMAND_HOLD)
     breaks = np.diff(t) > GAP_PERIODS * recording.period
     breaks |= known[1:] != known[:-1]
@@ -126,7 +126,7 @@ def windows_of(recording: Recording, commands: CommandedMotion) -> Iterator[Wind
 @dataclass(frozen=True, eq=False)
 class LoopModel:
     """
-    Robot with position controller, drives and tool, as a function of P parameters.
+    Robot under position control, with drives and tool that depend on P parameters.
 
     Attributes
     ----------
@@ -142,7 +142,7 @@ class LoopModel:
 
     @cached_property
     def bare(self) -> ArmModel:
-        """Return the described arm with the effects of the fit, all zero."""
+        """Return the described arm with the effects to fit, whose values are zero."""
         names = 'rotor_inertia', 'viscous_friction', 'coulomb_friction', 'payload'
         return ArmModel.of(self.robot, effects=names)
 
@@ -166,7 +166,7 @@ class LoopModel:
         )
 
     def arm(self, x: FloatArray) -> ArmModel:
-        """Return the arm with the effects of the parameters, shape (P,); the tool is a ball."""
+        """Return the arm model for given parameters, shape (P,); the tool is taken as a ball."""
         n, (mass, *center, radius) = self.robot.n_joints, x[-5:]
         tool = pin.Inertia(mass, np.array(center), mass * radius**2 * np.eye(3))
         values = (*np.split(x[2 * n + 1 : -5], 3), tool.toDynamicParameters())
@@ -176,7 +176,7 @@ class LoopModel:
         self, x: FloatArray, recording: Recording, commands: CommandedMotion
     ) -> Recording:
         """
-        Return a recording with the torque of the controller, while commands last.
+        Return a recording with the torque that the controller computes from its commands.
 
         Parameters
         ----------
@@ -202,7 +202,7 @@ class LoopModel:
 
     def simulated(self, x: FloatArray, windows: Sequence[Window]) -> list[FloatArray]:
         """
-        Simulate windows with values of the parameters, shape (P,).
+        Simulate the arm in windows, with parameters of shape (P,).
 
         Returns
         -------
@@ -215,8 +215,8 @@ class LoopModel:
         rotor, viscous, *others = effects.values
         endless = replace(self.robot, torque_limit=np.full(n, np.inf))
         damped = replace(effects, robot=endless, values=(rotor, viscous + kd, *others))
-        # a step in which friction sticks or slips from some time on has four parts: a reversal at
-        # the end of a step delays the joint, which resembles viscous friction
+        # a step in which a joint begins to stick or slip is divided into four, as a reversal at
+        # the end of a step would delay the joint like viscous friction
         plant, fine = (Plant(damped, step, hard_stops=False) for step in (dt, dt / 4))
         # positions half a step ahead: kp (u - q - dq dt / 2)
         feedback = LinearFeedback(
@@ -228,7 +228,7 @@ class LoopModel:
         )
         control = Controller(feedback)
         compiled = CompiledLoop.of(plant, control)
-        found, far = [], 3.0  # largest position error, of an unstable loop [rad or m]
+        found, far = [], 3.0  # largest position error, that of an unstable loop [rad or m]
         for window in windows:
             # steps begin when commands arrive, as friction may hold against a mean of two commands
             sent = window.commands.t[np.searchsorted(window.commands.t, window.start - x[0]) - 1]

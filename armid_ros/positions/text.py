@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Summary and document of ``armid positions``."""
+"""Terminal summary and JSON document of ``armid positions``."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _COLUMNS = {
 
 
 def limit_hints(runs: Sequence[Run], torques: Sequence[Recording], robot: Robot) -> list[str]:
-    """Return hints about commands beyond position limits, and torques at the limits of drives."""
+    """Return hints on joints with commands beyond position limits, or torques at their limits."""
     commands = np.concatenate([commands.q for _, commands in runs])
     torque = np.concatenate([one.tau for one in torques if one.tau is not None])
     beyond = np.mean((commands < robot.lower) | (commands > robot.upper), axis=0)
@@ -34,8 +34,8 @@ def limit_hints(runs: Sequence[Run], torques: Sequence[Recording], robot: Robot)
     return [
         f'{joint}: {100.0 * share:.3g} % of the {text}'
         for shares, text in (
-            (beyond, 'commands lie beyond its position limits; a stop is not modelled'),
-            (reached, 'torque reaches the limit of its drive, which is not modelled; move slower'),
+            (beyond, 'commands lie beyond its position limits; hard stops are not modelled'),
+            (reached, 'torques reach the limit of the drive, which is not modelled; move slower'),
         )
         for joint, share in zip(robot.joints, shares, strict=True)
         if share > 0.001
@@ -43,15 +43,15 @@ def limit_hints(runs: Sequence[Run], torques: Sequence[Recording], robot: Robot)
 
 
 def fit_document(found: PositionFit, hints: Sequence[str] = ()) -> dict[str, Any]:
-    """Return the content of positions.json; `hints` are of `limit_hints`."""
+    """Return the content of positions.json for a fit and the hints of `limit_hints`."""
     poor = bool(np.any(found.residual > 0.3 * found.tracking))
     std = [float(one) if np.isfinite(one) else None for one in found.std]
     values = zip(found.parameters, found.values.tolist(), std, found.reasons, strict=True)
     columns = 'tracking', 'residual', 'noise', 'gain_ratio', 'gain_ratio_std'
     rows = zip(*(getattr(found, name).tolist() for name in columns), strict=True)
     coloured = [
-        f'{joint}: the residual is {rest / noise:.2g} times the noise of the positions; a law is '
-        'not modelled (soft or load-dependent friction, an elastic joint), or --gains are wrong'
+        f'{joint}: the residual is {rest / noise:.2g} times the noise of the positions: an effect '
+        'is not modelled (soft or load-dependent friction, an elastic joint), or --gains are wrong'
         for joint, rest, noise in zip(
             found.arm.robot.joints, found.residual, found.noise, strict=True
         )
@@ -83,12 +83,12 @@ def fit_document(found: PositionFit, hints: Sequence[str] = ()) -> dict[str, Any
 
 
 def fit_summary(found: PositionFit, document: dict[str, Any], step: str) -> Summary:
-    """Return the summary of a fit and its document; `step` is the next step after a good fit."""
+    """Return the terminal summary of a fit; `step` is the next step for the user if it is good."""
     verdict = document['verdict']
     joints = found.arm.robot.joints
 
     def cell(name: str, joint: str = '', factor: float = 1.0) -> str:
-        """Write a value with its 95 % interval."""
+        """Return a fitted value with its 95 % interval as text."""
         value, std = found.of(name, joint)
         if not np.isfinite(std):
             return 'not det.'

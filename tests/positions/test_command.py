@@ -136,7 +136,7 @@ def test_the_reference_of_a_trajectory_controller_is_read(tmp_path, robot, playe
 def test_a_bag_without_commands_lists_its_topics(tmp_path, robot, played):
     ar.write_recording(tmp_path / 'bare', played[0])
     read = read_recording(tmp_path / 'bare', joints=robot.joints)
-    with pytest.raises(RecordingError, match=r'no topic of commands.*/joint_states'):
+    with pytest.raises(RecordingError, match=r'no topic of commanded positions.*/joint_states'):
         read_commands(tmp_path / 'bare', robot, read)
 
 
