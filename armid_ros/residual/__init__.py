@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-The residual of a diagnosis: learned as a map, and approximated by a law of few terms.
+Learning of the residual of a diagnosis: as a map of the state, and as a formula of few terms.
 
 ``learn_residual`` returns an arm with the maps as an effect, a table of the maps for other
 programs, and the predicted shares of the residual.

@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-A Gaussian process of the residual of a joint, on inducing points.
+Gaussian process of the residual torque of a joint, on inducing points.
 
 K-means divides the states into cells. An inducing point is the mean state of a cell, with the mean
 residual torque. Length scales, amplitude and noise maximise the marginal likelihood. Source:
@@ -26,7 +26,7 @@ _LENGTHS = (0.02, 10.0)
 
 
 class _Cells(NamedTuple):
-    """Cell of each row, (N,), and mean state (M, 3) and torque (M,) of each cell."""
+    """Cell number of each row, (N,), and mean state (M, 3) and torque (M,) of each cell."""
 
     labels: npt.NDArray[np.intp]
     points: FloatArray
@@ -35,7 +35,7 @@ class _Cells(NamedTuple):
 
 def learn_map(rows: JointRows, rng: np.random.Generator) -> tuple[TorqueMap, FloatArray]:
     """
-    Learn a map of the residual torque of a joint.
+    Learn the residual torque of a joint as a map of position, velocity and load.
 
     Parameters
     ----------
@@ -80,7 +80,7 @@ def learn_map(rows: JointRows, rng: np.random.Generator) -> tuple[TorqueMap, Flo
 
 
 class _Scales(NamedTuple):
-    """Hyperparameters of a map: noise of its points, length scales, amplitude and knee."""
+    """Hyperparameters of the process: noise, length scales, amplitude and knee velocity."""
 
     noise: float
     lengths: FloatArray
@@ -93,7 +93,7 @@ def _span(inputs: FloatArray) -> FloatArray:
 
 
 def _cells(rows: JointRows, labels: npt.NDArray[np.intp], used: npt.NDArray[np.bool_]) -> _Cells:
-    """Return the means of the cells over the used rows, without empty cells."""
+    """Average states and residuals over the used rows of each cell; leave out empty cells."""
     own, n = labels[used], int(labels.max()) + 1
     count = np.bincount(own, minlength=n)
     there = count > 0

@@ -1,11 +1,11 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Approximation of a residual by a law: sparse regression with few terms of a library.
+Approximation of a residual by a formula of few terms: sparse regression on a library of terms.
 
 Orthogonal matching pursuit adds the term that correlates most with the remaining residual.
 Cross-validation selects the fewest terms whose error is within one standard deviation of the least
-error. The law is a suggestion for a user-defined effect. Source: Brunton, Proctor and Kutz 2016;
+error. The formula suggests a user-defined effect. Source: Brunton, Proctor and Kutz 2016;
 Pati, Rezaiifar and Krishnaprasad 1993.
 
 """
@@ -22,7 +22,7 @@ import numpy as np
 
 
 class Term(NamedTuple):
-    """Term of a law: function of q, dq and the load w, such as 'dq^3', with factor and unit."""
+    """Term of a formula in q, dq and the load w, such as 'dq^3', with its factor and unit."""
 
     text: str
     coefficient: float
@@ -32,14 +32,14 @@ class Term(NamedTuple):
 @dataclass(frozen=True)
 class Law:
     """
-    A suggested law of a residual.
+    A formula of few terms that approximates the residual torque of a joint.
 
     Attributes
     ----------
     terms : tuple of Term
-        Terms of the law, the largest first.
+        Terms of the formula, the largest first.
     share : float
-        Share of the squared residual of held-out blocks that the law predicts.
+        Share of the squared residual of held-out blocks that the formula predicts.
 
     """
 
@@ -48,7 +48,7 @@ class Law:
 
     @property
     def text(self) -> str:
-        """Return the law in a line, such as '0.31 dq^3 - 0.02 q'."""
+        """Return the formula in a line, such as '0.31 dq^3 - 0.02 q'."""
         text = ''
         for number, term in enumerate(self.terms):
             sign = '-' if term.coefficient < 0.0 else ('' if number == 0 else '+')
@@ -58,7 +58,7 @@ class Law:
         return text
 
     def document(self) -> dict[str, Any]:
-        """Return the law as a JSON document."""
+        """Return the formula as a JSON document."""
         terms = [
             {'term': one.text, 'coefficient': one.coefficient, 'unit': one.unit}
             for one in self.terms
@@ -69,7 +69,7 @@ class Law:
 def _library(
     inputs: FloatArray, low: float, high: float, prismatic: bool
 ) -> list[tuple[str, str, FloatArray]]:
-    """Return the candidate terms: text, unit of the factor, and values along the data."""
+    """Return the candidate terms of a formula: text, unit of the factor, and values, (N,)."""
     q, dq, w = inputs.T
     sign = np.sign(dq)
     force, x = ('N', 'm') if prismatic else ('N m', 'rad')
@@ -106,7 +106,7 @@ def _library(
 
 def suggest_law(rows: JointRows, prismatic: bool) -> Law | None:
     """
-    Return the law that approximates a residual; None if there is no such law in the library.
+    Return a formula of few terms that approximates a residual; None if the library has none.
 
     Parameters
     ----------
@@ -119,8 +119,8 @@ def suggest_law(rows: JointRows, prismatic: bool) -> Law | None:
     ends = float(rows.inputs[:, 0].min()), float(rows.inputs[:, 0].max())
     columns = _library(rows.inputs, *ends, prismatic)
     x = np.column_stack([values for _, _, values in columns])
-    most = 3  # terms of a law
-    # squared residuals of each held-out block, by the number of terms of the law
+    most = 3  # terms of a formula
+    # squared residuals of each held-out block, by the number of terms of the formula
     losses = np.zeros((most, BLOCKS))
     for block, others in enumerate(rows.folds()):
         for more in range(most):
@@ -134,7 +134,7 @@ def suggest_law(rows: JointRows, prismatic: bool) -> Law | None:
     factors = _fit(x, rows.residual, count)
     chosen = np.flatnonzero(factors)
     share = 1.0 - float(losses[count - 1].sum()) / max(float(np.sum(rows.residual**2)), 1e-300)
-    if share < 0.5:  # a law predicts at least half of the squared residual
+    if share < 0.5:  # a useful formula predicts at least half of the squared residual
         return None
     size = np.abs(factors) * np.sqrt(np.mean(x**2, axis=0))
     order = sorted(chosen, key=lambda k: -size[k])
@@ -148,7 +148,7 @@ def share_of(residual: FloatArray, torque: FloatArray) -> float:
 
 
 def _fit(x: FloatArray, residual: FloatArray, count: int) -> FloatArray:
-    """Return the factors of the terms, at most ``count`` of them nonzero, shape (L,)."""
+    """Fit a residual by at most ``count`` of the L terms; return the factors of all, (L,)."""
     from sklearn.linear_model import orthogonal_mp
 
     size = np.sqrt(np.mean(x**2, axis=0))

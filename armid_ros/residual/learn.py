@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Learning the residual of a diagnosis: a map of each joint, and a suggested law."""
+"""Learning of the residual of a diagnosis: a map and a formula of few terms for each joint."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ _MIN_ROWS = 100
 @dataclass(frozen=True)
 class JointResidual:
     """
-    The learned map and the suggested law of one joint.
+    The learned map of a joint's residual torque, and the formula that approximates it.
 
     Attributes
     ----------
@@ -60,7 +60,7 @@ class JointResidual:
     held_out : float or None
         The same share for held-out recordings alone; None if none is near the training data.
     law : Law or None
-        Suggested law; None if no law approximates the residual.
+        Formula of few terms; None if no formula approximates the residual.
 
     """
 
@@ -74,14 +74,14 @@ class JointResidual:
     law: Law | None
 
     def axis(self, number: int, count: int) -> FloatArray:
-        """Return evenly spaced values over the range of an input, shape (count,)."""
+        """Return evenly spaced values over the recorded range of an input, 0 to 2, (count,)."""
         return np.linspace(float(self.ranges[number, 0]), float(self.ranges[number, 1]), count)
 
 
 @dataclass(frozen=True)
 class Residual:
     """
-    The learned residual of a diagnosis.
+    The residual of a diagnosis, learned as a map for each joint.
 
     Attributes
     ----------
@@ -103,7 +103,7 @@ class Residual:
     joints: tuple[JointResidual, ...]
 
     def sentences(self) -> tuple[str, ...]:
-        """Return a sentence for each joint on its map and its law."""
+        """Return a sentence on the map and the formula of each joint."""
         lines = []
         for one in self.joints:
             alone = ''
@@ -111,12 +111,12 @@ class Residual:
                 alone = f' ({percent(one.held_out)} of held-out recordings)'
                 if one.held_out < 0.0:
                     alone = ' (held-out recordings get worse: they leave the range of its data)'
-            like = 'no law of few terms'
+            like = 'no formula of few terms'
             if one.law is not None:
                 like = f'{one.law.text} ({percent(one.law.share)})'
             lines.append(
                 f'{one.joint}: a learned map predicts {percent(one.gain)} of the '
-                f'residual{alone}; similar law: {like}'
+                f'residual{alone}; similar formula: {like}'
             )
         return tuple(lines)
 
@@ -131,7 +131,7 @@ class Residual:
         ]
 
     def section(self) -> ContentSection:
-        """Return the section of a report that shows the learned maps at the middle load."""
+        """Return the section of the report on the learned maps, drawn at the mean load."""
         robot = self.base.robot
         rows, pictures = [], []
         for one in self.joints:
@@ -147,7 +147,7 @@ class Residual:
                     f'{digits(one.after)} {unit}',
                     percent(one.gain),
                     held_out,
-                    TableCell('no simple law' if one.law is None else one.law.text, 'law'),
+                    TableCell('no simple formula' if one.law is None else one.law.text, 'law'),
                     '' if one.law is None else percent(one.law.share),
                 )
             )
@@ -159,7 +159,7 @@ class Residual:
             'Share, map',
             'Held-out alone',
             'Looks like',
-            'Share, law',
+            'Share, formula',
         )
         return ContentSection(
             'Learned residual',
@@ -173,8 +173,8 @@ class Residual:
                 ),
                 DataTable(heads, rows, (0, 5)),
                 Paragraph(
-                    'q: position, dq: velocity, w: gravity torque. A law is a suggestion: write '
-                    'it as an effect of your own if it is plausible, and diagnose again.',
+                    'q: position, dq: velocity, w: gravity torque. A formula is a suggestion: '
+                    'write it as an effect of your own if it is plausible, and diagnose again.',
                     'hint',
                 ),
                 SmallMultiples(pictures),
@@ -214,7 +214,7 @@ class Residual:
         return rows
 
     def document(self) -> dict[str, Any]:
-        """Return the entry of diagnosis.json."""
+        """Return the maps and formulas as the entry `residual` of diagnosis.json."""
         return {
             'method': 'gp',
             'table': self.table_file,
@@ -313,7 +313,7 @@ def _learned(
     rng: np.random.Generator,
 ) -> JointResidual | None:
     """
-    Learn the map of one joint.
+    Learn the residual torque of one joint as a map, and test the map on held-out data.
 
     The map is None if it does not predict held-out blocks beyond chance. It is also None if its
     torque is below a material torque [N m] and it predicts no held-out recording.
@@ -357,7 +357,7 @@ def near_data(learned: TorqueMap, rows: JointRows) -> npt.NDArray[np.bool_]:
 
 
 def _pictures(one: JointResidual, unit: str, length: str) -> list[tuple[str, str, Markup, str]]:
-    """Return pictures of torque and deviation at the middle load, the largest velocity on top."""
+    """Return pictures of torque and standard deviation at the mean load of the range."""
     # cells along position and velocity
     q, dq = (one.axis(number, count) for number, count in enumerate((80, 60)))
     load = np.full((len(dq), len(q)), one.ranges[2].mean())

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Residuals of recordings, with position, velocity and load of the joint."""
+"""Residual torques of each joint, with the position, velocity and load of the joint."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ BLOCKS = 10
 @dataclass(frozen=True)
 class JointRows:
     """
-    The informative rows of one joint.
+    Residual torque of one joint with position, velocity and load, for N informative samples.
 
     Attributes
     ----------
@@ -43,7 +43,7 @@ class JointRows:
         return len(self.residual)
 
     def select(self, chosen: npt.NDArray[np.bool_]) -> JointRows:
-        """Return some of the rows, shape (N,) of bool."""
+        """Return the rows that a mask of shape (N,) selects."""
         return JointRows(self.inputs[chosen], self.residual[chosen], self.block[chosen])
 
     def folds(self) -> Iterator[npt.NDArray[np.bool_]]:
@@ -56,7 +56,7 @@ class JointRows:
 
 def joint_rows(arm: ArmModel, data: Sequence[Trajectory]) -> list[JointRows]:
     """
-    Return the residuals of a model on recordings, joint by joint.
+    Return the residual torques of a model on recordings, with the state, for each joint.
 
     Parameters
     ----------
