@@ -139,9 +139,7 @@ def parse_xml(text: str) -> ElementTree.Element:
 
     """
     if len(text) > TEXT_LIMIT:
-        raise RobotError(
-            f'the description has {len(text)} characters; at most {TEXT_LIMIT} are read'
-        )
+        raise RobotError(f'a description of {len(text)} characters is above {TEXT_LIMIT}')
     builder, parser = ElementTree.TreeBuilder(), expat.ParserCreate()
     parser.StartElementHandler, parser.EndElementHandler = builder.start, builder.end
     parser.CharacterDataHandler = builder.data
@@ -281,60 +279,60 @@ def _inertial(link: ElementTree.Element, name: str) -> Inertial | None:
     element = link.find('inertial')
     if element is None:
         return None
-    where = f"link '{name}'"
+    link_name = f"link '{name}'"
     mass, inertia = element.find('mass'), element.find('inertia')
     if mass is None or inertia is None:
         missing = 'mass' if mass is None else 'inertia'
-        raise RobotError(f'the <inertial> of {where} has no <{missing}>')
-    xyz, rpy = _origin(element, where)
+        raise RobotError(f'{link_name}: its <inertial> has no <{missing}>')
+    xyz, rpy = _origin(element, link_name)
     inertial = Inertial(
-        mass=_number(mass, 'value', where),
+        mass=_number(mass, 'value', link_name),
         xyz=xyz,
         rpy=rpy,
         inertia=tuple(
-            _number(inertia, key, where, None if key[1] == key[2] else 0.0) for key in INERTIA
+            _number(inertia, key, link_name, None if key[1] == key[2] else 0.0) for key in INERTIA
         ),
     )
     if inertial.mass < 0.0:
         raise RobotError(
-            f'{where} has a negative mass, {inertial.mass:g} kg; with --physical, identified '
+            f'{link_name} has a negative mass, {inertial.mass:g} kg; with --physical, identified '
             'parameters are physically consistent'
         )
     return inertial
 
 
 def _joint(element: ElementTree.Element, name: str, notes: list[str]) -> Joint:
-    where = f"joint '{name}'"
+    joint = f"joint '{name}'"
     kind = element.get('type', '')
     if kind not in JOINT_TYPES:
-        raise RobotError(f"{where} has the type '{kind}'; types are {', '.join(JOINT_TYPES)}")
+        raise RobotError(f"{joint} has the type '{kind}'; types are {', '.join(JOINT_TYPES)}")
     if kind in ('floating', 'planar'):
         raise RobotError(
-            f"{where} is {kind}, but an arm needs a fixed base: set type='fixed' in this joint, "
+            f"{joint} is {kind}, but an arm needs a fixed base: set type='fixed' in this joint, "
             'or give a URDF of the arm alone'
         )
-    xyz, rpy = _origin(element, where)
+    xyz, rpy = _origin(element, joint)
     axis = element.find('axis')
-    x, y, z = (1.0, 0.0, 0.0) if axis is None else _vector(axis, 'xyz', where)
+    x, y, z = (1.0, 0.0, 0.0) if axis is None else _vector(axis, 'xyz', joint)
     length = math.hypot(x, y, z)
     if length < 1e-100:  # a zero vector cannot be normalised
         if kind in MOVABLE:
-            raise RobotError(f'{where}: its <axis> is a zero vector; give it a direction')
+            raise RobotError(f'{joint}: its <axis> is a zero vector; give it a direction')
         x, y, z, length = 1.0, 0.0, 0.0, 1.0
-    lower, upper, velocity, effort = _limits(element, kind, where, notes)
+    lower, upper, velocity, effort = _limits(element, kind, joint, notes)
     mimic, followed = None, element.find('mimic')
     if followed is not None:
-        mimic = _mimic(followed, where, None)
+        mimic = _mimic(followed, joint, None)
     dynamics = element.find('dynamics')
     damping, friction, armature = (
-        0.0 if dynamics is None else _number(dynamics, key, where, 0.0)
+        0.0 if dynamics is None else _number(dynamics, key, joint, 0.0)
         for key in ('damping', 'friction', 'armature')
     )
     return Joint(
         name=name,
         kind=kind,
-        parent=_link(element, 'parent', where),
-        child=_link(element, 'child', where),
+        parent=_link(element, 'parent', joint),
+        child=_link(element, 'child', joint),
         xyz=xyz,
         rpy=rpy,
         axis=(x / length, y / length, z / length),
@@ -350,37 +348,37 @@ def _joint(element: ElementTree.Element, name: str, notes: list[str]) -> Joint:
 
 
 def _limits(
-    element: ElementTree.Element, kind: str, where: str, notes: list[str]
+    element: ElementTree.Element, kind: str, joint: str, notes: list[str]
 ) -> tuple[float, float, float, float]:
     limit = element.find('limit')
     if kind not in MOVABLE or limit is None:
         if kind in ('revolute', 'prismatic'):
-            notes.append(f'{where}: no <limit>; taken as unlimited')
+            notes.append(f'{joint}: no <limit>; taken as unlimited')
         return -math.inf, math.inf, math.inf, math.inf
     rates = []
     for name in ('velocity', 'effort'):
-        rate = abs(_number(limit, name, where, math.inf, endless=True))
+        rate = abs(_number(limit, name, joint, math.inf, endless=True))
         if rate == 0.0:  # noqa: RUF069 - as described
-            notes.append(f'{where}: {name} limit 0; taken as not given')
+            notes.append(f'{joint}: {name} limit 0; taken as not given')
             rate = math.inf
         rates.append(rate)
     if kind == 'continuous':
         return -math.inf, math.inf, rates[0], rates[1]
-    lower = _number(limit, 'lower', where, 0.0, endless=True)
-    upper = _number(limit, 'upper', where, 0.0, endless=True)
+    lower = _number(limit, 'lower', joint, 0.0, endless=True)
+    upper = _number(limit, 'upper', joint, 0.0, endless=True)
     if lower > upper:
-        raise RobotError(f'{where}: its lower limit {lower:g} is above its upper limit {upper:g}')
+        raise RobotError(f'{joint}: its lower limit {lower:g} is above its upper limit {upper:g}')
     if lower == upper:
-        notes.append(f'{where}: no range of motion in <limit>; taken as unlimited')
+        notes.append(f'{joint}: no range of motion in <limit>; taken as unlimited')
         lower, upper = -math.inf, math.inf
     return lower, upper, rates[0], rates[1]
 
 
-def _link(element: ElementTree.Element, role: str, where: str) -> str:
+def _link(element: ElementTree.Element, role: str, joint: str) -> str:
     reference = element.find(role)
     link = None if reference is None else reference.get('link')
     if not link:
-        raise RobotError(f'{where} has no {role} link')
+        raise RobotError(f'{joint} has no {role} link')
     return link
 
 

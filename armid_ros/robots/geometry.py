@@ -328,7 +328,7 @@ def _leave_out_touching(robot: Robot, geometry: pin.GeometryModel) -> tuple[tupl
 
 
 def _leave_out_separate(robot: Robot, geometry: pin.GeometryModel) -> None:
-    """Remove the pairs of links at one joint that touch at no position of this joint."""
+    """Remove the pairs of bodies that only one joint moves and that touch nowhere in its range."""
     robot = robot.tree
     data, placed = robot.model.createData(), geometry.createData()
     by_joint: dict[int, list[int]] = {}

@@ -152,10 +152,10 @@ def _volume(bodies: Sequence[coal.ConvexBase]) -> float:
 def _hull(points: FloatArray) -> coal.ConvexBase:
     """Return the convex hull of points (k, 3); ValueError for coplanar points."""
     if len(points) < 4:
-        raise ValueError('fewer than four points')
+        raise ValueError('a convex hull needs at least four points')
     spread = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
     if spread[2] < 1e-5 * spread[0]:
-        raise ValueError('all points lie in one plane')
+        raise ValueError('a convex hull needs points that do not lie in one plane')
     corners = coal.StdVec_Vec3s()
     corners.extend(list(points))
     return coal.Convex.convexHull(corners, True, 'Qt')

@@ -153,7 +153,7 @@ class _Writer:
     def _link(
         self, body: int, parent: int, joints: list[int], parent_anchor: FloatArray
     ) -> FloatArray:
-        """Write a MuJoCo body and its joints as URDF; return the link frame in the body frame."""
+        """Write a MuJoCo body and its joints; return the link's origin in the body frame [m]."""
         model, name = self.model, self.bodies[body]
         placement = pin.SE3(_rotation(model.body_quat[body]), np.array(model.body_pos[body]))
         placement.translation = placement.translation - parent_anchor
@@ -355,7 +355,7 @@ def _place(element: ElementTree.Element, parent: str, child: str, placement: pin
 
 
 def _origin(element: ElementTree.Element, placement: pin.SE3) -> None:
-    """Write the placement of an element in URDF; angles keep all digits in gimbal lock."""
+    """Write a placement as the <origin> of a URDF element, with exact angles in gimbal lock."""
     r = np.array(placement.rotation)
     roll = math.atan2(r[2, 1], r[2, 2])
     pitch = math.atan2(-r[2, 0], math.hypot(r[2, 1], r[2, 2]))

@@ -155,8 +155,8 @@ class Reference:
         for joint in robot.joints:
             if joint not in self.joints:
                 raise TrajectoryError(
-                    f"trajectory: joint '{joint}' is missing; {robot.name} needs {listed}; "
-                    f'--joints {",".join(self.joints)} keeps the others at rest'
+                    f"trajectory: joint '{joint}' is missing; {robot.name} needs {listed}; to "
+                    f'keep the others at rest, give --joints {",".join(self.joints)}'
                 )
         return self if self.joints == robot.joints else self.of_joints(robot.joints)
 

@@ -327,8 +327,8 @@ class Robot:
                 continue
             if np.abs(moment).max() >= NO_MASS:
                 raise RobotError(
-                    f"{place}: link '{self.links[body]}': a first moment {moment} kg m needs a "
-                    'mass; give the link an <inertial> with a rough one'
+                    f"{place}: link '{self.links[body]}' has a first moment, {moment} kg m, but "
+                    'no mass; give the link an <inertial> with a rough mass'
                 )
             inertia = pin.Inertia.Zero()  # the constructor accepts positive masses only
             inertia.inertia = np.array([[ixx, ixy, ixz], [ixy, iyy, iyz], [ixz, iyz, izz]])

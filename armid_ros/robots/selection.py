@@ -11,8 +11,6 @@ from armid_ros.errors import meant, RobotError
 from armid_ros.robots.description import Description, Joint, MOVABLE
 from armid_ros.robots.robot import Robot
 
-GRIPPER_WORDS = ('finger', 'gripper', 'jaw')
-
 
 @dataclass(frozen=True)
 class HeldJoint:
@@ -63,7 +61,8 @@ def driven_joints(description: Description, names: Sequence[str] | None) -> tupl
         gripper = {
             joint.name
             for joint in free
-            if joint.name in led or any(word in joint.name.lower() for word in GRIPPER_WORDS)
+            if joint.name in led
+            or any(word in joint.name.lower() for word in ('finger', 'gripper', 'jaw'))
         }
         carriers = _carriers(description, [j.name for j in free if j.name not in gripper])
         carriers |= {leader for name, m in mimics if name in carriers for leader in m.multipliers}
@@ -241,8 +240,7 @@ def _by_name(description: Description, names: Sequence[str]) -> tuple[Joint, ...
             )
         if name in description.passive:
             raise RobotError(
-                f"joint '{name}' is passive in a closed loop and cannot be driven; joints to "
-                f'drive: {free}'
+                f"joint '{name}' is passive, in a closed loop; joints to drive: {free}"
             )
         if name in named:
             raise RobotError(f"joint '{name}' is named twice among the driven joints")

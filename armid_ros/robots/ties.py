@@ -70,7 +70,7 @@ def centroid_ties(robot: Robot, other: Robot, joints: Sequence[tuple[str, str]])
 
 def leg_ties(exo: Robot, human: Robot, segments: Sequence[str] = SEGMENTS) -> tuple[Tie, ...]:
     """
-    Return the ties of the shipped exoskeleton to its wearer, at the springs of the source.
+    Return the ties between the shipped exoskeleton and its wearer.
 
     Raises
     ------

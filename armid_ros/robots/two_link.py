@@ -111,7 +111,7 @@ class TwoLinkParameters:
         return np.asarray(self.link_damping + self.joint_motor_damping)
 
     def mass_matrix(self, angle: float) -> FloatArray:
-        """Return M for an angle of joint 2 [rad], shape (2, 2) [kg m^2]."""
+        """Return the mass matrix for an angle of joint 2 [rad], shape (2, 2) [kg m^2]."""
         coupling = self.beta + self.gamma * np.cos(angle)
         first = self.alpha + self.beta + 2.0 * self.gamma * np.cos(angle)
         return np.array([[first, coupling], [coupling, self.beta]])

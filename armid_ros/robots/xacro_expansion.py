@@ -192,7 +192,11 @@ def expanded(request: dict[str, Any]) -> dict[str, str]:
         text = str(xacro.process_file(request['path'], mappings=arguments).toxml())
         unknown = [name for name in request['arguments'] if name not in arguments.known]
         if unknown:
-            return {'error': _unknown_argument(unknown[0], arguments, request)}
+            near = difflib.get_close_matches(unknown[0], arguments.known, 1, 0.75)
+            guess = f" (did you mean '{near[0]}'?)" if near else ''
+            path = request['path']
+            text = f"the file has no argument '{unknown[0]}'{guess}; grep '<xacro:arg' {path}"
+            return {'error': f'{text} lists them'}
         answer['text'] = text.replace(f'file://{_MISSING_PACKAGE}', 'package://')
         answer['text'] = answer['text'].replace(_MISSING_PACKAGE, 'package://')
     except ImportError:
@@ -262,15 +266,6 @@ def _reason(error: Exception, request: dict[str, Any], missing: dict[str, str]) 
         first = next(iter(missing))
         return f'not found: {lines}; clone or install it, or add --package {first}=FOLDER ({text})'
     return text if place == path else f'{place}: {text}'
-
-
-def _unknown_argument(name: str, arguments: _Arguments, request: dict[str, Any]) -> str:
-    """Return a message on an argument that no file declares or uses."""
-    near = difflib.get_close_matches(name, arguments.known, 1, 0.75)
-    guess = f" (did you mean '{near[0]}'?)" if near else ''
-    return (
-        f"the file has no argument '{name}'{guess}; grep '<xacro:arg' {request['path']} lists them"
-    )
 
 
 def _place(xacro: Any) -> str:
