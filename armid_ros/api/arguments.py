@@ -74,7 +74,7 @@ def arm_of(arm: RobotLike, effects: str = USUAL) -> ArmModel:
 
 
 def drivable(arm: RobotLike) -> ArmModel:
-    """Return an arm model; TrajectoryError if a robot named by text drives joints of no arm."""
+    """Return an arm model; TrajectoryError if a robot given by name drives joints of no arm."""
     model = arm_of(arm)
     others = joints_beside_arms(model.robot) if isinstance(arm, str | Path) else ()
     if others:

@@ -57,11 +57,13 @@ def diagnosed_model(
     rng: Rng,
 ) -> tuple[RobotLike | IdentificationResult, ArmModel, Misfit | None, IdentificationResult | None]:
     """
-    Return what is diagnosed: arm, model and misfit, and the identification of a simulator if any.
+    Return the arm to diagnose, its model and misfit, and the identification of a simulator.
+
+    Without recordings of a simulator (`against`), the last result is None.
 
     The misfit is that of the model at its identification; None if it is unknown. The model of a
-    simulator is identified from its recordings (`against`). Without given effects, it has the
-    usual effects, and those that an MJCF can describe.
+    simulator is identified from its recordings. Without given effects, it has the usual effects,
+    and those that an MJCF can describe.
 
     """
     model = arm.arm if isinstance(arm, IdentificationResult) else arm_of(arm, effects)

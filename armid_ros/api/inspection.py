@@ -171,7 +171,7 @@ def inspect(
     ()
 
     """
-    if recording is None:  # the only argument
+    if recording is None:  # the only argument is the recording
         robot, recording = None, robot
     if recording is None or isinstance(recording, Robot | ArmModel):
         raise RecordingError('no recording was given: give a bag, a table or a Recording')

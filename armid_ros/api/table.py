@@ -58,7 +58,7 @@ class Summary:
     then: str = ''
 
     def text(self, *below: str) -> list[str]:
-        """Return the lines of the text, with `below` before the next steps."""
+        """Return the lines of the summary, with the lines `below` before the next steps."""
         headline = f'{self.badge.upper()}: {self.title}' if self.badge else self.title
         steps = [f'next: {step}' for step in self.steps]
         table = aligned(self.heads, self.rows)
@@ -74,7 +74,7 @@ def data_frame(rows: Any) -> pandas.DataFrame:
     try:
         from pandas import DataFrame
     except ModuleNotFoundError:
-        raise ArmidError('a table needs pandas: pip install pandas') from None
+        raise ArmidError('to_dataframe() needs pandas: pip install pandas') from None
     return DataFrame(rows)
 
 
@@ -101,7 +101,7 @@ class Shown(ABC):
         """Return the summary of the result."""
 
     def with_step(self, origin: ResultOrigin, robot: Robot | None = None) -> ResultOrigin:
-        """Return an origin with the next step for the user, and the name of a robot if given."""
+        """Return the origin of a result with the next step, and with the name of a given robot."""
         shown, known = self.summary(), origin if robot is None else origin.of(source_of(robot))
         step = origin.step or ''.join(shown.steps[:1]) or f'armid {shown.then}'
         return replace(known, step=step)
@@ -116,7 +116,7 @@ class Shown(ABC):
 
     @abstractmethod
     def page(self, origin: ResultOrigin = DEFAULT_ORIGIN) -> str:
-        """Return the report, one HTML file."""
+        """Return the report as the text of one HTML file."""
 
     def report(self, path: str | Path = 'report.html') -> Path:
         """Write the report and return its path."""

@@ -14,7 +14,7 @@ import click
 @click.command(epilog='Example: armid robots')
 @parameters.as_json
 def robots(as_json: bool) -> None:
-    """List the robots that are shipped."""
+    """List the robots that are shipped with this program."""
     from armid_ros.files import json_text
     from armid_ros.robots import shipped_robots
 

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from functools import partial
 from typing import Any, TYPE_CHECKING
 
 from armid_ros.cli import parameters
@@ -27,8 +27,8 @@ def _kept(ctx: click.Context, parameter: click.Parameter, value: Any) -> Any:
     return value
 
 
-def _option(*names: str, **facts: Any) -> Callable[[Any], Any]:
-    return click.option(*names, **{'callback': _kept, 'expose_value': False, **facts})
+#: Declaration of an option whose value is stored in the context, not passed to the command.
+_option = partial(click.option, callback=_kept, expose_value=False)
 
 
 def _rules(ctx: click.Context, parameter: click.Parameter, value: Any) -> Any:
@@ -47,8 +47,22 @@ def _rules(ctx: click.Context, parameter: click.Parameter, value: Any) -> Any:
     return _kept(ctx, parameter, tuple(rules))
 
 
+def _couplings(ctx: click.Context, parameter: click.Parameter, value: Any) -> Any:
+    """Store motor, joint and ratio of each --coupling; RecordingError if one is malformed."""
+    couplings = []
+    for text in value:
+        pair, equals, ratio = text.rpartition('=')
+        names = listed(pair)
+        if not equals or len(names) != 2:
+            raise RecordingError(f"--coupling '{text}' has to be MOTOR,JOINT=RATIO, as in 6,5=32")
+        from armid_ros.recording.columns import number
+
+        couplings.append((names[0].strip(), names[1].strip(), number(ratio)))
+    return _kept(ctx, parameter, tuple(couplings))
+
+
 def _numbers(ctx: click.Context, parameter: click.Parameter, value: str | None) -> Any:
-    """Store the value of an option: one number, or one number per joint."""
+    """Store an option with one number, or with one number per joint, in the context."""
     if value is not None:
         from armid_ros.recording.columns import numbers
 
@@ -124,7 +138,7 @@ options = together(
     _option(
         '--coupling',
         multiple=True,
-        callback=lambda ctx, one, texts: _kept(ctx, one, tuple(map(_coupling, texts))),
+        callback=_couplings,
         metavar='I,J=X',
         help='With --gear: motor I also turns X times per turn of joint J.',
     ),
@@ -147,13 +161,3 @@ def settings() -> ColumnSettings:
     from armid_ros.recording.columns import ColumnSettings
 
     return ColumnSettings(**click.get_current_context().meta.get(META, {}))
-
-
-def _coupling(text: str) -> tuple[str, str, float]:
-    from armid_ros.recording.columns import number
-
-    pair, equals, ratio = text.rpartition('=')
-    names = listed(pair)
-    if not equals or len(names) != 2:
-        raise RecordingError(f"--coupling '{text}' has to be MOTOR,JOINT=RATIO, as in 6,5=32")
-    return names[0].strip(), names[1].strip(), number(ratio)

@@ -152,7 +152,7 @@ def diagnose(
     priors: tuple[str, ...],
     **settings: Any,
 ) -> None:
-    """Find which effect a model lacks, and add it."""
+    """Find the effects that a model lacks, and add them to the model."""
     if baseline and no_baseline:
         raise click.UsageError('--baseline and --no-baseline were both given; give only one')
     if against and (model or baseline):

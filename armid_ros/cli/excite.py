@@ -269,13 +269,13 @@ def excite(
         try:
             options.deliver(result, staged, origin, as_json)
         except TrajectoryError as error:  # a design without a path to it is kept in a new folder
-            held = f'{staged.out}: stays as it was'
+            note = f'{staged.out} is unchanged'
             if staged.alone:
                 staged.keep()
-                held = f'{staged.out / "excitation.yaml"} holds the design'
-            remedy = 'try another --start or --seed'
+                note = f'{staged.out / "excitation.yaml"} contains the design'
             raise TrajectoryError(
-                f'{held}, but no path to the trajectory was found: {error}; {remedy}'
+                f'no path to the trajectory was found: {error}; try another --start or --seed '
+                f'({note})'
             ) from error
     if result.core.stopped == INTERRUPTED:
         raise KeyboardInterrupt

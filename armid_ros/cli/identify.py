@@ -88,7 +88,7 @@ def identify(
     as_json: bool,
     **settings: Any,
 ) -> None:
-    """Fit a model with uncertainties to recordings."""
+    """Identify an arm model with uncertainties from recordings."""
     from armid_ros.api.identification import IdentificationResult
     from armid_ros.api.identification import identify as run
     from armid_ros.arm import ArmModel

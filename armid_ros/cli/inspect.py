@@ -107,9 +107,19 @@ def check(
     from armid_ros.api.inspection import check as run
     from armid_ros.api.inspection import CheckResult
     from armid_ros.cli import options
+    from armid_ros.robots import shipped_robots
 
-    context = click.get_current_context()
-    robot_source, bags = _described(context, arguments, robot_source)
+    context, first = click.get_current_context(), ''.join(arguments[:1])
+    suffix = Path(first.partition(' ')[0]).suffix
+    described = suffix in ('.urdf', '.xacro', '.xml') or first in ('-', *shipped_robots())
+    if first and (described or robot_source is None):
+        if robot_source is not None:
+            click.echo(f'{first} is used instead of --robot {robot_source}', err=True)
+        robot_source, arguments = first, arguments[1:]
+    robot_source = parameters.with_packages(context, robot_source)
+    if robot_source is None:
+        raise click.UsageError("Missing argument 'R', the robot description.")
+    bags = tuple(map(Path, arguments))
     context.params |= {'robot_source': robot_source, 'bags': bags}
     staged = None if out is None else options.stage(out, CheckResult.schema, robot_source)
     robot = options.open_robot(robot_source, gravity, joints, bags, tell=False)
@@ -120,22 +130,3 @@ def check(
     options.deliver(found, staged, origin, as_json)
     if strict and found.wrong:
         context.exit(3)
-
-
-def _described(
-    context: click.Context, arguments: tuple[str, ...], robot: str | None
-) -> tuple[str, tuple[Path, ...]]:
-    """Return description and recordings; a description as first argument replaces --robot."""
-    from armid_ros.robots import shipped_robots
-
-    first = ''.join(arguments[:1])
-    suffix = Path(first.partition(' ')[0]).suffix
-    named = suffix in ('.urdf', '.xacro', '.xml') or first in ('-', *shipped_robots())
-    if first and (named or robot is None):
-        if robot is not None:
-            click.echo(f'{first} is used instead of --robot {robot}', err=True)
-        robot, arguments = first, arguments[1:]
-    source = parameters.with_packages(context, robot)
-    if source is None:
-        raise click.UsageError("Missing argument 'R', the robot description.")
-    return source, tuple(map(Path, arguments))

@@ -262,8 +262,8 @@ def model_of(path: Path, robot: Robot | None) -> ArmModel:
     if not np.allclose(given, own):
         typed, known = (','.join(f'{part:g}' for part in vector) for vector in (given, own))
         raise ModelError(
-            f'{path}: its gravity is {known}, but --gravity is {typed}: leave --gravity out, or '
-            'write this gravity into the file if the arm is now mounted so'
+            f'{path}: its gravity is {known}, but --gravity is {typed}: leave out --gravity, or '
+            'write the other gravity into the file if the mounting of the arm has changed'
         )
     return arm
 

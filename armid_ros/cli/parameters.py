@@ -167,7 +167,7 @@ packages = click.option(
 
 
 def robot_described(**values: Any) -> Callable[[_Command], _Command]:
-    """Add --robot, with further arguments of the option, and --package for its description."""
+    """Return a decorator that adds the options --robot and --package to a command."""
     source = click.option(
         '--robot',
         'robot_source',

@@ -46,7 +46,7 @@ def ranges_text(arm: ArmModel, known: ParameterFile, spread: float, source: str)
     before = np.sqrt(slopes**2 @ prior**2)
     rows = []
     for k, name in enumerate(names):
-        determined = bool(estimate.std[k] < 0.5 * before[k])  # of the prior
+        determined = bool(estimate.std[k] < 0.5 * before[k])  # by recordings more than by prior
         described = slopes[k, : len(rigid)].any()
         own = float(estimate.std[k]) if determined or described else None
         low, high = estimate.interval()[k].tolist()
