@@ -3,7 +3,7 @@
 """
 Drawings of an arm with gravity downwards: outlines of its collision bodies, far bodies first.
 
-An arm without bodies is drawn as bars from each joint to the next joints. The last bar ends
+A link without a body is drawn as bars from its joint to the next joints. The last bar ends
 beyond its centre of mass.
 
 """
@@ -203,7 +203,7 @@ class _Solid:
 
 
 def _solids(collision: CollisionModel) -> list[_Solid]:
-    """Return the bodies of an arm and its surroundings; bars for an arm without bodies."""
+    """Return the bodies of an arm and its surroundings, and bars for links without a body."""
     solids = []
     for body in collision.geometry.geometryObjects:
         shape = body.geometry
@@ -217,9 +217,8 @@ def _solids(collision: CollisionModel) -> list[_Solid]:
         if len(points) and (radius > _MIN_SIZE or np.ptp(points, axis=0).max() > _MIN_SIZE):
             placed = points @ body.placement.rotation.T + body.placement.translation
             solids.append(_Solid(int(body.parentJoint), body.parentFrame > 0, placed, radius))
-    if any(solid.joint > 0 for solid in solids):
-        return solids
-    bars = sticks(collision.robot.model)
+    drawn = {solid.joint for solid in solids}
+    bars = [(k, end) for k, end in sticks(collision.robot.model) if k not in drawn]
     # radius of a bar [m]
     return solids + [_Solid(k, True, np.stack([np.zeros(3), end]), 0.02) for k, end in bars]
 
