@@ -58,7 +58,7 @@ def write_pages(store: Store, found: Watch) -> None:
 
 def _overview(found: Watch, diagnoses: Diagnoses) -> str:
     """Return index.html with the health and the diagnosis of every arm."""
-    heads = ('Arm', 'Health', 'What', 'Bags', 'Refused', 'Error')
+    heads = ('Arm', 'Health', 'Change', 'Bags', 'Refused', 'Error')
     rows = [_arm_row(arm, diagnoses.get(arm.arm)) for arm in found.arms]
     hint = (
         'Small curves: the changed parameter over time, on six standard deviations or more; a '

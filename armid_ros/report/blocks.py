@@ -99,7 +99,7 @@ class IntervalTrack:
     def place(self, number: float) -> float:
         """Return the position of a number on the axis [% of the width]."""
         span = max(abs(self.value) + self.reach, abs(self.reference or 0.0)) or 1.0
-        return round(50.0 + 48.0 * max(-1.0, min(1.0, number / span)), 2)
+        return round(50.0 + 45.0 * max(-1.0, min(1.0, number / span)), 2)
 
 
 #: Cells of a row.

@@ -202,7 +202,7 @@ class Story(Section):
 
     """
 
-    title: ClassVar[str] = 'In short'
+    title: ClassVar[str] = 'Arm and model'
     template: ClassVar[str] = 'story.html'
 
     diagnosis: Diagnosis
@@ -235,7 +235,7 @@ class Story(Section):
         if self.learned:
             added.append(f'the learned residual of {", ".join(self.learned)}')
         more = ', with rigid body and friction refitted' * (diagnosis.refitted and patched)
-        patch = f'model.yaml is the model with {" and ".join(added)}{more}.'
+        patch = f'model.yaml is the given model with {" and ".join(added)}{more}.'
         unexplained = [f'{w.joint}: {w.signature}' for w in diagnosis.left[:2]]
         answers = [
             (
@@ -245,7 +245,7 @@ class Story(Section):
                     for one in diagnosis.spans
                 ],
             ),
-            ('Patch', [patch if added else 'The model is unchanged.']),
+            ('Model', [patch if added else 'The model is unchanged.']),
             *(
                 (words[:1].upper() + words[1:], [f'{meaning[name]}.'])
                 for name, words in zip(names, added, strict=False)

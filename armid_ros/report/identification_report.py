@@ -221,8 +221,8 @@ def _physical_section(
             (
                 link.link,
                 f'{link.mass:.4g}',
-                TableCell(', '.join(f'{value:.3g}' for value in link.eigenvalues), 'wraps'),
-                ', '.join(f'{value:.3g}' for value in link.moments),
+                TableCell(', '.join(f'{value:.3g}' for value in link.moments), 'wraps'),
+                f'{link.eigenvalues[0]:.3g}',
                 digits(float(share)),
                 TableCell('active', 'telling') if active else 'inactive',
             )
@@ -230,9 +230,9 @@ def _physical_section(
     heads = (
         'Link',
         'Mass [kg]',
-        'Eigenvalues of the pseudo-inertia',
         'Principal moments [kg m²]',
-        'Smallest eigenvalue over its prior',
+        'Smallest eigenvalue',
+        'Over its prior',
         'Constraint',
     )
     activity = [(sentence(line), '') for line in certificate.activity]
@@ -253,7 +253,7 @@ def _physical_section(
                 f'cross-validation. Cross-validation chose {certificate.weight:g} as the weight '
                 'of the description.'
             ),
-            DataTable(heads, rows, (0, 5)),
+            DataTable(heads, rows, (0, 5), 'tight'),
             BulletList(activity or [('No constraint is active.', 'fine')]),
             *homeless,
         ],

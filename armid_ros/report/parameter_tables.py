@@ -23,7 +23,7 @@ from armid_ros.report.blocks import (
     Paragraph,
     TableCell,
 )
-from armid_ros.report.notation import counted, digits, pretty
+from armid_ros.report.notation import counted, digits, pretty, robot_label
 from armid_ros.report.page import Templated
 import numpy as np
 
@@ -78,10 +78,10 @@ def grouping(name: ParameterName, links: Sequence[str] = ()) -> str:
 
 
 def arm_facts(arm: ArmModel, robot: str) -> list[tuple[str, str]]:
-    """Return the facts of an arm: description file, driven joints, gravity and effects."""
+    """Return name and value of facts on an arm: description, joints, gravity and effects."""
     gravity = ', '.join(f'{g:.4g}' for g in arm.robot.gravity)
     return [
-        ('Robot', robot),
+        ('Robot', robot_label(robot) if robot == '-' else robot),
         ('Joints', ', '.join(arm.robot.joints)),
         ('Gravity', f'({gravity}) m/s²'),
         ('Effects', ', '.join(name_in_words(effect.name) for effect in arm.effects) or 'none'),
@@ -137,9 +137,13 @@ def parameter_folds(
                     TableCell(pretty(name.unit), 'unit'),
                 )
             rows.append((*lead, *cells(k)))
-        columns = ('Parameter', 'Unit') if rigid else ('Joint',)
+        columns = ('Parameter', 'Unit', *heads) if rigid else ('Joint', *heads)
+        words = (0, 1) if rigid else (0,)
+        filled = [c for c in range(len(columns)) if any(row[c] != '' for row in rows)]
         kind = 'parameters' if len(heads) < 5 else 'parameters described'
-        table = DataTable((*columns, *heads), rows, tuple(range(len(columns))), kind)
+        table = DataTable(
+            [columns[c] for c in filled], [[row[c] for c in filled] for row in rows], words, kind
+        )
         count, shown = str(len(members)), True
         if changed is not None:
             some = sum(changed[k] for k in members)

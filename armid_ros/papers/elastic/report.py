@@ -192,7 +192,9 @@ def responses_section(result: TwoInertiaIdentification) -> ContentSection:
         'Without the torque of the other joint (decoupled), a joint is a motor and a link on a '
         'spring. Drag across a plot, or pinch it, to zoom; double-click or double-tap to reset.'
     )
-    hint = 'Dashed lines are the frequencies of the joint alone. Errors are from 5 to 60 Hz.'
+    hint = (
+        'Dashed lines: antiresonance and resonance of the joint alone. Errors are from 5 to 60 Hz.'
+    )
     panels = [(joint, '', _joint(result, k)) for k, joint in enumerate(result.joints)]
     return ContentSection(
         'Frequency responses', [Paragraph(text), Panels(panels), Paragraph(hint, 'hint')]
@@ -237,8 +239,8 @@ def _joint(result: TwoInertiaIdentification, k: int) -> list[Templated]:
     ]
     low, high = (float(both[k]) for both in frequencies(result.parameters))
     marks = [
-        (low, f'antiresonance {low:.1f} Hz', True),
-        (high, f'resonance {high:.1f} Hz', False),
+        (low, f'{low:.1f} Hz', True),
+        (high, f'{high:.1f} Hz', False),
     ]
     shared: dict[str, Any] = {'link': 'frequency', 'logarithmic': True}
     facts = [

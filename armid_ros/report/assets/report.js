@@ -381,7 +381,8 @@
       while (walk.nextNode()) {
         const text = walk.currentNode;
         text.data = text.data.replace(/(\d) (?=%|°|(?:N|[kmc]?m|k?g|m?s|m?rad|k?Hz|dB)\b)/g, '$1\u00a0')
-          .replace(/\b(k?N|kg) m/g, '$1\u00a0m').replace(/ ± /g, '\u00a0± ');
+          .replace(/\b(k?N|kg) m/g, '$1\u00a0m')
+          .replace(/ ± /g, block.tagName === 'TD' ? ' ±\u00a0' : '\u00a0±\u00a0');
       }
     }
   }

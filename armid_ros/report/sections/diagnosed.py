@@ -155,7 +155,7 @@ def evidence_section(diagnosis: Diagnosis) -> ContentSection:
         line = f'{place.joint}: {100 * place.share_of_gap:.0f} % of {whole}, '
         line += ' and '.join(named) or place.signature
         folds.append(Fold(line, [*blocks, Panels(panels)], opened=number == 0))
-    return ContentSection('Where it shows', folds)
+    return ContentSection('Residual by variable', folds)
 
 
 def minor_section(diagnosis: Diagnosis, patched: bool) -> ContentSection:
@@ -322,7 +322,7 @@ def gap_section(diagnosis: Diagnosis, gap: Gap) -> ContentSection:
     where = 'recordings not used for the fit' if gap.predicted else gap.data
     kept = ' The model in model.yaml does not have the named cause.' * harmful
     return ContentSection(
-        'Gap',
+        'Error of each joint',
         [
             Paragraph(
                 f'Root mean square error of each joint on {where}, the worst joint first. '
