@@ -196,8 +196,8 @@ def _unset(
     Yield friction and offsets whose values are not given; they are fitted with every cause.
 
     The prior of a value is the one of every other effect: a mixture of normal distributions with
-    standard deviations `SIZES`, times the value whose torque is that of the joint. Most joints have
-    friction and an offset, so the default frequency of these effects is 'often'.
+    standard deviations `SIZES`, times the value whose torque is that of the joint. Most joints
+    have friction and an offset, so the default frequency of these effects is 'often'.
 
     """
     nuisance = result.nuisance
