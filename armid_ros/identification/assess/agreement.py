@@ -19,7 +19,7 @@ _Z_SCORE = 2.0
 @dataclass(frozen=True)
 class Agreement:
     """
-    Comparison of an estimate with the true values.
+    Comparison of estimated parameters with their known true values.
 
     Errors of correlated parameters occur together, so the number of large errors is no test. The
     squared distance of all parameters, in the metric of their covariance, has a known
@@ -45,7 +45,7 @@ class Agreement:
     @staticmethod
     def of(estimate: Estimate, truth: FloatArray, freedom: float = 40.0) -> Agreement:
         """
-        Compare an estimate of P parameters with the truth, shape (P,).
+        Compare an estimate of P parameters with their true values, shape (P,).
 
         The covariance has `freedom` degrees of freedom; infinity if it is known exactly. It comes
         from the spectrum of the residual in the band of the motion, of which a run of 20 s has few
@@ -64,17 +64,17 @@ class Agreement:
 
     @property
     def expected(self) -> float:
-        """Return the expected number of parameters within two standard deviations."""
+        """Return the expected number of parameters within two standard deviations of the truth."""
         return float(self.parameters * (2.0 * scipy.stats.norm.cdf(_Z_SCORE) - 1.0))
 
     @property
     def holds(self) -> bool:
-        """Whether the errors agree with the covariance."""
+        """Whether the squared distance of the errors is inside its 95 % range."""
         return self.lower <= self.distance <= self.upper
 
     def sentence(self) -> str:
-        """Return the number of parameters that agree with the truth, and chi-squared."""
-        chance = '' if self.holds else '; repeat it with another --seed'
+        """Return a sentence with the number of correct parameters and chi-squared."""
+        chance = '' if self.holds else '; repeat the simulation with another --seed'
         return (
             f'{self.within} of {self.parameters} parameters within 2 sigma of the truth '
             f'({self.expected:.0f} expected); chi-squared {self.distance:.0f}, 95 % range '
@@ -82,7 +82,7 @@ class Agreement:
         )
 
     def document(self) -> dict[str, Any]:
-        """Return the numbers of the comparison as a document."""
+        """Return the numbers of the comparison as a dictionary for JSON."""
         return {
             'within_two_deviations': self.within,
             'expected_within_two_deviations': self.expected,

@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Comparison of two identifications: changes beyond their uncertainty.
+Comparison of two identifications: significant changes of parameters, payload and residuals.
 
 With dozens of parameters, one in twenty is outside its 95 % interval by chance. Differences are
 therefore corrected for their number (Holm 1979): with 95 % probability, the list of changes
@@ -57,15 +57,15 @@ _NUMBERED = re.compile(r'(?:m[xyz]?|I[xyz]{2})(\d+)$')
 
 def compare(before: ParameterFile, after: ParameterFile) -> Comparison:
     """
-    Compare two identifications of one robot.
+    Find the significant changes of parameters between two identifications of one robot.
 
     Raises
     ------
     ModelError
-        If they are of two robots, are the same, or have no parameter in common.
+        If they are of two robots, are equal, or have no parameter in common.
 
     """
-    _require_two_of_one_robot(before, after)
+    _check_comparable(before, after)
     first, second = max(
         ((before.regrouped_as(after), after), (before, after.regrouped_as(before))),
         key=lambda pair: len(pair[0].values.keys() & pair[1].values.keys()),
@@ -109,34 +109,34 @@ def compare(before: ParameterFile, after: ParameterFile) -> Comparison:
     )
 
 
-def _require_two_of_one_robot(before: ParameterFile, after: ParameterFile) -> None:
-    """Raise an error if a covariance lacks, the joints differ, or both results are the same."""
-    for one in (before, after):
-        if one.covariance is None:
+def _check_comparable(before: ParameterFile, after: ParameterFile) -> None:
+    """Raise an error unless both results have a covariance, share the robot and differ."""
+    for file in (before, after):
+        if file.covariance is None:
             raise ModelError(
-                f'{one.source} has no covariance of its parameters, so changes cannot be tested; '
+                f'{file.source} has no covariance of its parameters, so changes cannot be tested; '
                 'name the folder that armid identify wrote'
             )
     if before.kinematics and after.kinematics and before.kinematics != after.kinematics:
         apart = set(before.joints).symmetric_difference(after.joints)
-        how = (
+        difference = (
             f'only one of them has {", ".join(sorted(apart))}'
             if apart
             else 'their joints have the same names, but other positions'
         )
         raise ModelError(
             f'{before.source} and {after.source} are of different robots, {before.robot} and '
-            f'{after.robot}: {how}; name two results of one robot'
+            f'{after.robot}: {difference}; name two results of one robot'
         )
     if before.values == after.values and before.values:
-        copy = '' if before.source == after.source else f' (is {before.source})'
         raise ModelError(
-            f'given twice: {after.source}{copy}; name results of two different recordings'
+            f'{before.source} and {after.source} have equal parameters; name results of two '
+            'different recordings'
         )
 
 
 def _only_in(one: ParameterFile, other: ParameterFile) -> Iterator[NotCompared]:
-    """Yield the parameters that only one of two results has."""
+    """Yield the parameters of one result that another result lacks, each with the reason."""
     for name in one.values:
         if name in other.values:
             continue
@@ -150,10 +150,10 @@ def _single_changes(
     before: ParameterFile, after: ParameterFile, names: Sequence[ParameterName]
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """
-    Return values and standard deviations of two results, (2, p), and p-values of changes, (p,).
+    Return parameters and standard deviations of two results, (2, p), and p-values of changes.
 
-    Standard deviations are those of noise. If the scatter between recordings exceeds the noise of
-    a joint, they are multiplied by the ratio.
+    The p-values have shape (p,). Standard deviations are those of noise. If the scatter between
+    recordings exceeds the noise of a joint, they are multiplied by the ratio.
 
     """
     known = np.array([[one.values[name] for name in names] for one in (before, after)])
@@ -187,7 +187,7 @@ def _single_changes(
 def _common_change(
     before: ParameterFile, after: ParameterFile, names: Sequence[ParameterName]
 ) -> tuple[FloatArray, FloatArray, float]:
-    """Return the differences of some parameters, their covariance and overall p-value."""
+    """Return the changes of parameters, their covariance, and the p-value of all together."""
     files = before, after
     difference = np.array([after.values[name][0] - before.values[name][0] for name in names])
     covariance = sum((one.covariance_of(names) for one in files), np.zeros(()))
@@ -217,7 +217,7 @@ def _common_change(
 def _find_load(
     terms: Sequence[Mapping[str, float]], difference: FloatArray, covariance: FloatArray
 ) -> LoadChange | None:
-    """Return the load that explains the changes, on the outermost possible link, or None."""
+    """Return the payload that explains all changes, on the outermost possible link, or None."""
     std = np.sqrt(np.diag(covariance))
     if not len(std) or not np.all(std > 0.0):
         return None
@@ -246,8 +246,8 @@ def _find_load(
         mass, mass_std = float(values[0]), float(np.linalg.norm(right[:, 0] / sizes) / scale[0])
         if abs(mass) < HALF_WIDTH * mass_std:  # a mass not different from zero is no load
             continue
-        whole = np.all(np.linalg.norm(right[:, 1:4], axis=0) > 1.0 - 1e-6)
-        center = values[1:4] / mass if whole else None
+        moments_known = np.all(np.linalg.norm(right[:, 1:4], axis=0) > 1.0 - 1e-6)
+        center = values[1:4] / mass if moments_known else None
         loads.append(LoadChange(link, mass, mass_std, center, p_value))
     if not loads:
         return None
@@ -259,10 +259,10 @@ def residual_changes(
     before: KnownFit | None, after: KnownFit | None
 ) -> tuple[ResidualChange, ...]:
     """
-    Compare the residuals of two models for each joint.
+    Return the change of the residual of each joint between two identified models.
 
-    Empty if unknown. Model errors vary slowly, so even many rows contain few independent values of
-    them.
+    Empty if a file has no residuals. Model errors vary slowly, so even many samples contain few
+    independent values of them.
 
     """
     if before is None or after is None:

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Result of a comparison of two identifications: changes, and parameters of one result only."""
+"""Result of a comparison of two identifications: changes of parameters and residuals."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ SCHEMA = 'armid/comparison/1'
 @dataclass(frozen=True)
 class ParameterChange:
     """
-    A parameter of both results: values, standard deviations, and significance of the change.
+    Values of one parameter in two identifications, and the significance of their difference.
 
     Attributes
     ----------
@@ -40,7 +40,7 @@ class ParameterChange:
 
     @property
     def difference(self) -> float:
-        """Return the difference, second minus first."""
+        """Return the second value minus the first value."""
         return self.after - self.before
 
     @property
@@ -50,7 +50,7 @@ class ParameterChange:
 
     @property
     def deviations(self) -> float:
-        """Return the z-score of the difference; 0 or ±inf for exact values."""
+        """Return the z-score of the difference; 0 or ±inf for values without uncertainty."""
         if self.std > 0.0:
             return self.difference / self.std
         return float(np.copysign(np.inf if self.changed else 0.0, self.difference))
@@ -59,7 +59,7 @@ class ParameterChange:
 @dataclass(frozen=True)
 class GroupChange:
     """
-    Group of parameters that may change together, with the p-value of their common change.
+    Group of parameters of one joint, or of the rigid body, that is tested for a common change.
 
     Attributes
     ----------
@@ -80,7 +80,7 @@ class GroupChange:
 @dataclass(frozen=True)
 class LoadChange:
     """
-    Load on one link that explains the changes of the rigid body.
+    Payload on one link that explains the changes of the rigid-body parameters.
 
     Attributes
     ----------
@@ -108,7 +108,7 @@ class LoadChange:
 @dataclass(frozen=True)
 class ResidualChange:
     """
-    Change of the residual of one joint between two models.
+    Change of the residual of one joint between two identified models.
 
     Attributes
     ----------
@@ -140,7 +140,7 @@ class ResidualChange:
 @dataclass(frozen=True)
 class NotCompared:
     """
-    A parameter that is not compared, and the reason.
+    A parameter of one result that the other result lacks, with the reason.
 
     Attributes
     ----------
@@ -158,7 +158,7 @@ class NotCompared:
 @dataclass(frozen=True)
 class Comparison:
     """
-    Comparison of two identifications.
+    Differences between two identifications of one robot.
 
     Attributes
     ----------
@@ -193,17 +193,17 @@ class Comparison:
 
     @property
     def unusable(self) -> tuple[ParameterFile, ...]:
-        """Return the results that are graded unusable."""
+        """Return the identifications whose grade is unusable."""
         both = self.before, self.after
         return tuple(one for one in both if one.fit is not None and one.fit.unusable)
 
     @property
     def factors(self) -> dict[str, float]:
         """
-        Return the factor, after over before, of each joint, if one factor fits nearly all values.
+        Return the ratio of new to old values of each joint, if nearly all values share a ratio.
 
         No load and no wear multiplies masses and friction of all joints by several times: the
-        torques of one result are in another unit, or currents. Empty if no factor is found.
+        torques of one result are in another unit, or currents. Empty without a shared ratio.
 
         """
         # smallest z-score of a value whose ratio is used, smallest number of ratios, and share of
@@ -229,7 +229,7 @@ class Comparison:
 
     @property
     def not_compared(self) -> tuple[NotCompared, ...]:
-        """Return every parameter of either result that was not compared."""
+        """Return the parameters that only one of the two results has."""
         return (*self.only_before, *self.only_after)
 
     @property
@@ -239,18 +239,18 @@ class Comparison:
 
     @property
     def changed_together(self) -> tuple[GroupChange, ...]:
-        """Return the groups that changed although none of their single parameters changed."""
+        """Return the groups that changed significantly although no single parameter did."""
         sure = {change.parameter for change in self.changed}
         return tuple(g for g in self.groups if g.changed and not sure.intersection(g.parameters))
 
     @property
     def changed(self) -> tuple[ParameterChange, ...]:
-        """Return the changed parameters, most significant first."""
+        """Return the significantly changed parameters, the most significant first."""
         found = [change for change in self.changes if change.changed]
         return tuple(sorted(found, key=lambda change: -abs(change.deviations)))
 
     def document(self) -> dict[str, Any]:
-        """Return the comparison as a document (schema armid/comparison/1)."""
+        """Return the comparison as a dictionary for JSON (schema armid/comparison/1)."""
         parameters = []
         for change in self.changes:
             row = asdict(change)

@@ -3,8 +3,8 @@
 """
 Checks for faults of the data, before physical causes of a residual are searched.
 
-The checks cover time base, units, signs, order of joints, delay and clipped readings: a fault of
-the data takes precedence over any effect. Names, signs and units: see `mistakes`.
+The checks cover the time base, units, signs, the order of joints, delays and clipped readings. A
+fault of the data takes precedence over any effect. `mistakes` finds wrong names, signs and units.
 
 """
 
@@ -47,10 +47,10 @@ def check_data(
     before: Sequence[Recording] = (),
 ) -> tuple[list[str], list[str]]:
     """
-    Check recordings for faults of the data before a diagnosis.
+    Return the faults of recordings that make a diagnosis meaningless, and less serious notes.
 
-    Returns faults that make a diagnosis meaningless, with remedies, and notes. `data` are the
-    recordings in rows; the torques of the baseline `before` have the unit of the model.
+    Both contain remedies. `data` are the regression rows of the recordings. The torques of the
+    baseline `before` have the unit of the model.
 
     """
     sensors = list(sensor_faults(arm, recordings, data, used))
@@ -58,9 +58,16 @@ def check_data(
     alone = not any(one.partner is not None for one in recordings)
     if alone and not mistaken:
         now, then = (slow_motions(some, used) for some in (recordings, before))
-        mistaken = _mistaken(arm, recordings, used, now, then) or list(
-            units_beyond_drives(arm.robot, recordings, now)
-        )
+        # with a baseline, the comparison with it gives the factor of all torques
+        compared = bool(then) and bool(np.any(_torque_ratios(arm, now, then) > 0.0))
+        # with a baseline, a mistake that needs a fitted body is a change of the arm instead
+        for one, sources in shared_mistakes(arm.body, recordings, used, refit=not then):
+            known = compared and one.hypotheses[0].of_masses
+            if len(sources) == len(recordings) and one.of_data and not known:
+                mistaken = [one.text]
+                break
+        mistaken = mistaken or unit_faults(arm, now, then)
+        mistaken = mistaken or list(units_beyond_drives(arm.robot, recordings, now))
     if mistaken:
         return mistaken, []
     faults = [
@@ -80,34 +87,16 @@ def check_data(
     return faults, notes
 
 
-def _mistaken(
-    arm: ArmModel,
-    recordings: Sequence[Recording],
-    used: Conditioning,
-    motions: Sequence[Motion],
-    before: Sequence[Motion],
-) -> list[str]:
-    """Return the mistake that all recordings share, or otherwise joints in a wrong unit."""
-    # with a baseline, the comparison with it gives the factor of all torques
-    since = bool(before) and bool(np.any(_factors_since(arm, motions, before) > 0.0))
-    # with a baseline, a mistake that needs a fitted body is a change of the arm instead
-    for one, sources in shared_mistakes(arm.body, recordings, used, refit=not before):
-        known = since and one.hypotheses[0].of_masses
-        if len(sources) == len(recordings) and one.of_data and not known:
-            return [one.text]
-    return unit_faults(arm, motions, before)
-
-
 def mistaken_recordings(
     arm: ArmModel,
     recordings: Sequence[tuple[Recording, npt.NDArray[np.bool_]]],
     used: Conditioning,
 ) -> list[str]:
     """
-    Return the mistakes in names, signs or units of each recording, with remedies.
+    Return the mistakes of single recordings in joint names, signs or units, with remedies.
 
-    Each recording comes with the joints, (n,), that may be wrong there because other recordings
-    differ. A mistake that is in every recording is found by `check_data`.
+    Each recording is paired with a mask of joints, (n,), in which it differs from the other
+    recordings. `check_data` finds a mistake that all recordings share.
 
     """
     found = []
@@ -122,7 +111,7 @@ def unit_faults(
     arm: ArmModel, motions: Sequence[Motion], before: Sequence[Motion] = ()
 ) -> list[str]:
     """
-    Return notes on the unit of torques, by a model with friction or by a baseline.
+    Return notes on joints whose torques seem to be in another unit than N m.
 
     If the torque of a joint is mostly friction, as in a wrist, the fitted friction hides a wrong
     unit; see `mistakes`. A model with known friction, or a baseline, reveals the unit. Errors of
@@ -130,7 +119,7 @@ def unit_faults(
     joints may be due to wrong masses of the model and are no fault.
 
     """
-    factors, robot = _factors_since(arm, motions, before), arm.robot
+    factors, robot = _torque_ratios(arm, motions, before), arm.robot
     found = [
         in_unit(robot, joint, unit).text
         for joint, factor in enumerate(factors)
@@ -158,10 +147,10 @@ def unit_faults(
     return [f'torques are those of the baseline times {named}: one of the two is in {remedy}']
 
 
-def _factors_since(
+def _torque_ratios(
     arm: ArmModel, motions: Sequence[Motion], before: Sequence[Motion]
 ) -> FloatArray:
-    """Return measured over modelled torques relative to a baseline, (n,); zero if undetermined."""
+    """Return measured over modelled torque of each joint, relative to a baseline; 0: unknown."""
     best, factors = np.full((2, arm.robot.n_joints), 0.0)
     if not motions:
         return factors
@@ -172,11 +161,11 @@ def _factors_since(
             then, follows = torque_factors(model, before)
             # the error of an undetermined model exceeds the baseline's torque; rows at rest are
             # included, as friction holds a joint with no more torque
-            whole = joined(before)
-            assert whole.tau is not None
-            speed, expected = np.abs(whole.dq), np.concatenate([model.torque(x) for x in before])
-            size = np.mean(whole.tau**2, axis=0, where=speed >= SLOW_SHARE * speed.max(axis=0))
-            off = np.mean(np.square(whole.tau - then * expected), axis=0)
+            old = joined(before)
+            assert old.tau is not None
+            speed, expected = np.abs(old.dq), np.concatenate([model.torque(x) for x in before])
+            size = np.mean(old.tau**2, axis=0, where=speed >= SLOW_SHARE * speed.max(axis=0))
+            off = np.mean(np.square(old.tau - then * expected), axis=0)
             known = (then > 0.0) & (off < size)
             slope = np.where(known, slope / np.where(known, then, 1.0), 0.0)
             correlation = np.minimum(correlation, follows)
@@ -187,7 +176,7 @@ def _factors_since(
 
 
 def _described_friction(arm: ArmModel) -> list[str]:
-    """Return a list with a note if the model lacks friction of the description."""
+    """Return a note if the model lacks friction that the URDF states; otherwise an empty list."""
     robot = arm.robot
     there = {(effect.name, joint) for effect in arm.effects for joint in effect.joints}
     kinds = [kind for kind in CATALOGUE.values() if kind.traits.urdf_attribute]
@@ -210,7 +199,7 @@ def _described_friction(arm: ArmModel) -> list[str]:
 
 
 def _extremes(robot: Robot, recording: Recording) -> Iterator[str]:
-    """Yield notes on torques that saturate, or exceed the limits of the drives."""
+    """Yield notes on joints whose torque saturates, or exceeds the limit of the drive."""
     if recording.tau is None:
         return
     source = recording.source or 'recording'

@@ -3,8 +3,8 @@
 """
 Grade of an identification, with reasons.
 
-The grade follows from the torque error on held-out data of the joint that is predicted worst, and
-from faults of the recordings. The error of a joint is a share of its own torque, as forces of a
+The grade follows from faults of the recordings, and from the torque error of the joint that is
+predicted worst on held-out data. The error of a joint is a share of its own torque, as forces of a
 slide [N] and torques of a wrist [N m] have no common unit. No model can predict white torque
 noise, or the dry friction of a joint at rest.
 
@@ -62,7 +62,7 @@ class Grade:
     worst_joint: str
 
     def document(self) -> dict[str, object]:
-        """Return the grade as a document."""
+        """Return the grade as a dictionary for JSON."""
         return {
             'grade': self.word,
             'error_percent': self.error_percent,
@@ -79,7 +79,7 @@ def grade(
     held_out: Sequence[Recording] = (),
 ) -> Grade:
     """
-    Grade an identification by its recordings, and by predictions of held-out ones.
+    Grade an identification by faults of its recordings and by its torque errors.
 
     Parameters
     ----------
@@ -88,9 +88,9 @@ def grade(
     description : ArmModel
         Model before the identification.
     recordings, held_out : sequence of Recording
-        Recordings of the fit, and those of `validation`.
+        Recordings of the fit, and the held-out recordings of `validation`.
     validation : mapping of str to sequence of Fit
-        Predictions of held-out recordings, by recording.
+        Torque predictions of the stretches of each held-out recording.
 
     """
     every, _ = without_damage([*recordings, *held_out], result.used)
@@ -112,10 +112,13 @@ def grade(
         *(fault for fault in sensors if fault.word != 'good'),
         *(mistakes or (Fault(text, 'poor') for text in units)),
     ]
-    worst: dict[str | None, _Worst] = {
-        bag: _worst(Score.of(fits).joint_relative_error_percent, fits, result)
+    worst: dict[str | None, _WorstJoint] = {
+        bag: _worst_joint(Score.of(fits).joint_relative_error_percent, fits, result)
         for bag, fits in validation.items()
-    } or {None: _worst(result.halves.joint_relative_error_percent, result.training, result)}
+    }
+    if not worst:
+        halves = result.halves.joint_relative_error_percent
+        worst = {None: _worst_joint(halves, result.training, result)}
     reasons = [
         *faults,
         *_errors(result, worst, [fit for fits in validation.values() for fit in fits]),
@@ -137,9 +140,9 @@ def grade(
 
 
 def _errors(
-    result: Identification, worst: Mapping[str | None, _Worst], held_out: Sequence[Fit]
+    result: Identification, worst: Mapping[str | None, _WorstJoint], held_out: Sequence[Fit]
 ) -> Iterator[Fault]:
-    """Yield the error of the worst joint, and the joints whose torque is hardly predicted."""
+    """Yield the torque error of the worst joint, and joints whose torque is hardly predicted."""
     use = {
         'good': '',
         'poor': ', too large to compute torques',
@@ -152,12 +155,25 @@ def _errors(
         # a body of the right robot follows the recordings that it is fitted to
         wrong = word == by_error(float(fitted[one.joint])) == 'unusable'
         ask = ', also in the fit: names, signs or units are wrong, or an effect is missing' * wrong
-        if bag is None:
-            yield _halves(result, word, f'{one.text}{ask}')
-        else:
-            yield Fault(
-                f'torque error on {bag}, not used for the fit: {one.text}{ask or use[word]}', word
+        if bag is not None:
+            text = f'torque error on {bag}, not used for the fit: {one.text}{ask or use[word]}'
+            yield Fault(text, word)
+            continue
+        # without held-out data, each half of the data is predicted from the other half
+        text = f'torque error of one half of the data, predicted from the other: {one.text}{ask}'
+        halves = result.halves.joint_relative_error_percent
+        undetermined = halves > np.maximum(LIMITS.undetermined * training, 100.0 * LIMITS.floor)
+        undetermined &= beyond_noise(halves, result.training, result.used) > 0.0
+        if np.any(undetermined):
+            joint = int(np.argmax(np.where(undetermined, halves, 0.0)))
+            word = 'poor' if word == 'good' else word
+            time = sum(float(fit.motion.t[-1] - fit.motion.t[0]) for fit in result.training)
+            text += (
+                f', but the training error of {result.arm.robot.joints[joint]} is '
+                f'{training[joint]:.2g} %: {time:.2g} s of this motion do not determine '
+                f'{result.base.rank} parameters; record longer, or more motion'
             )
+        yield Fault(text, word)
     # held-out data, or training data if there are none
     fits = held_out or result.training
     every = Score.of(fits).joint_relative_error_percent
@@ -173,8 +189,8 @@ def _errors(
         yield Fault(text, 'good')
 
 
-class _Worst(NamedTuple):
-    """The worst joint: index, error, error without noise [%], and text with both errors."""
+class _WorstJoint(NamedTuple):
+    """Joint with the largest torque error [%]: index, error, error without noise, and text."""
 
     joint: int
     measured: float
@@ -182,8 +198,8 @@ class _Worst(NamedTuple):
     text: str
 
 
-def _worst(errors: FloatArray, fits: Sequence[Fit], result: Identification) -> _Worst:
-    """Return the joint with the largest error without noise; of equal ones, the largest error."""
+def _worst_joint(errors: FloatArray, fits: Sequence[Fit], result: Identification) -> _WorstJoint:
+    """Return the joint with the largest torque error without noise."""
     joints, beyond = result.arm.robot.joints, beyond_noise(errors, fits, result.used)
     moves = moving(fit.motion for fit in fits)
     worst = int(np.lexsort((np.where(moves, errors, -1.0), beyond))[-1])
@@ -194,30 +210,11 @@ def _worst(errors: FloatArray, fits: Sequence[Fit], result: Identification) -> _
     limit = LIMITS.unusable if word == 'unusable' else LIMITS.poor
     number = f'{measured:.0f}' if measured >= 99.5 else f'{measured:.2g}'
     text = f'{number} % ({", ".join([*details, f"limit {limit:g} %"])})'
-    return _Worst(worst, measured, error, text)
-
-
-def _halves(result: Identification, word: Word, error: str) -> Fault:
-    """Grade an identification by how well each half of the data predicts the other."""
-    training = Score.of(result.training).joint_relative_error_percent
-    every = result.halves.joint_relative_error_percent
-    text = f'torque error of one half of the data, predicted from the other: {error}'
-    undetermined = every > np.maximum(LIMITS.undetermined * training, 100.0 * LIMITS.floor)
-    undetermined &= beyond_noise(every, result.training, result.used) > 0.0
-    if np.any(undetermined):
-        joint = int(np.argmax(np.where(undetermined, every, 0.0)))
-        word = 'poor' if word == 'good' else word
-        time = sum(float(fit.motion.t[-1] - fit.motion.t[0]) for fit in result.training)
-        text += (
-            f', but the training error of {result.arm.robot.joints[joint]} is '
-            f'{training[joint]:.2g} %: {time:.2g} s of this motion do not determine '
-            f'{result.base.rank} parameters; record longer, or more motion'
-        )
-    return Fault(text, word)
+    return _WorstJoint(worst, measured, error, text)
 
 
 def _resting(result: Identification, validation: Mapping[str, Sequence[Fit]]) -> Iterator[Fault]:
-    """Yield the joints that do not move, and are therefore not identified or not validated."""
+    """Yield the joints that do not move, so that they are not identified or not validated."""
     fitted = moving(fit.motion for fit in result.training)
     held_out = [fit.motion for part in validation.values() for fit in part]
     checked = moving(held_out) if held_out else fitted
@@ -236,7 +233,7 @@ def _resting(result: Identification, validation: Mapping[str, Sequence[Fit]]) ->
 
 def beyond_noise(errors: FloatArray, fits: Sequence[Fit], used: Conditioning) -> FloatArray:
     """
-    Return the relative torque errors of joints, corrected for white torque noise.
+    Return the relative torque error of each joint without the share of white sensor noise [%].
 
     The noise is computed from the median of second differences (Gasser, Sroka and Jennen-Steinmetz
     1986): torques of motion change little from row to row, and friction jumps in few rows only.

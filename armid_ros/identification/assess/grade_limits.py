@@ -1,13 +1,13 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Limits that grade an identification, each with its reason; see docs/identification.md."""
+"""Limits of the grades of an identification, each with its reason."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from typing import Literal
 
-#: Grade of an identification, with reasons.
+#: Grade of an identification.
 Word = Literal['good', 'poor', 'unusable']
 #: Number of independent values of a residual in one recording. Ten unchanged simulated arms made
 #: other motions each day. The logarithm of the ratio of two residuals of a joint had a deviation
@@ -19,7 +19,7 @@ FREEDOM = 8
 @dataclass(frozen=True)
 class GradeLimits:
     """
-    Limits of the grades, and of the likelihood ratio of a hypothesis.
+    Limits of the grades of an identification, and of the tests for mistakes in recordings.
 
     Attributes
     ----------
@@ -68,5 +68,5 @@ LIMITS = GradeLimits()
 
 
 def by_error(error: float) -> Word:
-    """Return the grade of a relative torque error on held-out data [%]."""
+    """Return the grade for a relative torque error on held-out data [%]."""
     return 'good' if error <= LIMITS.poor else 'poor' if error <= LIMITS.unusable else 'unusable'

@@ -1,9 +1,9 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Hypotheses on mistakes in a recording, each with the change of the data that corrects it.
+Possible mistakes in a recording, each with a function that corrects the data.
 
-A hypothesis is accepted by its likelihood ratio against the data as recorded; see `mistakes`.
+`mistakes` accepts a hypothesis by its likelihood ratio against the data as recorded.
 
 """
 
@@ -31,13 +31,13 @@ QUANTITIES: tuple[Quantity, ...] = ('position and torque', 'position', 'torque')
 @dataclass(frozen=True, eq=False)
 class Hypothesis:
     """
-    Hypothesis of a mistake in a recording.
+    Possible mistake in a recording, with functions that correct the data or the description.
 
     Attributes
     ----------
     kind : str
-        Kind of mistake: body, gravity, scale (of all torques; units if it is that of a unit),
-        unit, degrees, sign, exchange, zero or delay.
+        Kind of mistake: body, gravity, scale (a factor of all torques), units (such a factor that
+        is a unit), unit, degrees, sign, exchange, zero or delay.
     text : str
         Suspected mistake and remedy, without a full stop.
     motion : callable
@@ -49,7 +49,7 @@ class Hypothesis:
     body : callable
         Function that returns the description without the mistake.
     nearby : callable
-        Function that returns neighbouring hypotheses in finer steps.
+        Function that returns hypotheses with nearby values, in finer steps.
 
     """
 
@@ -63,17 +63,17 @@ class Hypothesis:
 
     @property
     def of_masses(self) -> bool:
-        """Whether an error that all masses share would explain the data equally well."""
+        """Whether one wrong factor of all described masses would explain the data equally well."""
         return self.kind in ('gravity', 'scale', 'units')
 
     @property
     def of_data(self) -> bool:
-        """Whether only an error of the data, and no change of the arm, explains the difference."""
+        """Whether only an error of the data, and no change of the arm, explains the torques."""
         return self.kind in ('units', 'unit', 'degrees', 'sign', 'exchange')
 
 
 AS_RECORDED = Hypothesis('nothing', 'the data have no mistake')
-#: Hypothesis that the described links explain nothing, and friction and drives everything.
+#: Hypothesis that the described links explain no torque, and friction and drives all of it.
 WITHOUT_BODY = Hypothesis(
     'body',
     'the description does not explain the torques',
@@ -83,7 +83,7 @@ WITHOUT_BODY = Hypothesis(
 
 def hypotheses(robot: Robot, motions: Sequence[Motion]) -> Iterator[Hypothesis]:
     """
-    Yield the possible mistakes in recorded motions of an arm, except delays.
+    Yield all possible mistakes in recorded motions of an arm, except torque delays.
 
     Only values beyond 2 pi are tested for degrees: even small angles in degrees exceed this.
 
@@ -121,7 +121,7 @@ def hypotheses(robot: Robot, motions: Sequence[Motion]) -> Iterator[Hypothesis]:
 
 
 def _of_all_torques(robot: Robot, motions: Sequence[Motion]) -> Iterator[Hypothesis]:
-    """Yield the best-fitting gravity and torque factor, unless errors of masses explain them."""
+    """Yield the best gravity and factor of all torques, unless wrong masses explain them."""
     motion = thinned(motions, 600)
     if motion is None:
         return
@@ -133,12 +133,31 @@ def _of_all_torques(robot: Robot, motions: Sequence[Motion]) -> Iterator[Hypothe
         yield found
     nothing, column = np.zeros_like(described), described[:, :, np.newaxis]
     factor = float(common_values(motion, nothing, column)[0])
-    if abs(factor) > np.finfo(float).tiny and _beyond_masses(factor):
-        yield _other_scale(robot, factor, motions)
+    if abs(factor) <= np.finfo(float).tiny or not _beyond_masses(factor):
+        return
+    # the efforts may be in another unit than N m, or currents
+    factors, correlation = torque_factors(ArmModel(robot), motions)
+    # smallest correlation for a reliable factor of a joint: the residual is below 15 % of torque
+    known = (correlation > 0.989) & (factors > 0.0)
+    unit = unit_of(factor, factors[known].tolist())
+    text = (
+        f'the efforts of all joints seem to be in {unit} instead of N m: convert them'
+        if unit
+        else f'the efforts of all joints seem to be {factor:.2g} times the torque in N m: '
+        'currents, or wrong masses in the description'
+    )
+    if known.any() and not unit:
+        shown = zip(factors, known, strict=True)
+        gains = ','.join(f'{1.0 / one:.3g}' if clear else '?' for one, clear in shown)
+        hidden = ', '.join(robot.joints[k] for k in np.flatnonzero(~known))
+        text += f'; for currents give --current-gain {gains}, no more accurate than those masses'
+        text += f'; the factor of {hidden} is not determined' if hidden else ''
+    scaled = _times(robot, 'torque', slice(None), 1.0 / factor)
+    yield Hypothesis('units' if unit else 'scale', text, scaled)
 
 
 def in_unit(robot: Robot, joint: int, unit: str) -> Hypothesis:
-    """Return the hypothesis that the torque of a joint is not in N m."""
+    """Return the hypothesis that the torque of a joint is recorded in a given other unit."""
     wrong = FORCE_UNITS[unit] if robot.prismatic[joint] else unit
     right = robot.torque_units[joint]
     return Hypothesis(
@@ -151,7 +170,7 @@ def in_unit(robot: Robot, joint: int, unit: str) -> Hypothesis:
 
 
 def delayed(seconds: float, half_width: float) -> Hypothesis:
-    """Return the hypothesis of a torque delay, with its 95 % interval [s]."""
+    """Return the hypothesis that torques are delayed, with the 95 % interval of the delay [s]."""
     side = 'later' if seconds > 0.0 else 'earlier'
     return Hypothesis(
         'delay',
@@ -163,7 +182,7 @@ def delayed(seconds: float, half_width: float) -> Hypothesis:
 
 def shifted(motion: Motion, seconds: float) -> Motion:
     """
-    Shift the motion by the delay of the torque.
+    Return a motion with its positions shifted in time by the delay of the torque [s].
 
     The torque is not interpolated, as this would reduce its noise.
 
@@ -179,9 +198,10 @@ def shifted(motion: Motion, seconds: float) -> Motion:
 
 def other_gravity(robot: Robot, vector: FloatArray) -> Hypothesis | None:
     """
-    Return the hypothesis of another gravity vector, replaced by a nearby known vector.
+    Return the hypothesis that gravity has another direction or size than described.
 
-    Known vectors have the described magnitude along an axis, for example.
+    A fitted vector near a known vector is replaced by the known vector, such as the described
+    gravity along another axis.
 
     Parameters
     ----------
@@ -194,7 +214,7 @@ def other_gravity(robot: Robot, vector: FloatArray) -> Hypothesis | None:
     -------
     Hypothesis or None
         None if no planet has such gravity, or if wrong masses may explain the difference. Wrong
-        masses make all weight larger or smaller, but do not turn it.
+        masses change the size of the fitted gravity, but not its direction.
 
     """
     described = robot.gravity
@@ -236,29 +256,8 @@ def other_gravity(robot: Robot, vector: FloatArray) -> Hypothesis | None:
     )
 
 
-def _other_scale(robot: Robot, factor: float, motions: Sequence[Motion]) -> Hypothesis:
-    """Return the hypothesis that efforts are in another unit than N m, or are currents."""
-    factors, correlation = torque_factors(ArmModel(robot), motions)
-    # smallest correlation for a reliable factor of a joint: the residual is below 15 % of torque
-    known = (correlation > 0.989) & (factors > 0.0)
-    unit = unit_of(factor, factors[known].tolist())
-    text = (
-        f'the efforts of all joints seem to be in {unit} instead of N m: convert them'
-        if unit
-        else f'the efforts of all joints seem to be {factor:.2g} times the torque in N m: '
-        'currents, or wrong masses in the description'
-    )
-    if known.any() and not unit:
-        shown = zip(factors, known, strict=True)
-        gains = ','.join(f'{1.0 / one:.3g}' if clear else '?' for one, clear in shown)
-        hidden = ', '.join(robot.joints[k] for k in np.flatnonzero(~known))
-        text += f'; for currents give --current-gain {gains}, no more accurate than those masses'
-        text += f'; the factor of {hidden} is not determined' if hidden else ''
-    scaled = _times(robot, 'torque', slice(None), 1.0 / factor)
-    return Hypothesis('units' if unit else 'scale', text, scaled)
-
-
 def _zero_off(robot: Robot, joint: int, degrees: float) -> Hypothesis:
+    """Return the hypothesis that the zero of an encoder is wrong by an angle."""
     shift = np.zeros(robot.n_joints)
     shift[joint] = -np.deg2rad(degrees)
     wrong = 180.0 - (180.0 - degrees) % 360.0
@@ -274,7 +273,7 @@ def _zero_off(robot: Robot, joint: int, degrees: float) -> Hypothesis:
 
 
 def _in_degrees(robot: Robot, joint: int | None = None) -> Hypothesis:
-    """Return the hypothesis that positions of one joint, or of all, are in degrees."""
+    """Return the hypothesis that the positions of one joint, or of all joints, are in degrees."""
     text = 'the positions seem to be in degrees: convert them to rad'
     if joint is not None:
         text = f'the position of {robot.joints[joint]} seems to be in degrees: convert it to rad'
@@ -297,7 +296,7 @@ def _times(
 
 
 def _changed(quantity: Quantity, matrix: FloatArray, motion: Motion) -> Motion:
-    """Multiply a quantity of all joints by a matrix."""
+    """Return a motion with the positions or torques of all joints multiplied by a matrix."""
     if quantity != 'torque':
         q, dq, ddq = (x @ matrix for x in (motion.q, motion.dq, motion.ddq))
         motion = replace(motion, q=q, dq=dq, ddq=ddq)

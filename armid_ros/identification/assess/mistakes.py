@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Search for a mistake in a recording: hypotheses by their likelihood ratio.
+Search for the most likely mistake in a recording by a likelihood ratio.
 
 Each hypothesis is compared with the data as recorded. Errors of the described links are more
 common. Both fits therefore include the link parameters, with the description as prior. A mistake
@@ -55,16 +55,16 @@ _MIN_SAMPLES = 40
 @dataclass(frozen=True)
 class Mistake:
     """
-    A mistake in a recording.
+    Mistake found in a recording, with the torque errors before and after its correction.
 
     Attributes
     ----------
     hypotheses : tuple of Hypothesis
         Hypothesis with the largest likelihood ratio, and equally likely ones.
     before, after : PredictionError
-        Errors as recorded, and after correction of the mistake.
+        Torque errors of the data as recorded, and after correction of the mistake.
     fitted : bool
-        Whether the body was fitted as well.
+        Whether the link parameters were fitted as well.
 
     """
 
@@ -75,21 +75,21 @@ class Mistake:
 
     @property
     def joint(self) -> int:
-        """Return the joint with the best explained torque."""
+        """Return the index of the joint whose torque error the correction reduces most."""
         return int(np.argmax(self.before.joints.clip(max=1.0) - self.after.joints))
 
     @property
     def of_data(self) -> bool:
-        """Whether only an error of the data, and no change of the arm, explains the difference."""
+        """Whether only an error of the data, and no change of the arm, explains the torques."""
         return all(one.of_data for one in self.hypotheses)
 
     @property
     def text(self) -> str:
-        """Return the mistake and the remedy, without a full stop."""
+        """Return a text with the mistake and its remedy, without a full stop."""
         return ', or '.join(one.text for one in self.hypotheses)
 
     def sentence(self, robot: Robot) -> str:
-        """Return the mistake, the remedy and the evidence, without a full stop."""
+        """Return a text with the mistake, its remedy and torque errors, without a full stop."""
         before, after = (
             100.0 * min(float(error.joints[self.joint]), 9.99)
             for error in (self.before, self.after)
@@ -105,10 +105,11 @@ def shared_mistakes(
     robot: Robot, recordings: Sequence[Recording], used: Conditioning, *, refit: bool = True
 ) -> list[tuple[Mistake, tuple[str, ...]]]:
     """
-    Find the mistakes in recordings with torques, grouped by kind and joint.
+    Return the mistakes in recordings with torques, each with the recordings that contain it.
 
-    Returns the mistake in the recording with the largest error, and the sources of all of them.
-    Without `refit`, a mistake does not count that only a fitted body reveals.
+    Mistakes of one kind in one joint are grouped. The returned mistake is that of the recording
+    with the largest torque error. Without `refit`, mistakes that only fitted links reveal are not
+    returned.
 
     """
     by_kind: dict[tuple[object, ...], list[tuple[str, Mistake]]] = {}
@@ -127,7 +128,7 @@ def shared_mistakes(
 
 
 class _Tested(NamedTuple):
-    """Hypothesis with its prediction errors, and its likelihood ratios divided by their limits."""
+    """Tested hypothesis: prediction errors, and likelihood ratios over their limits."""
 
     hypothesis: Hypothesis
     described: PredictionError  # with the described links
@@ -140,10 +141,11 @@ def find_mistake(
     robot: Robot, recording: Recording, used: Conditioning, *, refit: bool = True
 ) -> Mistake | None:
     """
-    Find the most likely mistake in a recording with torques, filtered as for the identification.
+    Return the most likely mistake in a recording with torques; None if there is none.
 
-    None if the recorded data fit best, or if errors of the links may be the cause. Without
-    `refit`, a mistake does not count that only a fitted body reveals.
+    None if the data as recorded fit best, or if errors of the link parameters may be the cause.
+    Without `refit`, mistakes that only fitted links reveal are not returned. The data are filtered
+    as for the identification.
 
     """
     slow = slow_motions([recording], used)
@@ -161,7 +163,7 @@ def find_mistake(
         return None
 
     def rows(some: Sequence[Hypothesis]) -> list[_Tested]:
-        """Evaluate hypotheses; fit the links as well if their errors may decide."""
+        """Evaluate hypotheses; fit the links as well if their errors may change the decision."""
         found = []
         for one in some:
             after = _error(robot, slow, one, near=False)
@@ -181,7 +183,7 @@ def find_mistake(
         tried += rows(max(tried, key=attrgetter(ratio)).hypothesis.nearby())
     # hypotheses with which the model predicts the corrected data
     after = (row.described if row.as_described >= 1.0 else row.fitted for row in tried)
-    errors = [100.0 * one.whole(robot) for one in after]
+    errors = [100.0 * one.overall(robot) for one in after]
     tried = [row for row, error in zip(tried, errors, strict=True) if error < LIMITS.unusable]
     # prefer hypotheses that explain more than any body near the description
     sure = [row for row in tried if row.as_described >= 1.0]
@@ -207,7 +209,7 @@ def find_mistake(
 def _error(
     robot: Robot, slow: Sequence[Motion], one: Hypothesis, *, near: bool
 ) -> PredictionError | None:
-    """Return the prediction error of a hypothesis; None if too few samples remain."""
+    """Return the torque error after a correction of the data; None for too few samples."""
     # 200 samples: twenty for each of the ten parameters of a link
     motion = thinned([one.motion(motion) for motion in slow], 200)
     if motion is None or len(motion) < _MIN_SAMPLES:
@@ -216,7 +218,7 @@ def _error(
 
 
 def _first(rows: Sequence[_Tested], ratio: str, before: PredictionError) -> Mistake:
-    """Return the likeliest mistake, and mistakes of other kinds that are equally likely."""
+    """Return the most likely mistake, with equally likely mistakes of other kinds."""
     value = attrgetter(ratio)
     first, *others = sorted(rows, key=value, reverse=True)
     likely = {first.hypothesis.kind: first.hypothesis}
@@ -230,7 +232,7 @@ def _first(rows: Sequence[_Tested], ratio: str, before: PredictionError) -> Mist
 
 
 def slow_motions(recordings: Sequence[Recording], used: Conditioning) -> list[Motion]:
-    """Return the stretches of recordings, low-passed to the band of the motion."""
+    """Return the uninterrupted motions of recordings, low-passed to the band of the motion."""
     result = []
     for motion in (part for one in recordings for part in segments(one, used)):
         kept = np.array(decimated_samples(len(motion), used), dtype=np.intp)
@@ -257,8 +259,8 @@ def torque_delay(robot: Robot, recording: Recording, used: Conditioning) -> Dela
     reversal it grows with the distance that the joint has travelled (Dahl 1968), which takes tens
     of milliseconds at low speed. A delay is therefore estimated from weight and inertia. Its
     column is the rate of the rigid-body torque; friction with several presliding lengths is a
-    nuisance. In a reversed motion, the rigid-body torque is the same, but its rate and friction
-    have the opposite sign. Errors of described masses therefore do not look like a delay.
+    nuisance parameter. In a reversed motion, the rigid-body torque is the same, but its rate and
+    friction have the opposite sign. Errors of described masses therefore do not look like a delay.
 
     """
     longest = 0.3  # longest delay that is tested [s]
@@ -285,7 +287,7 @@ def torque_delay(robot: Robot, recording: Recording, used: Conditioning) -> Dela
 
 
 def _delay_rows(robot: Robot, motion: Motion, used: Conditioning) -> tuple[FloatArray, ...]:
-    """Return columns of each joint, of bodies, of a delay and the rest, (n, M, k), and torques."""
+    """Return regressor columns of joints, links and a delay, each (n, M, k), and the torques."""
     # presliding lengths of friction [rad or m], as in gears of arms, in steps of three to cover
     # all lengths between. On 63 recordings with lengths of 1 to 3 mrad, the delay errs by -1 to 6
     # ms (5 to 95 %). Lengths of 1 and 3 mrad alone err by 0 to 6 ms, 0.1 to 30 mrad by -3 to 6 ms.

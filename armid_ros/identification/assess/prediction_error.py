@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Error of an arm's torque prediction for a recording.
+Torque prediction error of an arm model for a recording.
 
 Friction, offset and drive inertia of every joint are fitted. The links have the described
 parameters, or the most likely ones near them.
@@ -31,7 +31,7 @@ _N_OWN = 4
 @dataclass(frozen=True)
 class PredictionError:
     """
-    Prediction error of the torque.
+    Torque prediction error of each joint of an arm.
 
     Attributes
     ----------
@@ -40,7 +40,7 @@ class PredictionError:
     torque : ndarray, shape (n,)
         Root mean square torque of each joint [N m or N].
     off : float
-        Squared distance of the body from the described body, in prior standard deviations.
+        Squared distance of the link parameters from the description, in prior standard deviations.
 
     """
 
@@ -48,8 +48,8 @@ class PredictionError:
     torque: FloatArray
     off: float = 0.0
 
-    def whole(self, robot: Robot) -> float:
-        """Return the error of all prismatic or of all revolute joints, the larger of the two."""
+    def overall(self, robot: Robot) -> float:
+        """Return the larger error: that of all prismatic joints or that of all revolute joints."""
         residual = self.joints * self.torque
         return max(
             float(np.linalg.norm(residual[own]) / np.linalg.norm(self.torque[own]))
@@ -59,7 +59,7 @@ class PredictionError:
 
     def gain(self, better: PredictionError) -> float:
         """
-        Return the likelihood ratio by which another prediction is better, per independent sample.
+        Return the likelihood ratio of another prediction to this one, per independent sample.
 
         The likelihood ratio of models with unknown noise is multiplied by the ratio of the
         priors of their links. Errors are limited to the range from the floor to the torque itself.
@@ -68,13 +68,13 @@ class PredictionError:
         return self.of_data(better) * float(np.exp((self.off - better.off) / (2.0 * FREEDOM)))
 
     def of_data(self, better: PredictionError) -> float:
-        """Return the likelihood ratio of the data alone, without the priors of the links."""
+        """Return the likelihood ratio of another prediction without the priors of the links."""
         before, after = (np.clip(x.joints, LIMITS.floor, 1.0) for x in (self, better))
         return float(np.prod(before / after))
 
 
 def thinned(stretches: Sequence[Motion], rows: int) -> Motion | None:
-    """Concatenate stretches with torques, and keep about `rows` evenly spaced samples."""
+    """Return about `rows` evenly spaced samples of motions with torques; None without torques."""
     parts = [motion for motion in stretches if motion.tau is not None and len(motion) > 2]
     if not parts:
         return None
@@ -84,7 +84,7 @@ def thinned(stretches: Sequence[Motion], rows: int) -> Motion | None:
 
 def prediction_error(robot: Robot, motion: Motion, *, near: bool) -> PredictionError:
     """
-    Fit friction, offset and drive inertia of every joint; return the prediction error.
+    Return the torque error after a fit of friction, offset and drive inertia of every joint.
 
     Friction and drive inertia are bounded below by zero, so they cannot explain a torque of the
     opposite sign.
@@ -96,7 +96,7 @@ def prediction_error(robot: Robot, motion: Motion, *, near: bool) -> PredictionE
     motion : Motion
         N samples with torque.
     near : bool
-        Whether the body is fitted too. The prior of its parameters is a uniform density over
+        Whether the links are fitted too. The prior of its parameters is a uniform density over
         their possible errors; residuals are those of a good identification, with few independent
         values in a recording.
 
@@ -130,10 +130,10 @@ def prediction_error(robot: Robot, motion: Motion, *, near: bool) -> PredictionE
 
 def _own_values(own: FloatArray, target_torque: FloatArray) -> FloatArray:
     """
-    Fit columns (N, n, 4) of each joint to its torque (N, n); all but the offset are positive.
+    Return nonnegative friction and drive inertia, and the offset, that fit each joint torque.
 
-    The joints are independent, and have eight sets of active bounds: the solution is the best
-    feasible one. Returns values of shape (n, 4).
+    The columns of each joint have shape (N, n, 4), the torques (N, n) and the values (n, 4). The
+    joints are independent. The best feasible solution of eight sets of active bounds is used.
 
     """
     normal = np.einsum('rja,rjb->jab', own, own) + LIMITS.floor**2 * np.eye(_N_OWN)
@@ -149,7 +149,7 @@ def _own_values(own: FloatArray, target_torque: FloatArray) -> FloatArray:
 
 def common_values(motion: Motion, fixed: FloatArray, columns: FloatArray) -> FloatArray:
     """
-    Fit values that all joints share, such as gravity, with friction and drives as nuisance.
+    Fit values that all joints share, such as gravity; friction and drives are also fitted.
 
     The motion has N samples with torque, of which `fixed`, (N, n) [N m or N], is known. The
     regressor of the k values has shape (N, n, k). Returns the values, (k,).
@@ -167,7 +167,7 @@ def shared_values(
     own: FloatArray, shared: FloatArray, near: FloatArray | None = None
 ) -> tuple[FloatArray, FloatArray]:
     """
-    Fit values that all joints share, with parameters of joints and links as nuisance.
+    Fit values that all joints share; parameters of joints and links are also fitted.
 
     Columns of single joints are projected out (Frisch and Waugh 1933). Joints are weighted by
     their residuals, down to the floor. The interval allows for residuals that are correlated in
@@ -219,13 +219,13 @@ def shared_values(
 
 
 def root_mean_square(columns: FloatArray) -> FloatArray:
-    """Return the root mean square of every column; one if it is zero."""
+    """Return the root mean square of each column; 1 for a column of zeros."""
     size = np.sqrt(np.mean(columns**2, axis=0))
     return np.where(size > 0.0, size, 1.0)
 
 
 def _own_columns(motion: Motion) -> tuple[FloatArray, FloatArray]:
-    """Return weighted columns of each joint, (N, n, 4), and weights, (N, n), of mean square 1."""
+    """Return weighted friction columns of each joint, (N, n, 4), and their weights, (N, n)."""
     dq, ddq = motion.dq, motion.ddq
     columns = np.stack([np.ones_like(dq), dq, np.sign(dq), ddq], axis=-1)
     # Weights are zero where a joint rests or reverses: dry friction is arbitrary there, and

@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Faults visible in the readings: dead sensors, wrong velocities or clocks, misplaced joints.
+Faults of sensors and clocks: constant channels, wrong velocities, wrong joint positions.
 
 The reading of a locked joint is constant and its velocity is zero. A constant position is a dead
 sensor only if the recorded velocity is not zero. A passive joint and a drive at its limit have a
@@ -26,7 +26,7 @@ from armid_ros.model import inverse_dynamics
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.recording import Recording
 from armid_ros.recording.series import NOTHING
-from armid_ros.robots import described_at, held_joints, HeldJoint, Robot
+from armid_ros.robots import described_at, held_joints, Robot
 import numpy as np
 from scipy.integrate import cumulative_trapezoid
 
@@ -34,14 +34,14 @@ from scipy.integrate import cumulative_trapezoid
 @dataclass(frozen=True)
 class Fault:
     """
-    A fault of recordings.
+    Fault of one recording or of all recordings, with its effect on the grade.
 
     Attributes
     ----------
     what : str
         Joint, fault and remedy, without the recording and without a full stop.
     word : {'good', 'poor', 'unusable'}
-        The best possible grade of an identification with the fault; 'good' for a mere note.
+        Best grade that an identification can have with the fault; 'good' for a note.
     source : str or None
         The recording; None if all recordings have the fault.
 
@@ -53,7 +53,7 @@ class Fault:
 
     @property
     def text(self) -> str:
-        """Return the fault with its recording."""
+        """Return a text with the fault and the name of its recording."""
         return (
             self.what if self.source is None else f'in {self.source or "a recording"} {self.what}'
         )
@@ -63,10 +63,10 @@ def sensor_faults(
     arm: ArmModel, recordings: Sequence[Recording], rows: Sequence[Stretch], used: Conditioning
 ) -> Iterator[Fault]:
     """
-    Yield faults of clocks and sensors, and undriven joints at another position.
+    Yield faults of clocks and sensors, and undriven joints that are not where the model has them.
 
-    The recordings have torques, and no damaged samples (`damage`); `rows` are the same data in
-    rows.
+    The recordings have torques and no damaged samples (see `damage`); `rows` are the regression
+    rows of the same recordings.
 
     """
     for one in recordings:
@@ -92,7 +92,7 @@ def sensor_faults(
 
 
 def _jumps(robot: Robot, recording: Recording) -> Iterator[Fault]:
-    """Yield the first impossible jump of a position; short excursions are repaired (`damage`)."""
+    """Yield the first impossible jump of a joint position; `damage` repairs single samples."""
     if len(recording) < 2:
         return
     # a step is no motion if it is ten times as fast as the limit and as 99 % of all steps
@@ -113,7 +113,7 @@ def _jumps(robot: Robot, recording: Recording) -> Iterator[Fault]:
 
 
 def encoder_faults(recording: Recording, units: Sequence[str] | None) -> Iterator[Fault]:
-    """Yield position and velocity channels that are constant while the joint moves."""
+    """Yield position and velocity channels that stay constant while the joint moves."""
     if recording.dq is None:
         return
     t, units = recording.t, units or ('rad',) * recording.n_joints
@@ -124,7 +124,7 @@ def encoder_faults(recording: Recording, units: Sequence[str] | None) -> Iterato
     changes = np.ptp(recording.dq, axis=0) > 0.0
     measured = bool(np.any((moved > REST_RANGE) & changes))  # or there are no velocities
     for j, unit in enumerate(units):
-        start, stop = _longest_same(recording.q[:, j])
+        start, stop = _longest_constant(recording.q[:, j])
         # range of positions at rest, plus one step of the encoder
         steps = np.abs(np.diff(recording.q[:, j]))
         hidden = REST_RANGE + (float(steps[steps > 0.0].min()) if steps.any() else 0.0)
@@ -142,18 +142,20 @@ def encoder_faults(recording: Recording, units: Sequence[str] | None) -> Iterato
         if distance > hidden:
             why = f', while its velocity goes {distance:.3g} {unit}: its encoder is frozen'
             value = f'{recording.q[start, j]:.4g} {unit}'
-            yield _stays(recording, j, 'position', value, (start, stop), why, 'record again')
+            yield _constant_channel(
+                recording, j, 'position', value, (start, stop), why, 'record again'
+            )
         if measured and moved[j] > REST_RANGE and not changes[j] and deviation[j] > 0.1 * moved[j]:
             why = f', while its position goes {moved[j]:.3g} {unit}: one of the two is frozen'
             remedy = 'record again, or leave velocities out if the positions are right'
             value = f'{recording.dq[0, j] + 0.0:.4g} {unit}/s'
-            yield _stays(recording, j, 'velocity', value, (0, len(t)), why, remedy)
+            yield _constant_channel(recording, j, 'velocity', value, (0, len(t)), why, remedy)
 
 
 def torque_faults(
     arm: ArmModel, recording: Recording, motions: Sequence[Motion]
 ) -> Iterator[Fault]:
-    """Yield torque channels that are constant while the motion needs a varying torque."""
+    """Yield torque channels that stay constant while the motion requires a varying torque."""
     assert recording.tau is not None
     if np.all(np.ptp(recording.tau, axis=0) < NOTHING):
         yield Fault(SILENT, 'unusable', recording.source)
@@ -163,7 +165,7 @@ def torque_faults(
     t, least = recording.t, max(2, round(1.0 / recording.period))
     for j in range(recording.n_joints):
         reading, q = recording.tau[:, j], recording.q[:, j]
-        start, stop = _longest_same(reading, NOTHING)
+        start, stop = _longest_constant(reading, NOTHING)
         moved = float(np.ptp(q[start:stop])) > 0.2 * float(np.ptp(q))
         at_limit = 0.0 < np.abs(reading).max() == abs(reading[start]) and stop - start < len(t)
         if stop - start < least or not moved or at_limit:
@@ -178,7 +180,7 @@ def torque_faults(
                 value = f'{reading[start] + 0.0:.4g} {arm.robot.torque_units[j]}'
                 why = ' while the joint moves: its channel is frozen'
                 remedy = 'record with the joint held still'
-                yield _stays(recording, j, 'torque', value, (start, stop), why, remedy)
+                yield _constant_channel(recording, j, 'torque', value, (start, stop), why, remedy)
                 break
 
 
@@ -186,7 +188,7 @@ def units_beyond_drives(
     robot: Robot, recordings: Sequence[Recording], motions: Sequence[Motion]
 ) -> Iterator[str]:
     """
-    Yield notes on torques in another unit, by the limits of the drives.
+    Yield notes on joints whose torques exceed the drive limit so far that their unit is wrong.
 
     There is no note if most joints exceed their limits, or if the described links need as much
     torque along the filtered motions: then the described limits are wrong.
@@ -211,26 +213,26 @@ def units_beyond_drives(
         )
 
 
-def _stays(
+def _constant_channel(
     recording: Recording,
     joint: int,
-    what: str,
+    quantity: str,
     value: str,
     run: tuple[int, int],
     why: str,
     always: str,
 ) -> Fault:
-    """Return the fault of a channel that stays constant for some time, or throughout."""
+    """Return the fault of a sensor channel that is constant for some time or throughout."""
     when, remedy = 'throughout', always
     if run != (0, len(recording)):
         first, last = recording.t[run[0]], recording.t[run[1] - 1]
         when, remedy = f'from {first:.3f} s to {last:.3f} s', 'leave out that time'
-    text = f'the {what} of {recording.joints[joint]} stays at {value} {when}{why}; {remedy}'
+    text = f'the {quantity} of {recording.joints[joint]} stays at {value} {when}{why}; {remedy}'
     return Fault(text, 'unusable', recording.source)
 
 
-def _longest_same(reading: FloatArray, step: float = 0.0) -> tuple[int, int]:
-    """Return start and stop of the longest run without a step larger than ``step``."""
+def _longest_constant(reading: FloatArray, step: float = 0.0) -> tuple[int, int]:
+    """Return the index range of the longest run of samples without a step above ``step``."""
     edges = np.flatnonzero(np.abs(np.diff(reading)) > step) + 1
     bounds = np.concatenate([[0], edges, [len(reading)]])
     longest = int(np.argmax(np.diff(bounds)))
@@ -239,7 +241,7 @@ def _longest_same(reading: FloatArray, step: float = 0.0) -> tuple[int, int]:
 
 def velocity_ratio(recording: Recording) -> tuple[FloatArray, FloatArray]:
     """
-    Compare velocities of a recording with its positions, in the recorded time.
+    Return the ratio of recorded velocities to the rates of the positions, and its correlation.
 
     The integral of a velocity is compared with the position, so that noise and steps of positions
     and jitter of time stamps do not matter.
@@ -283,7 +285,7 @@ def velocity_ratio(recording: Recording) -> tuple[FloatArray, FloatArray]:
 
 def velocity_faults(recording: Recording) -> Iterator[Fault]:
     """
-    Yield faults of velocities against positions: time base, unit or sign.
+    Yield velocities that disagree with the positions in time base, unit or sign.
 
     Identification differentiates the positions, so a wrong unit or sign of velocities is harmless.
     A wrong time base needs at least two joints that agree, and no moving joint that disagrees.
@@ -326,7 +328,7 @@ def held_elsewhere(
     robot: Robot, recordings: Sequence[Recording], motions: Sequence[Motion]
 ) -> Iterator[Fault]:
     """
-    Yield undriven joints off their described position, if the torque error is relevant.
+    Yield undriven joints that are not at their modelled position, if this changes torques.
 
     If such a joint moves, or carries driven joints at another position, the arm differs from the
     model. The size of this error is the change of the described torque along the recorded motions
@@ -347,28 +349,24 @@ def held_elsewhere(
         described = [np.concatenate([inverse_dynamics(r, m) for m in motions]) for r in robots]
         changes = [np.linalg.norm(a - b, axis=0) for a, b in combinations(described, 2)]
         measured = [motion.tau for motion in motions if motion.tau is not None]
-        whole = np.linalg.norm(np.concatenate(measured), axis=0)
-        share = np.max(changes, axis=0) / np.where(whole > 0.0, whole, np.inf)
+        torque = np.linalg.norm(np.concatenate(measured), axis=0)
+        share = np.max(changes, axis=0) / np.where(torque > 0.0, torque, np.inf)
         worst = int(np.argmax(share))
         if share[worst] > LIMITS.floor or (moves and joint.carries):
-            makes = f'{100.0 * share[worst]:.0f} % of the torque of {robot.joints[worst]}'
+            error = f'{100.0 * share[worst]:.0f} % of the torque of {robot.joints[worst]}'
+            model = f'the model has it at {joint.position:.3g} {joint.unit}'
+            carries = f', and carries {", ".join(joint.carries)}' if joint.carries else ''
+            remedy = 'drive it too (--joints), or hold it still where its torque is not measured'
+            text = (
+                f'joint {joint.name} is not driven, but moves from {lowest:.3g} to {highest:.3g} '
+                f'{joint.unit}{carries}; {model}; its position makes up to {error}; '
+                f'{"leave out where it moves" if joint.follows else remedy}'
+            )
+            if not moves:
+                text = (
+                    f'joint {joint.name} is not driven and stands at {lowest:.3g} {joint.unit}, '
+                    f'where {model}, which makes {error}; make it fixed there in the '
+                    'description, or drive it (--joints)'
+                )
             word: Word = 'poor' if 100.0 * share[worst] > LIMITS.poor else 'good'
-            yield Fault(_elsewhere(joint, lowest, highest, moves, makes), word)
-
-
-def _elsewhere(joint: HeldJoint, lowest: float, highest: float, moves: bool, makes: str) -> str:
-    """Describe where an undriven joint is, how that affects the torque, and the remedy."""
-    name, unit = joint.name, joint.unit
-    model = f'the model has it at {joint.position:.3g} {unit}'
-    if not moves:
-        return (
-            f'joint {name} is not driven and stands at {lowest:.3g} {unit}, where {model}, which '
-            f'makes {makes}; make it fixed there in the description, or drive it (--joints)'
-        )
-    carries = f', and carries {", ".join(joint.carries)}' if joint.carries else ''
-    remedy = 'drive it as well (--joints), or hold it still where its torque is not measured'
-    return (
-        f'joint {name} is not driven, but moves from {lowest:.3g} to {highest:.3g} '
-        f'{unit}{carries}; {model}; its position makes up to {makes}; '
-        f'{"leave out where it moves" if joint.follows else remedy}'
-    )
+            yield Fault(text, word)

@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Further tests of an identification, in addition to its torque error.
+Tests of an identified model: bias by encoder noise, and simulation of held-out recordings.
 
 Bias by encoder noise is tested on the training data. The description and the identified arm are
 simulated in closed loop along held-out data. Tests that cannot be made are listed with reasons.
@@ -38,7 +38,7 @@ Progress = Callable[[float, str], None]
 @dataclass(frozen=True)
 class ForwardScore:
     """
-    Position error of a simulated arm under the recorded torques.
+    Position error of a simulated arm that is driven by recorded torques.
 
     Attributes
     ----------
@@ -70,14 +70,14 @@ class ForwardScore:
 
     @property
     def worst(self) -> str:
-        """Write the largest position error and its joint as text."""
+        """Return a text with the largest position error and its joint."""
         joint = int(np.argmax(self.position_error))
         return (
             f'{1e3 * self.position_error[joint]:.3g} m{self.units[joint]} ({self.joints[joint]})'
         )
 
     def document(self) -> dict[str, dict[str, float]]:
-        """Return the errors of every joint as a document."""
+        """Return the position and torque errors of every joint as a dictionary for JSON."""
         named = {
             'position_rms': self.position_error,
             'torque_rms': self.torque_error,
@@ -91,7 +91,7 @@ class ForwardScore:
 
 @dataclass(frozen=True, eq=False)
 class _RecordedTorque(Controller):
-    """Recorded torque with inertia-scaled feedback to the recorded motion."""
+    """Controller with recorded torque, and inertia-scaled feedback to the recorded motion."""
 
     motion: Motion
     feedback: LinearFeedback
@@ -106,7 +106,7 @@ class _RecordedTorque(Controller):
 def _forward_score(
     arm: ArmModel, recording: Recording, used: Conditioning, nominal: ArmModel, duration: float
 ) -> ForwardScore:
-    """Simulate an arm along the first seconds of a recording, with feedback by a nominal model."""
+    """Simulate an arm driven by the recorded torques, with the feedback of a nominal model."""
     motion = next(iter(segments(recording, used)), None)
     if motion is None:
         raise IdentificationError(f'{recording.source}: no stretch is long enough to be filtered')
@@ -142,7 +142,7 @@ def _forward_score(
 @dataclass(frozen=True)
 class ForwardValidation:
     """
-    A held-out recording, simulated with the models before and after the identification.
+    Simulation errors of the models before and after the identification, on held-out data.
 
     Attributes
     ----------
@@ -155,7 +155,7 @@ class ForwardValidation:
     after: ForwardScore
 
     def sentence(self) -> str:
-        """Return a sentence on the position errors of the simulations."""
+        """Return a sentence on the position errors of both simulations."""
         comment = self.comment()
         return (
             f'simulated in closed loop along {np.ptp(self.after.motion.t):.0f} s of '
@@ -165,19 +165,19 @@ class ForwardValidation:
 
     @property
     def same(self) -> bool:
-        """Whether both models are equal, so that they have equal position errors."""
+        """Whether both models give the same simulated motion."""
         before = self.before
         return before is not None and np.array_equal(before.simulated, self.after.simulated)
 
     def errors(self) -> str:
-        """Return the largest position error of the model, or of both models."""
+        """Return a text with the largest position error of each model."""
         if self.before is None or self.same:
             return self.after.worst
         return f'{self.before.worst} before, {self.after.worst} after'
 
     @property
     def worse(self) -> tuple[str, ...]:
-        """Joints whose error increased significantly."""
+        """Return the joints whose position error is clearly larger after the identification."""
         if self.before is None:
             return ()
         before, after = self.before.position_error, self.after.position_error
@@ -193,7 +193,7 @@ class ForwardValidation:
         return f'the error increased in {", ".join(self.worse)}' if self.worse else ''
 
     def document(self) -> dict[str, Any]:
-        """Return the errors as a document."""
+        """Return the errors of both simulations as a dictionary for JSON."""
         return {
             'bag': self.after.source,
             'seconds': float(np.ptp(self.after.motion.t)),
@@ -205,7 +205,7 @@ class ForwardValidation:
 @dataclass(frozen=True)
 class Verification:
     """
-    Results of the tests of an identification.
+    Results of the tests of an identified model.
 
     Attributes
     ----------
@@ -233,7 +233,7 @@ def verify(
     progress: Progress = lambda share, what: None,
 ) -> Verification:
     """
-    Test an identification for encoder noise, and simulate it along held-out recordings.
+    Test a model for bias by encoder noise, and simulate it along held-out recordings.
 
     Parameters
     ----------
@@ -281,9 +281,9 @@ def simulate_held_out(
     progress: Progress = lambda share, what: None,
 ) -> tuple[tuple[ForwardValidation, ...], tuple[str, ...]]:
     """
-    Simulate two models in closed loop along recordings that neither was fitted to.
+    Simulate two models in closed loop along held-out recordings, and return their errors.
 
-    Returns a result per simulated recording, and omitted tests with reasons. The second model
+    Returns a result for each simulated recording, and omitted tests with reasons. The second model
     defines the feedback of both. `progress` is called with the finished share, 0 to 1, and the
     present task.
 
@@ -304,8 +304,8 @@ def simulate_held_out(
             patched = _forward_score(after, recording, used, after, duration)
             plain = _forward_score(before, recording, used, after, duration)
         except ArmidError as error:
-            what = '' if patched is None else 'the description is '
-            left_out.append(f'{recording.source}: {what}not simulated: {error}')
+            subject = '' if patched is None else 'the description is '
+            left_out.append(f'{recording.source}: {subject}not simulated: {error}')
         if patched is not None:
             pairs.append(ForwardValidation(plain, patched))
     return tuple(pairs), tuple(left_out)

@@ -172,7 +172,7 @@ def test_a_change_beyond_what_recordings_differ_by_is_found():
         assert 0.02 < first.std < 0.08
 
 
-def test_why_a_parameter_is_not_compared_is_told_apart():
+def test_each_reason_why_a_parameter_is_not_compared():
     shared = {ParameterName('Izz1', 'a', 'kg m^2'): (1.0, 0.1)}
     alone = {
         ParameterName('viscous_coefficient', 'resting', 'N m s/rad'): 'motion',
@@ -201,17 +201,17 @@ OTHER = ParameterFile('other', 'arm', {ParameterName('x', '', 'm'): (0.0, 1.0)},
 
 
 @pytest.mark.parametrize(
-    ('other', 'said'),
+    ('other', 'message'),
     [
-        (parameters([1.0], [0.1]), 'twice: a;'),
-        (parameters([1.0], [0.1], source='copy'), 'twice: copy'),
+        (parameters([1.0], [0.1]), 'equal parameters'),
+        (parameters([1.0], [0.1], source='copy'), 'copy have equal'),
         (BARE, 'bare .*covariance'),
         (OTHER, 'other .*common'),
     ],
     ids=['itself', 'a copy', 'no covariance', 'nothing in common'],
 )
-def test_what_cannot_be_compared_is_refused_by_name(other, said):
-    with pytest.raises(ModelError, match=said):
+def test_results_that_cannot_be_compared_are_refused_by_name(other, message):
+    with pytest.raises(ModelError, match=message):
         compare(parameters([1.0], [0.1]), other)
 
 
