@@ -3,9 +3,9 @@
 """
 Background computations in small pieces, between the samples of a stream.
 
-A stream must not wait. Computations that take longer than one sample are therefore generators,
-which yield after every piece of bounded size. With each sample, a few pieces run. Their order
-depends on the samples alone. The results therefore do not depend on the speed of the computer.
+A sample of the stream must not wait. Computations that take longer than one sample are therefore
+generators, which yield after every piece of bounded size. With each sample, a few pieces run.
+Their order depends on the samples alone, so results do not depend on the speed of the computer.
 
 """
 
@@ -17,14 +17,14 @@ from typing import TypeVar
 
 Result = TypeVar('Result')
 
-#: A background job without a result: a generator that yields after every piece of work.
+#: Background computation without a result: a generator that yields after every piece of work.
 Job = Generator[None, None, None]
-#: A background job that returns a result.
+#: Background computation that returns a result.
 Pieces = Generator[None, None, Result]
 
 
 def at_once(work: Pieces[Result]) -> Result:
-    """Run all pieces of a job; return its result."""
+    """Run all pieces of a background computation without a pause, and return its result."""
     while True:
         try:
             next(work)
@@ -34,13 +34,13 @@ def at_once(work: Pieces[Result]) -> Result:
 
 
 class Background:
-    """Queue of jobs that run in pieces: an urgent one first, otherwise in order."""
+    """Queue of computations that run in short pieces between the samples of a stream."""
 
     def __init__(self) -> None:
         self._jobs: deque[Job] = deque()
 
     def begin(self, job: Job, *, urgent: bool = False) -> None:
-        """Add a job."""
+        """Add a computation at the end of the queue, or at its front if urgent."""
         if urgent:
             self._jobs.appendleft(job)
         else:
@@ -48,15 +48,15 @@ class Background:
 
     @property
     def busy(self) -> bool:
-        """Whether any job is pending."""
+        """Whether any computation is pending."""
         return bool(self._jobs)
 
     def advance(self, pieces: int = 1) -> None:
-        """Run up to a number of pieces."""
+        """Run at most the given number of pieces of the pending computations."""
         for _ in range(pieces):
             if not self._jobs:
                 return
-            job = self._jobs.popleft()  # failed jobs are not repeated
+            job = self._jobs.popleft()  # a failed computation is not repeated
             try:
                 next(job)
             except StopIteration:
@@ -64,12 +64,12 @@ class Background:
             self._jobs.appendleft(job)
 
     def finish(self) -> None:
-        """Finish all jobs."""
+        """Run all pending computations to their end."""
         while self.busy:
             self.advance()
 
     def clear(self) -> None:
-        """Drop all jobs that are pending."""
+        """Discard all pending computations."""
         for job in self._jobs:
             job.close()
         self._jobs.clear()

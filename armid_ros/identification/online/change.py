@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Possible changes of a working arm, as directions in its base parameters."""
+"""Possible and detected changes of an arm during online identification."""
 
 from __future__ import annotations
 
@@ -21,22 +21,22 @@ _MIN_SINGULAR_VALUE = 1e-6
 @dataclass(frozen=True, eq=False)
 class ChangeCandidate:
     """
-    A change of the arm that the search can detect.
+    Possible change of an arm, such as a payload, as directions of the base parameters.
 
     Attributes
     ----------
     name : str
         Name of an effect in the catalogue, or 'friction' for all friction of a joint at once.
     joint : str
-        Joint of the change; empty for the whole arm.
+        Joint of the change; empty for a change of the entire arm.
     parameters : tuple of ParameterName
-        The p quantities that change.
+        The p physical quantities that change.
     directions : ndarray, shape (P, p)
         Change of the base parameters per unit of each quantity.
     reopened : ndarray, shape (P, k)
         Independent directions in which the base parameters may have changed.
     common : bool
-        Whether such changes are frequent, as those of the carried load.
+        Whether such changes are frequent, as changes of the payload are.
 
     """
 
@@ -48,25 +48,25 @@ class ChangeCandidate:
     common: bool = False
 
     def __post_init__(self) -> None:
-        """Freeze the arrays."""
+        """Make the arrays read-only."""
         for name in ('directions', 'reopened'):
             object.__setattr__(self, name, read_only(getattr(self, name)))
 
     @property
     def label(self) -> str:
-        """Return name and joint of the change as text, such as 'payload at hand'."""
+        """Return the name and joint of the change, such as 'payload at hand'."""
         text = name_in_words(self.name)
         return f'{text} at {self.joint}' if self.joint else text
 
     def includes(self, other: ChangeCandidate) -> bool:
-        """Whether this candidate includes another candidate."""
+        """Whether this change includes all parameters of another change."""
         return set(other.parameters) <= set(self.parameters)
 
 
 @dataclass(frozen=True, eq=False)
 class Change:
     """
-    A detected change.
+    Change of the arm that was detected in the torques.
 
     Attributes
     ----------
@@ -77,8 +77,8 @@ class Change:
     t : float
         Time of the change, to a quarter of a second [s].
     size : Estimate
-        Change of each quantity of the candidate, as estimated when the change was named. The
-        standard deviation of a quantity without data is infinite.
+        Change of each quantity of the candidate, estimated at the detection. The standard
+        deviation of a quantity without data is infinite.
 
     """
 
@@ -89,14 +89,14 @@ class Change:
 
     @property
     def reopened(self) -> FloatArray:
-        """Directions of all changes that are possible, rivals included, shape (P, k)."""
+        """Return independent directions of the candidate and its rivals, shape (P, k)."""
         columns = np.hstack([c.reopened for c in (self.candidate, *self.rivals)])
         columns = columns / np.linalg.norm(columns, axis=0)
         directions, size, _ = np.linalg.svd(columns, full_matrices=False)
         return np.asarray(directions[:, size > _MIN_SINGULAR_VALUE * size[0]])
 
     def __str__(self) -> str:
-        """Return a sentence on the change: candidate, sizes and rivals."""
+        """Return a sentence with the cause of the change, its sizes and the rivals."""
         sizes = ', '.join(
             f'{p.name} by {value:+.3g} {p.unit} ({lower:.3g} to {upper:.3g})'
             if 0.0 < upper - lower < np.inf
@@ -111,7 +111,7 @@ class Change:
 
 def change_candidates(arm: ArmModel, base: BaseParameters) -> tuple[ChangeCandidate, ...]:
     """
-    List candidates: every effect on every joint, joint friction, carried load.
+    Return the possible changes of an arm: its effects, the friction of each joint, a payload.
 
     Parameters
     ----------
@@ -148,7 +148,7 @@ def _candidate(
     added_to: Sequence[int],
     names: Sequence[ParameterName] = (),
 ) -> ChangeCandidate:
-    """Return the candidate of an effect, or of a body that adds to the parameters of a link."""
+    """Return the possible change of an effect, or of a payload on a link."""
     columns = base.grouping[:, added_to]
     # a maximal set of linearly independent columns, in their order
     lengths = np.linalg.norm(columns, axis=0)

@@ -1,12 +1,12 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Search the last blocks of rows for a change, its onset and its cause.
+Search the latest samples for a change of the arm, its onset and its cause.
 
-After each block, the windows of 0.5, 1 and 2 s that end with it are tested. After a positive test,
-all possible onsets are compared. The change is named when no rival explains the torques equally
-well, or after six blocks with its torque. The test is the likelihood ratio of a change in the
-window.
+The samples are summed in blocks. After each block, the windows of 0.5, 1 and 2 s that end with it
+are tested by the likelihood ratio of a change in the window. After a positive test, all possible
+onsets are compared. The change is named when no rival explains the torques equally well, or after
+six blocks with its torque.
 
 The estimate before a window is theta0, with the information A = R^T R. The rows W of the window,
 of unit noise, give M = W^T W and c = W^T tau. The hypothesis theta = theta0 + D delta in the
@@ -39,7 +39,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.linalg import lapack
 
-#: Lengths of the tested windows, in blocks.
+#: Lengths of the tested windows [blocks].
 _WINDOW_LENGTHS = (2, 4, 8)
 #: Eigenvalues of an information matrix below this share of the largest count as zero [-].
 _MIN_EIGENVALUE = 1e-9
@@ -48,12 +48,12 @@ _MIN_EIGENVALUE = 1e-9
 @dataclass(frozen=True, eq=False)
 class Block:
     """
-    Normal equations of a short stretch of whitened rows.
+    Normal equations of the whitened regression rows of a quarter of a second.
 
     Attributes
     ----------
     begin, end : float
-        First and last time of the stretch [s].
+        First and last time of the block [s].
     information : ndarray, shape (P, P)
         M = W^T W.
     right : ndarray, shape (P,)
@@ -61,13 +61,13 @@ class Block:
     moved : ndarray, shape (P, Q)
         M D, with the directions D of all candidate changes.
     known : ndarray, shape (P, P)
-        Information before the stretch, A = R^T R.
+        Information before the block, A = R^T R.
     known_along : ndarray, shape (P, Q)
         A D, with the same D.
     before : RecursiveLeastSquares
-        Estimator with nuisance parameters at the begin.
+        Estimator with nuisance parameters at the begin of the block.
     samples : tuple of WeightedSample
-        Samples of the stretch, kept to be learned again.
+        Samples of the block, which are processed again after a change.
 
     """
 
@@ -85,7 +85,7 @@ class Block:
 @dataclass(frozen=True, eq=False)
 class ScoreStatistics:
     """
-    Test statistics of Q candidate changes in a window.
+    Information and score of Q possible changes in a window of blocks.
 
     Attributes
     ----------
@@ -104,7 +104,7 @@ class ScoreStatistics:
 
     def ratios(self, sets: npt.NDArray[np.intp]) -> FloatArray:
         """
-        Return twice the log likelihood ratio of each of G sets of changes, shape (G,).
+        Return twice the log-likelihood ratio of each of G sets of changes, shape (G,).
 
         Parameters
         ----------
@@ -113,7 +113,7 @@ class ScoreStatistics:
 
         """
         squares = np.diag(self.information)
-        # a change of which the window shows nothing has the ratio 0
+        # the ratio is 0 for a change without torque in the window
         scale = np.where(squares > 0.0, np.abs(squares), np.inf) ** -0.5
         score, information = scale * self.score, np.outer(scale, scale) * self.information
         own = information[sets[:, :, np.newaxis], sets[:, np.newaxis, :]]
@@ -123,7 +123,7 @@ class ScoreStatistics:
 
     def size(self, some: slice) -> tuple[FloatArray, FloatArray]:
         """
-        Return the estimate of some changes and its covariance in white noise.
+        Return the estimated sizes of some changes, and their covariance for white noise.
 
         The variance of a change is infinite if this window alone does not determine the change.
 
@@ -132,7 +132,6 @@ class ScoreStatistics:
         covariance = np.linalg.pinv(information, hermitian=True)
         values = np.asarray(covariance @ self.score[some])
         shown = np.einsum('pq,qp->p', covariance, information)  # 1 for a change that is determined
-        # the variance of a change is infinite that the data do not determine
         hidden = np.flatnonzero(shown < 1.0 - 1e-6)
         covariance[hidden, hidden] = np.inf
         return values, np.asarray(covariance)
@@ -145,14 +144,14 @@ def score_statistics(
     residual_scale: float = 1.0,
 ) -> Pieces[ScoreStatistics]:
     """
-    Compute the statistics of candidates in a window, in pieces.
+    Compute the information and score of possible changes in a window, in short pieces.
 
     Parameters
     ----------
     window : sequence of Block
         Blocks of the window.
     before : Block
-        Block whose initial state is compared with the window.
+        Block whose initial estimate is tested against the window.
     directions : ndarray, shape (P, Q)
         Change of the parameters per unit of each candidate quantity.
     residual_scale : float
@@ -182,14 +181,14 @@ def score_statistics(
     return ScoreStatistics((shared[:, :-1] + shared[:, :-1].T) / 2.0, shared[:, -1], strength)
 
 
-#: A significant change, with its covariance in the usual noise; the last block before the change,
-#: and the blocks wholly after it.
+#: A significant change with its covariance; the last block before the change, and the blocks that
+#: lie entirely after it.
 FoundChange = tuple[Change, Block, Sequence[Block]]
 
 
 class ChangeSearch:
     """
-    Search for changes in blocks of rows, with calibrated statistics.
+    Search for changes of the arm in successive blocks, with a calibrated false-alarm rate.
 
     Parameters
     ----------
@@ -200,7 +199,7 @@ class ChangeSearch:
     chance : float
         Probability of a false alarm in a block.
     work : Background
-        Queue of the jobs that calibrate the statistics.
+        Queue of the computations that calibrate the statistics.
 
     Attributes
     ----------
@@ -228,7 +227,7 @@ class ChangeSearch:
         self.reset()
 
     def set_chance(self, chance: float) -> None:
-        """Set the probability of a false alarm; 0 switches detection off."""
+        """Set the probability of a false alarm in a block; 0 switches the detection off."""
         self._chance = chance / (len(self._sizes) * len(_WINDOW_LENGTHS))
 
     def reset(self) -> None:
@@ -241,13 +240,13 @@ class ChangeSearch:
         self.interrupt()
 
     def interrupt(self) -> None:
-        """Begin a new stretch of rows after an interruption of the stream."""
+        """Discard the blocks before an interruption of the stream."""
         self._blocks: deque[Block] = deque(maxlen=_WINDOW_LENGTHS[-1] + 1)
         self._waiting: deque[dict[int, tuple[FloatArray, FloatArray]]] = deque()
 
     def take(self, block: Block, residual_scale: float) -> Pieces[FoundChange | None]:
         """
-        Add a block of rows; return a significant change or None.
+        Add a block, and return a significant change; None if there is none.
 
         Parameters
         ----------
@@ -272,7 +271,7 @@ class ChangeSearch:
                 positive = positive or bool(np.any(excess > 1.0))
             yield
         if positive:
-            found = yield from self._judge(residual_scale)
+            found = yield from self._find_onset(residual_scale)
             if found is not None:
                 self.interrupt()
                 return found
@@ -289,7 +288,7 @@ class ChangeSearch:
         after: Sequence[Block],
         residual_scale: float,
     ) -> Pieces[Estimate]:
-        """Return the size of a change between a block and later blocks."""
+        """Return the estimated size of a change between one block and later blocks."""
         window = yield from score_statistics(after, before, self.directions, residual_scale)
         yield
         number = self._candidates.index(candidate)
@@ -299,8 +298,8 @@ class ChangeSearch:
         )
         return Estimate(candidate.parameters, values, covariance * usual)
 
-    def _judge(self, residual_scale: float) -> Pieces[FoundChange | None]:
-        """Return onset and cause of the change; None if they are still ambiguous."""
+    def _find_onset(self, residual_scale: float) -> Pieces[FoundChange | None]:
+        """Return the change with its onset and cause; None while they are ambiguous."""
         # difference of log-likelihoods from which one explanation is clearly better
         clear = 5.0
         rows, blocks = [], list(self._blocks)

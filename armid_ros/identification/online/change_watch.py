@@ -3,14 +3,14 @@
 """
 Detection of changes during online estimation, such as a load or more friction.
 
-Rows are summed up in blocks of a quarter of a second, which are searched (``change_search``).
+Samples are summed in blocks of a quarter of a second, which are searched (``change_search``).
 When a change is named, an estimator with nuisance parameters returns to its state before the
-change. It removes the information on the directions that may have changed, and processes the rows
-since then again. The estimator of the arm then has the same state, without nuisance parameters.
+change. It forgets the information on the directions that may have changed, and processes the
+later samples again. The estimator of the arm then copies this state, without nuisance parameters.
 
 Only the update of the estimator runs at once. A change is therefore named some samples after the
-block that made it significant. Until the later rows are processed again, the estimator continues
-as if nothing had changed.
+block that made it significant. Until the later samples are processed again, the estimator
+continues as without a change.
 
 """
 
@@ -34,31 +34,31 @@ import numpy as np
 
 #: Length of a block [s].
 BLOCK_LENGTH = 0.25
-#: Samples in one piece of work; fewer arrive in the meantime, so that the backlog shrinks.
+#: Samples in one piece of work; fewer arrive in the meantime, so that the queue shrinks.
 _SAMPLES_PER_PIECE = 10
-#: Arrays of a motion.
+#: Arrays of a `Motion`.
 _OF_MOTION = 't', 'q', 'dq', 'ddq'
 Item = TypeVar('Item')
 
 
 class Row(NamedTuple):
     """
-    A filtered row, and the state from which its friction columns are computed.
+    Filtered sample of the estimator, with the motion that gives its friction columns.
 
     Attributes
     ----------
     t : float
-        Time of the row [s].
+        Time of the sample [s].
     sample : WeightedSample
         Rows, torques and weights for the estimator.
     motion : CausalMotion
         Output of the motion filter.
     step : float
-        Time since the row before [s].
+        Time since the previous sample [s].
     gain : float
-        Divisor of the rows: gain of the filters for white noise [-].
+        Divisor of the regressor rows: gain of the filters for white noise [-].
     begins : bool
-        Whether the row begins a new stretch.
+        Whether the sample is the first after an interruption.
 
     """
 
@@ -72,7 +72,7 @@ class Row(NamedTuple):
 
 class NuisanceRows:
     """
-    Filtered regressor columns of friction that the model lacks, as nuisance parameters.
+    Regressor columns of friction that the model lacks, used as nuisance parameters.
 
     Such friction biases the identified parameters, and the bias varies with the motion. A search
     for changes would attribute this variation to a change. The friction law itself does not vary,
@@ -110,7 +110,7 @@ class NuisanceRows:
         )
 
     def columns(self, rows: Sequence[Row]) -> Pieces[FloatArray]:
-        """Compute the columns of N successive rows, shape (N, n, K n), in pieces."""
+        """Compute the friction columns of N successive samples, shape (N, n, K n), in pieces."""
         motion = Motion(
             self._arm.robot.joints,
             *(np.array([getattr(row.motion, name) for row in rows]) for name in _OF_MOTION),
@@ -135,7 +135,7 @@ class NuisanceRows:
 
 @dataclass(eq=False)
 class _Stretch:
-    """Rows to be searched; `end` is None before an interruption."""
+    """Samples of one block that are not searched yet; `end` is None before an interruption."""
 
     begin: float
     end: float | None = None
@@ -144,14 +144,14 @@ class _Stretch:
 
 class ChangeWatch:
     """
-    Update of an estimator with detection of changes of its parameters.
+    Estimator update that also detects changes of the parameters.
 
     Parameters
     ----------
     estimator : RecursiveLeastSquares
-        Estimator that learns the rows.
+        Estimator of the parameters of the arm.
     nuisance : NuisanceRows
-        Source of the nuisance columns, which only the tests use.
+        Source of the friction columns, which only the search for changes uses.
     candidates : sequence of ChangeCandidate
         Candidate changes to search for.
     false_alarm_time : float
@@ -181,14 +181,14 @@ class ChangeWatch:
         self._work = work
         self._search = ChangeSearch(
             candidates,
-            self._among_all(np.hstack([c.directions for c in candidates])),
+            self._with_nuisance(np.hstack([c.directions for c in candidates])),
             BLOCK_LENGTH / false_alarm_time,
             self._work,
         )
         self.reset()
 
     def reset(self) -> None:
-        """Clear noise level and changes; no background job may be pending."""
+        """Clear the noise level and the changes; no background computation may be pending."""
         self.changes: list[Change] = []
         self._wider.reset()
         self._search.reset()
@@ -202,7 +202,7 @@ class ChangeWatch:
 
     def use(self, false_alarm_time: float | None, forgetting: float) -> None:
         """
-        Use other settings, without loss of the estimate.
+        Change the false-alarm time and the forgetting factor, and keep the estimate.
 
         Parameters
         ----------
@@ -218,12 +218,12 @@ class ChangeWatch:
         self._wider.forgetting = forgetting
 
     def interrupt(self) -> None:
-        """Begin a new stretch of rows after an interruption of the stream."""
+        """Begin a new block after an interruption of the stream."""
         self._open = self._open or _Stretch(0.0)
         self._queue(None)
 
     def update(self, row: Row) -> None:
-        """Update the estimator with one row; see ``RecursiveLeastSquares.update``."""
+        """Update the estimator with one sample, and queue the sample for the search."""
         if self._open is not None and row.t - self._open.begin >= BLOCK_LENGTH:
             self._queue(row.t)
         if self._open is None:
@@ -231,13 +231,13 @@ class ChangeWatch:
         self._open.rows.append(row)
         self._estimator.update(*row.sample)
 
-    def _among_all(self, directions: FloatArray) -> FloatArray:
-        """Extend directions of the parameters by zeros for the nuisance parameters."""
+    def _with_nuisance(self, directions: FloatArray) -> FloatArray:
+        """Return directions of the parameters with zeros for the nuisance parameters."""
         more = len(self._wider.parameters) - self._count
         return np.vstack([directions, np.zeros((more, directions.shape[1]))])
 
     def _queue(self, end: float | None) -> None:
-        """Add the open stretch of rows to the stretches to be searched."""
+        """Queue the present block for the search, and start the search if it is idle."""
         assert self._open is not None
         self._open.end = end
         self._queued.append(self._open)
@@ -247,7 +247,7 @@ class ChangeWatch:
             self._work.begin(self._search_queue(), urgent=True)
 
     def _search_queue(self) -> Job:
-        """Search the stretches that wait for a search."""
+        """Search the queued blocks for changes."""
         try:
             while self._queued:
                 stretch = self._queued.popleft()
@@ -258,33 +258,34 @@ class ChangeWatch:
                 if stretch.end is None:
                     self._search.interrupt()
                     continue
-                block = yield from self._summed(stretch, stretch.end, samples, before)
+                block = yield from self._block(stretch, stretch.end, samples, before)
                 mean = float(np.exp(np.mean(np.log(self._residual_scale.value))))
                 found = yield from self._search.take(block, mean)
                 if found is not None:
-                    yield from self._name(found)
+                    yield from self._apply(found)
         finally:
             self._searching = False
 
     def _unsearched(self) -> list[Row]:
-        """Remove and return all rows to be searched."""
+        """Remove and return all samples that are not searched yet."""
         stretches = (*self._queued, *([self._open] if self._open else ()))
         self._queued.clear()
         self._open = None
         return [row for part in stretches for row in part.rows]
 
     def _learn(self, estimator: RecursiveLeastSquares, samples: Sequence[WeightedSample]) -> Job:
-        for part in _parts(samples, self._at_a_time):
+        """Update an estimator with several samples, in pieces."""
+        for part in _parts(samples, self._samples_per_update):
             estimator.update_together(part)
             yield
 
     @property
-    def _at_a_time(self) -> int:
+    def _samples_per_update(self) -> int:
         # with forgetting, samples are learned one by one
         return 4 if self._estimator.forgetting < 1.0 else _SAMPLES_PER_PIECE
 
     def _widened(self, rows: Sequence[Row]) -> Pieces[list[WeightedSample]]:
-        """Return successive samples with the columns of all parameters."""
+        """Return successive samples with the columns of the nuisance parameters added."""
         samples: list[WeightedSample] = []
         if not rows:
             return samples
@@ -298,14 +299,14 @@ class ChangeWatch:
             ]
         return samples
 
-    def _summed(
+    def _block(
         self,
         stretch: _Stretch,
         end: float,
         samples: Sequence[WeightedSample],
         before: RecursiveLeastSquares,
     ) -> Pieces[Block]:
-        """Sum up the rows of a block, projected on the candidate changes."""
+        """Compute the normal equations of a block, and update the residual scale."""
         residual_scale, residuals, squares = self._residual_scale.value, [], 0.0
         size = len(self._wider.parameters)
         information, right = np.zeros((size, size)), np.zeros(size)
@@ -339,15 +340,15 @@ class ChangeWatch:
             samples=tuple(samples),
         )
 
-    def _name(self, found: FoundChange) -> Job:
-        """Restore the state before a change, reset the changed parameters, report the change."""
+    def _apply(self, found: FoundChange) -> Job:
+        """Return to the state before a change, forget the changed directions, add the change."""
         change, before, after = found
         size, reopened = change.size, change.reopened
         self._wider.restore(before.before)
-        self._wider.reopen(self._among_all(reopened))
+        self._wider.reopen(self._with_nuisance(reopened))
         yield
         yield from self._learn(self._wider, [x for block in after for x in block.samples])
-        while len(rows := self._unsearched()) > self._at_a_time:
+        while len(rows := self._unsearched()) > self._samples_per_update:
             yield from self._learn(self._wider, (yield from self._widened(rows)))
         at_once(self._learn(self._wider, at_once(self._widened(rows))))
         self._estimator.restore(self._wider.restricted(self._count))
@@ -369,6 +370,6 @@ class ChangeWatch:
 
 
 def _parts(items: Sequence[Item], size: int) -> Iterator[Sequence[Item]]:
-    """Yield slices of a given size."""
+    """Yield successive slices of at most a given size."""
     for first in range(0, len(items), size):
         yield items[first : first + size]

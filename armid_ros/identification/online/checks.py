@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Conditions for identification from a stream; `rows.checks` has those for a recording."""
+"""Checks of a stream of joint states; `rows.checks` has the checks of a recording."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ import numpy as np
 
 class StreamChecks:
     """
-    Check by the ranges of undamaged samples whether a stream allows an identification.
+    Faults of a stream that prevent identification, such as constant torques or wrong units.
 
     Parameters
     ----------
@@ -29,13 +29,13 @@ class StreamChecks:
         self.reset()
 
     def reset(self) -> None:
-        """Clear the time of the first motion."""
+        """Restart the checks with a new stream."""
         self._moved: float | None = None
         self._moving = 0.0
         self._judged: tuple[bytes, str] | None = None
 
     def take(self, t: float) -> None:
-        """Add the timestamp of an undamaged sample."""
+        """Add the timestamp of an undamaged sample [s]."""
         if self._moved is None:
             lowest, highest = self._positions
             self._moved = t if np.any(highest - lowest > REST_RANGE) else None
@@ -43,6 +43,7 @@ class StreamChecks:
 
     @property
     def _positions(self) -> tuple[FloatArray, FloatArray]:
+        """Return the smallest and the largest position of each joint."""
         n = self._robot.n_joints
         return self._gate.lowest[:n], self._gate.highest[:n]
 
@@ -67,7 +68,7 @@ class StreamChecks:
 
 class MissingSamples:
     """
-    Count of missing samples by the timestamps.
+    Number of missing samples of a stream, computed from the timestamps.
 
     A delayed sample that is followed by early samples is not missing.
 
@@ -88,7 +89,7 @@ class MissingSamples:
         self._doubtful = 0
 
     def take(self, t: float, period: float | None) -> None:
-        """Add a timestamp [s], with the sampling period if known."""
+        """Add the timestamp of a sample [s], with the sampling period if it is known."""
         last = self._last
         # a timestamp more than 1 s before the last one belongs to a restarted clock
         if last is not None and last - 1.0 < t <= last:
@@ -109,7 +110,7 @@ class MissingSamples:
             self._doubtful = 0
 
     def _subtract_late(self) -> None:
-        """Subtract a late sample from the latest missing samples."""
+        """Reduce the count by a sample that was missing and arrives late."""
         if self._doubtful:
             self._doubtful -= 1
             self.count -= 1

@@ -3,9 +3,10 @@
 """
 Online identification: an estimate that is updated with one joint state at a time.
 
-A row is processed in two steps. Its prediction by the previous estimate is computed at once. The
-update with the row waits for the next sample, which usually has no row. No sample therefore needs
-both steps. Reading the estimate runs a pending update first.
+Only some joint states become a regression row. A row is processed in two steps. Its prediction by
+the previous estimate is computed at once. The update with the row waits for the next joint state,
+which usually becomes no row. No joint state therefore needs both steps. Reading the estimate runs
+a pending update first.
 
 """
 
@@ -54,12 +55,12 @@ _SMALLEST = float(np.finfo(float).tiny)
 
 class OnlineIdentifier:
     """
-    Estimate the base parameters of an arm and of its effects while it moves.
+    Recursive estimate of the base parameters of an arm and its effects while the arm moves.
 
     Parameters
     ----------
     arm : ArmModel
-        Structure: robot and effects, which have to be linear in their parameters.
+        Robot and effects; the effects have to be linear in their parameters.
     settings : OnlineSettings, optional
         Filters, weights, forgetting.
     rng : numpy.random.Generator
@@ -75,7 +76,7 @@ class OnlineIdentifier:
     base : BaseParameters
         The estimated base parameters.
     latest : tuple of OnlineSample
-        Rows of the last update; several if earlier samples had waited for this one.
+        Torque predictions of the last update; several if earlier joint states had to wait.
 
     Examples
     --------
@@ -156,7 +157,7 @@ class OnlineIdentifier:
         self._noise: RowNoise | None = None
 
     def reset(self) -> None:
-        """Clear the estimate and all counters."""
+        """Clear the estimate and all counters, and keep the settings."""
         self._work.clear()
         self._clear_estimate()
         self._filter.reset()
@@ -165,7 +166,7 @@ class OnlineIdentifier:
         self._gate.reset()
 
     def _clear_estimate(self) -> None:
-        """Clear the estimate; no background job may be pending."""
+        """Clear the estimate; no background computation may be pending."""
         self._pending: tuple[Row, FloatArray] | None = None  # with its innovation
         self._reopened = 0
         self.latest: tuple[OnlineSample, ...] = ()
@@ -195,7 +196,8 @@ class OnlineIdentifier:
         Returns
         -------
         OnlineSample or None
-            None between rows, while the filters settle, and for a sample that is left out.
+            Torque prediction; None between used samples, while the filters settle, and for a
+            joint state that is left out.
 
         """
         added = self._add_pending_row()
@@ -223,13 +225,13 @@ class OnlineIdentifier:
         return self.latest[-1] if self.latest else None
 
     def __getstate__(self) -> dict[str, Any]:
-        """Finish pending jobs, as generators cannot be copied."""
+        """Finish pending computations, as generators cannot be copied."""
         self._add_pending_row()
         self._work.finish()
         return self.__dict__
 
     def _process(self, sample: StreamSample) -> OnlineSample | None:
-        """Filter a valid sample; return the new row or None."""
+        """Filter a valid joint state, and return its torque prediction if it is used."""
         if sample.begins:
             self._filter.restart('position_step')
         self._checks.take(sample.t)
@@ -267,20 +269,20 @@ class OnlineIdentifier:
         return self._new_row(motion, step, used & usable, begins)
 
     def estimate(self) -> Estimate:
-        """Return base parameters and covariance, with autocorrelated errors included."""
+        """Return the base parameters with a covariance that allows for autocorrelated errors."""
         self._add_pending_row()
         estimate = self._estimator.estimate
         covariance = self._scores.covariance(self._estimator.root)
         return estimate if covariance is None else replace(estimate, covariance=covariance)
 
     def model(self) -> ArmModel:
-        """Return the arm with the estimate; unidentified directions stay unchanged."""
+        """Return the arm model with the estimated parameters; unidentified ones stay unchanged."""
         self._add_pending_row()
         return self.arm.with_theta(self.base.lift(self._estimator.values, self.arm.theta))
 
     def check(self, settings: OnlineSettings) -> None:
         """
-        Raise an error for settings that need a restart; see `use`.
+        Raise an error if settings cannot be changed while the arm moves; see `use`.
 
         Raises
         ------
@@ -292,19 +294,19 @@ class OnlineIdentifier:
             same = getattr(settings, part.name) == getattr(self.settings, part.name)
             if part.name not in self.CHANGEABLE and not same:
                 raise IdentificationError(
-                    f'{part.name} cannot change now; restart the identification'
+                    f'{part.name} cannot change during the identification; restart it'
                 )
         if self._watch is None and settings.false_alarm_time is not None:
             raise IdentificationError(
-                'change detection was off at the start and cannot begin now: restart the '
-                'identification'
+                'false_alarm_time cannot be set now, as change detection was off at the start; '
+                'restart the identification'
             )
         check_forgetting(settings.forgetting)
         check_gap(settings.max_gap)
 
     def use(self, settings: OnlineSettings) -> None:
         """
-        Use other settings, without loss of the estimate.
+        Change settings during the identification, and keep the estimate.
 
         Parameters
         ----------
@@ -332,34 +334,34 @@ class OnlineIdentifier:
 
     @property
     def condition_number(self) -> float:
-        """Condition number of the weighted regressor so far; takes a millisecond."""
+        """Return the condition number of the weighted regressor; this takes a millisecond."""
         self._add_pending_row()
         return self._estimator.condition_number
 
     @property
     def samples(self) -> int:
-        """Return the number of samples in the estimate."""
+        """Return the number of samples that the estimator has used."""
         self._add_pending_row()
         return self._estimator.samples
 
     @property
     def missing(self) -> int:
-        """Number of missing joint states, by the timestamps."""
+        """Return the number of missing joint states, computed from the timestamps."""
         return self._missing.count
 
     @property
     def rejected(self) -> Mapping[str, int]:
-        """Joint states left out, by reason; see CausalFilter and SpikeGate."""
+        """Return the number of joint states that the filters left out, by reason."""
         return Counter(self._filter.rejected) + self._gate.rejected
 
     @property
     def error(self) -> str:
-        """Fault that prevents identification, such as absent torques; empty without fault."""
+        """Return the fault that prevents identification, such as zero torques; empty if none."""
         return self._checks.error
 
     @property
     def spikes(self) -> Mapping[tuple[str, str], int]:
-        """Joint states left out for spikes, by joint and signal."""
+        """Return the number of joint states left out for spikes of each joint and signal."""
         joints = self.arm.robot.joints
         signals = ('position', *(['velocity'] * self.settings.measured_velocity), 'effort')
         names = [(joint, signal) for signal in signals for joint in joints]
@@ -367,18 +369,19 @@ class OnlineIdentifier:
 
     @property
     def restarts(self) -> Mapping[str, int]:
-        """Restarts of the filters, by reason; see CausalFilter."""
+        """Return the number of restarts of the filters for each reason; see CausalFilter."""
         return self._filter.restarts
 
     @property
     def delay(self) -> float | None:
-        """Delay of the filters [s]; None until the sampling period is known."""
+        """Return the delay of the filters [s]; None until the sampling period is known."""
         pole = self._filter.pole
         return None if pole is None else 3.0 / pole + self._row_filter.delay
 
     def _new_row(
         self, motion: CausalMotion, step: float, used: npt.NDArray[np.bool_], begins: bool
     ) -> OnlineSample:
+        """Compute the regressor and the torque prediction of a filtered joint state."""
         state = (motion.q[None], motion.dq[None], motion.ddq[None])
         one = Motion(self.arm.robot.joints, np.array([motion.t]), *state)
         robot = self.arm.robot
@@ -404,7 +407,7 @@ class OnlineIdentifier:
         return OnlineSample(stamp, measured, measured - innovation * gain, used)
 
     def _add_pending_row(self) -> bool:
-        """Update the estimate with the pending row; return whether there was one."""
+        """Update the estimate with the pending regression row; return whether there was one."""
         if self._pending is None:
             return False
         (row, innovation), self._pending = self._pending, None
@@ -430,7 +433,7 @@ class OnlineIdentifier:
 
     @property
     def _negligible_error(self) -> FloatArray:
-        """Return the largest negligible error of one sample: 0 except for torques."""
+        """Return the largest error of a signal that does not matter: 0 except for torques."""
         n = self.arm.robot.n_joints
         if self._filter.pole is None:
             return np.zeros((3 if self.settings.measured_velocity else 2) * n)
@@ -440,7 +443,7 @@ class OnlineIdentifier:
         return self._floor
 
     def _row_noise(self) -> RowNoise:
-        """Return the noise model of rows since the start of the filters."""
+        """Return the noise of filtered samples relative to that of the sensors."""
         if self._noise is None:
             period, pole = self._filter.period, self._filter.pole
             assert period is not None and pole is not None

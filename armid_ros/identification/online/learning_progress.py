@@ -25,12 +25,12 @@ _OF_BODY = {
 @dataclass(frozen=True)
 class Unlearned:
     """
-    Quantities of a joint that the motion does not identify.
+    Parameters of one joint that the motion does not identify.
 
     Attributes
     ----------
     joint : str
-        The joint; empty for the whole arm.
+        The joint; empty for parameters of the entire arm.
     parameters : tuple of ParameterName
         Unidentified parameters, the most uncertain first.
 
@@ -40,7 +40,7 @@ class Unlearned:
     parameters: tuple[ParameterName, ...]
 
     def __str__(self) -> str:
-        """Return the unidentified quantities, and the motion that they need."""
+        """Return a text with the unidentified quantities, and the motion that identifies them."""
         friction = {
             'viscous_coefficient': 'viscous friction',
             'coulomb_torque': 'Coulomb friction',
@@ -56,7 +56,7 @@ class Unlearned:
 
 class LearningProgress:
     """
-    Comparison of estimates over time to find parameters that the motion does not identify.
+    Detector of parameters that the motion does not identify, from the latest estimates.
 
     Parameters
     ----------
@@ -78,12 +78,12 @@ class LearningProgress:
         self._past: deque[tuple[float, FloatArray]] = deque()
 
     def reset(self) -> None:
-        """Clear all estimates."""
+        """Forget all earlier estimates."""
         self._past.clear()
 
     def unidentified(self, t: float, estimate: Estimate) -> tuple[Unlearned, ...]:
         """
-        Return the unidentified quantities of each joint that made no progress for ten seconds.
+        Return the parameters of each joint whose uncertainty has not fallen for ten seconds.
 
         Parameters
         ----------

@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Null distribution of likelihood ratios and residuals, and the critical values that follow.
+Null distribution of likelihood ratios and residuals, and critical values of the tests.
 
 Twice the log-likelihood ratio is chi-square with p degrees of freedom if noise is white and the
 model is exact. Coloured noise and model discrepancy multiply it by a factor of at least 1, which
@@ -28,12 +28,12 @@ MAX_BLOCKS = 240
 
 class History:
     """
-    Buffer of the latest rows of numbers.
+    Buffer of constant size for the latest rows of numbers.
 
     Parameters
     ----------
     width : int
-        Numbers in a row.
+        Number of columns.
     most : int
         Largest number of rows kept.
 
@@ -49,7 +49,7 @@ class History:
         return min(self._end, self._max_rows)
 
     def append(self, row: FloatArray) -> None:
-        """Append a row."""
+        """Append a row, and drop the oldest row of a full buffer."""
         if self._end == len(self._rows):
             kept, self._rows = self.values, np.empty_like(self._rows)
             self._rows[: self._max_rows], self._end = kept, self._max_rows
@@ -64,10 +64,10 @@ class History:
 
 class NullCalibration:
     """
-    Factors by which test statistics exceed their size in white noise, for calibration.
+    Critical values of the change tests, calibrated while the arm does not change.
 
-    The factor of a statistic is the ratio of its mean to its mean in white noise; the largest 5
-    % are limited to their quantile. The mean covers the last three quarters of at most ten
+    The factor of a statistic is the ratio of its mean to its mean in white noise; the largest 5 %
+    are limited to their quantile. The mean covers the last three quarters of at most ten
     minutes, so early windows soon lose their influence. Few windows determine a factor only
     roughly. The factors of one arm are similar, so uncertain factors are shrunk towards the mean
     of all (Efron and Morris 1975). If large statistics are more frequent than expected from the
@@ -113,7 +113,7 @@ class NullCalibration:
 
     def update(self, ratios: FloatArray, strength: FloatArray) -> Job:
         """
-        Update the factors with a window without a change; yield between pieces of the work.
+        Update the calibration with a window without a change, in pieces.
 
         Parameters
         ----------
@@ -140,7 +140,7 @@ class NullCalibration:
         yield from self._fit_factors(self._ratios.values[len(self._ratios) // 4 :])
 
     def _fit_factors(self, later: FloatArray) -> Job:
-        """Compute the factors from statistics of later windows, where 0 means no data."""
+        """Compute the factors from the statistics of earlier windows; 0 means no data."""
         counts = np.sum(later > 0.0, axis=0)
         independent = counts / self._overlap
         valid = independent >= 12.0  # too few independent windows for a test
@@ -181,7 +181,7 @@ class NullCalibration:
 
     def excess(self, ratios: FloatArray, strength: FloatArray, chance: float) -> FloatArray:
         """
-        Return statistics divided by their critical values; 0 before the calibration.
+        Return the test statistics over their critical values; 0 before the calibration.
 
         Model discrepancy has biased the parameters, so the critical values are larger for motion
         that is stronger than usual.
@@ -207,7 +207,7 @@ class NullCalibration:
 
 
 def _in_pieces(values: FloatArray) -> Iterator[slice]:
-    """Yield the columns in slices, one per piece of work."""
+    """Yield slices of the columns, each small enough for one piece of work."""
     width = max(1, 4_000 // max(1, len(values)))
     for first in range(0, values.shape[1], width):
         yield slice(first, first + width)
@@ -215,7 +215,7 @@ def _in_pieces(values: FloatArray) -> Iterator[slice]:
 
 class ResidualScale:
     """
-    Standard deviation of autocorrelated residuals per joint, over the assumed noise.
+    Standard deviation of the residuals of each joint, relative to the assumed noise.
 
     Residuals are summed over a block, in which fast errors cancel. The scale is the median over
     blocks, so first blocks and a change that is not yet detected hardly affect it.
@@ -234,11 +234,11 @@ class ResidualScale:
 
     @property
     def value(self) -> FloatArray:
-        """Return the factor of every joint, shape (m,); initially 1."""
+        """Return the scale of each joint relative to the assumed noise, (m,); initially 1."""
         return np.ones(1) if self._value is None else self._value
 
     def learn(self, residual: FloatArray, weights: FloatArray) -> None:
-        """Update the scale with residuals of a block over the assumed noise, shape (k, m)."""
+        """Update the scale with the residuals of a block over the assumed noise, shape (k, m)."""
         used = np.sum(weights > 0.0, axis=0)
         if not used.any():
             return  # residuals during motion are kept while the arm is at rest

@@ -39,7 +39,7 @@ _BLOCK_COLUMNS = 8
 
 class WeightedSample(NamedTuple):
     """
-    Rows, torques and weights of one sample.
+    Regressor rows, torques and weights of one sample.
 
     Attributes
     ----------
@@ -57,12 +57,12 @@ class WeightedSample(NamedTuple):
 
 class RecursiveLeastSquares:
     """
-    Estimate theta of tau = rows @ theta + noise, a few rows at a time.
+    Recursive least-squares estimate of theta in tau = rows @ theta + noise.
 
     Parameters
     ----------
     parameters : tuple of ParameterName
-        P names.
+        Names of the P parameters.
     noise : array_like, shape (m,)
         Standard deviation of the noise of the m rows of a sample, usually one per joint [N m].
     forgetting : float
@@ -83,7 +83,7 @@ class RecursiveLeastSquares:
     Attributes
     ----------
     parameters : tuple of ParameterName
-        P names.
+        Names of the P parameters.
     noise_is_relative : bool
         Whether the noise is known up to a factor only.
     samples : int
@@ -121,7 +121,7 @@ class RecursiveLeastSquares:
         self.reset()
 
     def with_more(self, parameters: tuple[ParameterName, ...]) -> RecursiveLeastSquares:
-        """Return a reset estimator with added parameters, which begin at 0 with a weak prior."""
+        """Return a restarted estimator with further parameters, which start at 0."""
         wider = copy(self)
         wider.parameters = self.parameters + parameters
         wider._start = np.concatenate([self._start, np.zeros(len(parameters))])
@@ -129,7 +129,7 @@ class RecursiveLeastSquares:
         return wider
 
     def restricted(self, count: int) -> RecursiveLeastSquares:
-        """Return the estimator of the first parameters, with all others fixed to zero."""
+        """Return the estimator of the first `count` parameters, with all others fixed to zero."""
         fewer = copy(self)
         fewer.parameters, fewer._start = self.parameters[:count], self._start[:count]
         root, right = self._root[:count, :count].copy('F'), self._root @ self._values
@@ -139,7 +139,7 @@ class RecursiveLeastSquares:
         return fewer
 
     def reset(self) -> None:
-        """Reset to the initial state."""
+        """Forget all samples."""
         self.samples = 0
         root = np.asfortranarray(np.eye(len(self._start)) / PRIOR_STD)
         self._take(root, self._start)
@@ -154,12 +154,12 @@ class RecursiveLeastSquares:
         weights: npt.ArrayLike | None = None,
     ) -> None:
         """
-        Add one sample, or several at once.
+        Update the estimate with one sample, or with several samples at once.
 
         Parameters
         ----------
         rows : ndarray, shape (m, P)
-            Sensitivity of the torques to the parameters; of several samples one after the other.
+            Sensitivity of the torques to the parameters; several samples are stacked.
         tau : ndarray, shape (m,)
             Measured torque [N m].
         weights : array_like, shape (m,), optional
@@ -199,10 +199,10 @@ class RecursiveLeastSquares:
 
     def update_together(self, samples: Sequence[WeightedSample]) -> None:
         """
-        Add several samples at once, which is faster than one by one.
+        Update the estimate with several samples, which is faster than one update per sample.
 
-        Without forgetting, the estimate is the same. With forgetting, samples are added one by
-        one, as the forgotten information depends on the order.
+        Without forgetting, the estimate is the same. With forgetting, each sample has its own
+        update, as the forgotten information depends on the order.
 
         """
         if self._forgetting < 1.0:
@@ -212,24 +212,24 @@ class RecursiveLeastSquares:
             self.update(*(np.concatenate(part) for part in zip(*samples, strict=True)))
 
     def scale(self, weights: FloatArray) -> FloatArray:
-        """Return the factors that whiten rows of given weights, shape (m,) [1/(N m)]."""
+        """Return the factors that give rows of given weights unit noise, shape (m,) [1/(N m)]."""
         return np.asarray(np.sqrt(weights) / self._noise)
 
     def copied(self) -> RecursiveLeastSquares:
-        """Return a copy that is independent of later updates."""
+        """Return a copy of the estimator that later updates do not change."""
         other = copy(self)
         other._root, other._right = self._root.copy('F'), self._right.copy('F')
         return other
 
     def restore(self, other: RecursiveLeastSquares) -> None:
-        """Continue from the state of another estimator of the same parameters."""
+        """Take over the state of another estimator of the same parameters."""
         self._take(other._root.copy('F'), other._values)
         self._squares, self._freedom = other._squares, other._freedom
         self.samples = other.samples
 
     def reopen(self, directions: FloatArray) -> None:
         """
-        Forget the information on the parameters along some directions.
+        Forget the information on some directions of the parameters.
 
         Parameters
         ----------
@@ -242,7 +242,7 @@ class RecursiveLeastSquares:
 
     @property
     def forgetting(self) -> float:
-        """Forgetting factor; it may be set at any time."""
+        """Return the forgetting factor, which may be set at any time."""
         return self._forgetting
 
     @forgetting.setter
@@ -253,17 +253,17 @@ class RecursiveLeastSquares:
 
     @property
     def root(self) -> FloatArray:
-        """Upper triangle R of the information R^T R, shape (P, P); updates overwrite it."""
+        """Return the triangle R of the information R^T R, shape (P, P); updates overwrite it."""
         return self._root
 
     @property
     def values(self) -> FloatArray:
-        """Estimated parameters, shape (P,)."""
+        """Return the estimated parameters, shape (P,)."""
         return self._values
 
     @property
     def covariance(self) -> FloatArray:
-        """Covariance of the values, shape (P, P)."""
+        """Return the covariance of the estimated parameters, shape (P, P)."""
         factor = self.variance_factor if self.noise_is_relative else 1.0
         inverse, _ = lapack.dtrtri(self._root)
         return np.asarray(inverse @ inverse.T * factor)
@@ -271,7 +271,7 @@ class RecursiveLeastSquares:
     @property
     def variance_factor(self) -> float:
         """
-        Variance of the weighted residuals: 1 when the noise is as given.
+        Return the variance of the weighted residuals, which is 1 if the given noise is right.
 
         It is also 1 while there are no more observations than parameters.
 
@@ -280,23 +280,24 @@ class RecursiveLeastSquares:
 
     @property
     def condition_number(self) -> float:
-        """Condition number of the weighted regressor so far."""
+        """Return the condition number of the weighted regressor of all samples."""
         singular = np.linalg.svd(self._root, compute_uv=False)
         return float(singular[0] / singular[-1])
 
     @property
     def estimate(self) -> Estimate:
-        """Values and covariance with their names."""
+        """Return the estimated parameters with names and covariance."""
         return Estimate(self.parameters, self._values.copy(), self.covariance)
 
     def _take(self, root: FloatArray, values: FloatArray) -> None:
+        """Set the triangle and the estimate, with R theta computed from them."""
         self._root, self._values = root, values
         self._right = np.asfortranarray((root @ values)[:, np.newaxis])
 
 
 def replaced(root: FloatArray, rows: FloatArray, forgetting: float) -> FloatArray:
     """
-    Return R with new information, discounting old information in the same directions.
+    Return R with the information of new rows, and less old information in their directions.
 
     In the directions b of U = rows R^-1 = A diag(s) B^T the old information, 1, becomes
     1 - f + s^2 with f = min(s^2, level). It never falls, so the new triangle is the old one
@@ -336,7 +337,7 @@ def replaced(root: FloatArray, rows: FloatArray, forgetting: float) -> FloatArra
 
 def reopened(root: FloatArray, directions: FloatArray) -> FloatArray:
     """
-    Return R without its information on parameters along some directions (P, k).
+    Return R without its information on some directions of the parameters, shape (P, k).
 
     The parameters become theta + directions delta, where nothing is known of delta: R theta = z
     is stacked with delta = 0 within PRIOR_STD, and delta is eliminated by reflections.
@@ -351,8 +352,8 @@ def reopened(root: FloatArray, directions: FloatArray) -> FloatArray:
 
 
 def check_forgetting(factor: float) -> None:
-    """Raise an error for a forgetting factor out of range."""
+    """Raise an IdentificationError for a forgetting factor out of range."""
     if not MIN_FORGETTING <= factor <= 1.0:
         raise IdentificationError(
-            f'the forgetting factor, {factor}, has to be from {MIN_FORGETTING} to 1'
+            f'the forgetting factor is {factor}, but has to be from {MIN_FORGETTING} to 1'
         )

@@ -32,7 +32,7 @@ _RIDGE = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class _Bands:
-    """Products of the transforms of rows and torques, joint by joint and band by band."""
+    """Products of Fourier transforms of regressor and torque, per joint and frequency band."""
 
     products: FloatArray  # (m, B, P + 1, P + 1), torques last
     counts: FloatArray  # number of real values summed up in every product, (m, B)
@@ -45,16 +45,16 @@ class _Bands:
 
 class RobustCovariance:
     """
-    Sandwich covariance of an estimate from windows of rows.
+    Covariance of a recursive estimate whose errors are autocorrelated.
 
     Parameters
     ----------
     window : int
-        Rows in a window, which should be longer than the correlation time of errors.
+        Samples in a window, which should be longer than the correlation time of errors.
     forgetting : float
-        Forgetting factor per row; a window removes no more information than it brings.
+        Forgetting factor per sample; a window removes no more information than it adds.
     work : Background
-        Queue of the jobs that sum up windows.
+        Queue of the computations on complete windows.
 
     """
 
@@ -65,20 +65,20 @@ class RobustCovariance:
         self.reset()
 
     def reset(self) -> None:
-        """Clear all sums; no background job may be pending."""
+        """Clear all sums; no background computation may be pending."""
         self._settled: _Bands | None = None
         self._latest: _Bands | None = None
         self._shape: tuple[FloatArray, FloatArray] | None = None
         self.interrupt()
 
     def interrupt(self) -> None:
-        """Begin a new stretch of rows after an interruption of the stream."""
+        """Begin a new window after an interruption of the stream."""
         self._rows: FloatArray | None = None
         self._count = 0
 
     def add(self, rows: FloatArray, tau: FloatArray, values: FloatArray) -> None:
         """
-        Add one sample.
+        Add one sample to the present window.
 
         Parameters
         ----------
@@ -94,30 +94,30 @@ class RobustCovariance:
         self._rows[:, self._count, -1] = tau
         self._count += 1
         if self._count == self._window:
-            self._work.begin(self._sum_up(self._rows, values))
+            self._work.begin(self._add_window(self._rows, values))
             self.interrupt()
 
     def reopen(self, directions: FloatArray, values: FloatArray) -> None:
         """
-        Assume an unknown change of the parameters between earlier and later rows.
+        Allow for a change of the parameters between earlier and later samples.
 
         The last window, in which they may have changed, is left out. The torque of the change that
-        fits best is subtracted from the torques of all earlier rows.
+        fits best is subtracted from the torques of all earlier samples.
 
         Parameters
         ----------
         directions : ndarray, shape (P, k)
             Directions in which the parameters may have changed.
         values : ndarray, shape (P,)
-            The estimate now.
+            The present estimate.
 
         """
         self.interrupt()
         self._shape = None
         self._work.begin(self._reopened(directions, values))
 
-    def _sum_up(self, columns: FloatArray, values: FloatArray) -> Job:
-        """Add a window of rows and torques, shape (m, k, P + 1)."""
+    def _add_window(self, columns: FloatArray, values: FloatArray) -> Job:
+        """Add a window of k regressor rows and torques, shape (m, k, P + 1), to the sums."""
         window = yield from _transformed(columns)
         if not window.counts.any():
             return
@@ -125,13 +125,13 @@ class RobustCovariance:
             settled = self._latest
             if self._settled is not None:
                 settled = yield from _sum(self._settled, self._latest)
-            # share of the information that the window brings, mean over all directions
+            # share of the information that the window adds, mean over all directions
             both = settled.information + window.information
             size = np.sqrt(np.diag(both).clip(PRIOR_STD**-2))
             scale, ridge = np.outer(size, size), _RIDGE * np.eye(len(size))
             share = np.linalg.solve(both / scale + ridge, window.information / scale)
-            brought = float(np.trace(share)) / len(size)
-            kept = max(self.forgetting**self._window, 1.0 - brought)
+            added = float(np.trace(share)) / len(size)
+            kept = max(self.forgetting**self._window, 1.0 - added)
             yield
             if kept < 1.0:
                 for products in settled.products:
@@ -139,12 +139,12 @@ class RobustCovariance:
                     yield
                 settled.counts[:] *= kept
             self._settled = settled
-            whole = yield from _sum(settled, window)
-            self._shape = yield from _shape(whole, values)
+            every = yield from _sum(settled, window)
+            self._shape = yield from _shape(every, values)
         self._latest = window
 
     def _reopened(self, directions: FloatArray, values: FloatArray) -> Job:
-        """Marginalise earlier parameters along some directions."""
+        """Subtract the torque of the best-fitting change of some directions from earlier sums."""
         self._latest = None
         if self._settled is None:
             return
@@ -186,7 +186,7 @@ class RobustCovariance:
 
 
 def _sum(some: _Bands, more: _Bands) -> Pieces[_Bands]:
-    """Return the sums of two sets of products, in pieces."""
+    """Return the sums of two sets of products, computed in pieces."""
     products = np.empty_like(some.products)
     for place, first, second in zip(products, some.products, more.products, strict=True):
         np.add(first, second, out=place)
@@ -195,7 +195,7 @@ def _sum(some: _Bands, more: _Bands) -> Pieces[_Bands]:
 
 
 def _transformed(columns: FloatArray) -> Pieces[_Bands]:
-    """Return the products of a window of rows [W, y] of shape (m, k, P + 1), in octaves."""
+    """Return the products of a window [W, y], shape (m, k, P + 1), in frequency octaves."""
     # number of columns transformed in one piece of work
     at_once = 24
     joints, count, size = columns.shape
@@ -223,7 +223,7 @@ def _transformed(columns: FloatArray) -> Pieces[_Bands]:
 
 
 def _shape(bands: _Bands, values: FloatArray) -> Pieces[tuple[FloatArray, FloatArray]]:
-    """Return a root of R_M^-T J R_M^-1 with R_M^T R_M = M, and factors that widen deviations."""
+    """Return a root of R_M^-T J R_M^-1, R_M^T R_M = M, and factors of the standard deviations."""
     # level of the upper end of an interval
     level = 0.975
     # The noise power in a band is that of the residuals, corrected for the degrees of freedom of
@@ -271,7 +271,7 @@ def _shape(bands: _Bands, values: FloatArray) -> Pieces[tuple[FloatArray, FloatA
 
 
 def _triangle(information: FloatArray) -> FloatArray:
-    """Return R with R^T R = information; eigenvalues below the ridge are raised to it."""
+    """Return R with R^T R = information; smaller eigenvalues are raised to the ridge."""
     try:
         return np.asarray(linalg.cholesky(information))
     except linalg.LinAlgError:

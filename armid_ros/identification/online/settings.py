@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Settings of online identification, and its result for a row."""
+"""Settings of online identification, and its torque prediction for one sample."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ FALSE_ALARM_TIME = 100.0 * 3600.0
 @dataclass(frozen=True)
 class OnlineSettings:
     """
-    Settings of online estimation.
+    Settings of the online identification.
 
     Attributes
     ----------
@@ -26,10 +26,10 @@ class OnlineSettings:
         Frequency of the low-pass on torque and regressor rows [Hz]. Well above the motion, whose
         fastest part carries the inertial torque, and below disturbances of the torque signal.
     row_rate : float or None
-        Rows used per second [1/s]; 40 times the cut-off frequency by default. After the filter,
-        the rows between them are nearly the same, so they would add only computing time.
+        Samples used per second [1/s]; 40 times the cut-off frequency by default. After the filter,
+        the samples between them are nearly the same, so they would add only computing time.
     forgetting : float
-        Forgetting factor per row used, 0.9 to 1. A memory of T seconds is 1 - 1 / (T row_rate).
+        Forgetting factor per used sample, 0.9 to 1. A memory of T seconds is 1 - 1 / (T row_rate).
     torque_noise : tuple of float or None
         Standard deviation of the noise in single torque samples, per joint [N m]. Without it the
         noise is proportional to the torque limits and its size is taken from the residuals.
@@ -54,13 +54,13 @@ class OnlineSettings:
         """Raise an error unless the time between false alarms is positive."""
         if self.false_alarm_time is not None and not self.false_alarm_time > 0.0:
             raise IdentificationError(
-                f'the time between false alarms is {self.false_alarm_time} s, but has to be above '
-                '0'
+                f'false_alarm_time is {self.false_alarm_time} s, but has to be above 0; None '
+                'switches the detection of changes off'
             )
 
     def rows_per_second(self) -> float:
         """
-        Return the rate of the rows [1/s].
+        Return the number of samples per second that the estimator uses.
 
         Raises
         ------
@@ -73,8 +73,8 @@ class OnlineSettings:
         rate = 40.0 * self.cutoff if self.row_rate is None else self.row_rate
         if not (np.isfinite(rate) and rate >= 2.0 * self.cutoff):
             raise IdentificationError(
-                f'{rate} rows per second are too few: a cut-off frequency of {self.cutoff:g} Hz '
-                f'needs at least {2.0 * self.cutoff:g}'
+                f'row_rate is {rate} samples per second, but a cut-off frequency of '
+                f'{self.cutoff:g} Hz needs at least {2.0 * self.cutoff:g}'
             )
         return rate
 
@@ -82,12 +82,12 @@ class OnlineSettings:
 @dataclass(frozen=True)
 class OnlineSample:
     """
-    Measured and predicted torques of one row, and which of them the estimator used.
+    Measured and predicted joint torques of one sample, and which of them were used.
 
     Attributes
     ----------
     t : float
-        Time of the row [s]: the stamp of the newest joint state minus the delay of the filters.
+        Time of the sample [s]: the stamp of the newest joint state minus the delay of the filters.
     measured : ndarray, shape (n,)
         Filtered measured torque [N m].
     predicted : ndarray, shape (n,)
