@@ -303,9 +303,9 @@ def checked_model(text: str) -> dict[str, Any]:
         )
     _require(document, _NEEDED, 'a model')
     for place, row, units in _rows(document, text):
-        key, fault = _fault(row, units)
-        if fault:
-            raise ModelError(f'line {yaml_line(text, (*place, key))}: {fault}')
+        key, problem = _problem(row, units)
+        if problem:
+            raise ModelError(f'line {yaml_line(text, (*place, key))}: {problem}')
     return document
 
 
@@ -336,7 +336,7 @@ def _rows(
                 yield ('effects', k, part, place), row, units.get(_name(row), ())
 
 
-def _fault(row: Any, units: tuple[str, ...]) -> tuple[str, str]:
+def _problem(row: Any, units: tuple[str, ...]) -> tuple[str, str]:
     """Return the key and the error message of an invalid parameter; empty if it is valid."""
     if not isinstance(row, dict):
         keys = ', '.join(_KEYS_OF_PARAMETER)

@@ -159,5 +159,6 @@ def mended(
         whole.append(sound)
         notes += [f'{x.source}: {x.report.describe()}' for x in part if not x.report.unharmed]
         notes += repairs
-    notes += filter(None, [given_twice([*recordings, *baseline], validate)])
+    if again := given_twice([*recordings, *baseline], validate):
+        notes += [f'recordings are given twice, or in two roles: {again}']
     return whole[0], whole[1], whole[2], notes

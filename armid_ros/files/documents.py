@@ -73,7 +73,7 @@ def reading(path: str | Path, error: type[ArmidError]) -> Iterator[None]:
             raise
         raise error(f'{path}: {problem}') from problem
     except _UNEXPECTED as problem:
-        raise error(f'{path}: {_one_line(problem)}') from problem
+        raise error(f'{path}: {_error_message(problem)}') from problem
 
 
 def finite(value: Any, quantity: str) -> float:
@@ -168,7 +168,7 @@ def _line(event: yaml.Event) -> int:
     return 0 if event.start_mark is None else int(event.start_mark.line) + 1
 
 
-def _one_line(problem: BaseException) -> str:
+def _error_message(problem: BaseException) -> str:
     """Return the message of a parser's error in one line."""
     if isinstance(problem, RecursionError):
         return 'the document is nested too deep'

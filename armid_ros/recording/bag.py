@@ -131,12 +131,11 @@ class Bag(Source):
         ]
         if len(found) == 1:
             return found[0]
-        number = 'several topics' if found else 'no topic'
-        name = f' with the name {wanted}' if wanted else ''
+        called = f' and name {wanted}' if wanted else ''
         damage = f' ({self.damage})' if self.damage else ''
         raise RecordingError(
-            f'{self.path}: the bag has {number} of type {type_name}{name}; its topics are '
-            f'{listed(topics)}{damage}'
+            f'{self.path}: the bag has {len(found)} topics of type {type_name}{called}, but one '
+            f'is needed; its topics are {listed(topics)}{damage}'
         )
 
     def blocks(self, topic: str) -> Iterator[MessageBlock]:

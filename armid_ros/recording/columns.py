@@ -100,7 +100,7 @@ class ColumnSettings:
 
 
 def renamed(name: str, rules: Rules) -> str:
-    """Return a joint name with the rule applied that matches it, or matches its beginning."""
+    """Replace the name of a joint, or the beginning of it, by the first rule that matches."""
     for old, new in sorted(rules, key=lambda rule: rule[0] != name):
         if name.startswith(old):
             return new + name[len(old) :]
@@ -117,7 +117,7 @@ def name_in_file(name: str, rules: Rules) -> str:
 
 
 def renaming(joints: Sequence[str], names: Sequence[str]) -> str:
-    """Return a rule OLD:NEW that turns names in a file into all joint names; '' if none does."""
+    """Return a rule OLD:NEW from names in a file to those of all joints; '' if none fits."""
     ends = [(name[:end], name[end:]) for name in names for end in range(len(name))]
     # first try rules that replace complete words of a name
     for old, rest in sorted(ends, key=lambda end: not end[0].endswith(('_', '/'))):
@@ -180,25 +180,26 @@ def refuse_columns(path: str | Path, settings: ColumnSettings, *, copied: bool =
         either.
 
     """
-    reasons = dict.fromkeys(
-        _TABLE_SETTINGS,
-        'is for tables, and this is a bag; leave it out, or make a bag of the tables with armid '
-        'convert',
-    )
-    if copied:
-        reason = 'has no effect on a copied bag; give it to the command that reads the bag'
-        reasons |= dict.fromkeys(_NOT_COPIED, reason)
-    for name, reason in reasons.items():
-        if getattr(settings, name) != getattr(ColumnSettings, name):  # unchanged default
-            option = _OPTIONS.get(name, f'--{name.replace("_", "-")}')
-            raise RecordingError(f'{path}: {option} {reason}')
+    for name in (*_TABLE_SETTINGS, *(_NOT_COPIED if copied else ())):
+        if getattr(settings, name) == getattr(ColumnSettings, name):  # unchanged default
+            continue
+        option = _OPTIONS.get(name, f'--{name.replace("_", "-")}')
+        if name in _TABLE_SETTINGS:
+            raise RecordingError(
+                f'{path}: {option} applies to tables, and this is a bag; remove the option, or '
+                'convert the tables to a bag with armid convert'
+            )
+        raise RecordingError(
+            f'{path}: {option} has no effect on a copied bag; give it to the command that reads '
+            'the bag'
+        )
 
 
 def in_si(
     recording: Recording, settings: ColumnSettings, slides: Collection[bool] | None = None
 ) -> Recording:
     """
-    Return a recording converted to SI units and to the joint side of gears.
+    Return a recording converted to SI units, and from the motor side to the joint side.
 
     Parameters
     ----------

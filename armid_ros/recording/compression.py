@@ -74,7 +74,7 @@ def decompressed(stored: _Buffer, compression: str, size: int, settings: ReadSet
 
 
 class _Zstd(threading.local):
-    """Decompressor of each thread, since its construction takes as long as decompressing 20 kB."""
+    """One zstd decompressor per thread; to make one takes as long as decompressing 20 kB."""
 
     def __init__(self) -> None:
         self.decompressor = zstandard.ZstdDecompressor()

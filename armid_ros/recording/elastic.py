@@ -30,7 +30,7 @@ _ACCELERATION = slice(25, 28)
 
 def write_runs(path: str | Path, runs: Sequence[ElasticRun], robot: Robot) -> None:
     """
-    Write experiments with accelerometer readings to one bag, with a pause of 1 s between them.
+    Write experiments with an elastic arm to one bag, with a pause of 1 s between them.
 
     Raises
     ------

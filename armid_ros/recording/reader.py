@@ -330,10 +330,9 @@ def choose_topics(bag: Bag, joints: Sequence[str] | None, wanted: str | None) ->
     if not complete and set(joints) <= set(between) and len(between) == len(set(between)):
         return parts
     listed = '; '.join(f'{name} has {", ".join(n) or "none"}' for name, n in names.items())
-    number = 'several topics have' if complete else 'no topic has'
     raise RecordingError(
-        f'{bag.path}: {number} all joints {", ".join(joints)}; choose a topic to read with '
-        f'--topic: {listed}'
+        f'{bag.path}: {len(complete)} topics have all of the joints {", ".join(joints)}, but one '
+        f'is needed; choose a topic to read with --topic: {listed}'
     )
 
 

@@ -413,7 +413,7 @@ def recorded_together(
 
 def given_twice(fitted: Sequence[Recording], held_out: Sequence[Recording] = ()) -> str:
     """
-    Return a message that names recordings given more than once; empty if there are none.
+    Return the names of recordings that are given more than once; empty if there are none.
 
     A recording given twice would have twice the weight, and a fitted recording cannot be held
     out. Recordings are equal if their positions and torques are equal, since two simulated runs
@@ -442,11 +442,13 @@ def given_twice(fitted: Sequence[Recording], held_out: Sequence[Recording] = ())
         for b in fitted[:k]
         if same(a, b)
     ]
-    return f'recordings are given twice: {", ".join(dict.fromkeys(again))}' if again else ''
+    return ', '.join(dict.fromkeys(again))
 
 
 def require_once(fitted: Sequence[Recording], held_out: Sequence[Recording] = ()) -> None:
     """Raise RecordingError if a recording is given more than once."""
-    repeated = given_twice(fitted, held_out)
-    if repeated:
-        raise RecordingError(f'{repeated}; give each recording once')
+    names = given_twice(fitted, held_out)
+    if names:
+        raise RecordingError(
+            f'recordings are given twice, or in two roles: {names}; give each recording once'
+        )

@@ -368,13 +368,13 @@ def assemble(
     for states in gathered if clock == 'receive' else ():
         if states.receive is None:
             raise RecordingError(
-                f'{where}: {note}; choose another column of time with --time, or give the '
-                'sampling rate with --rate'
+                f'{where}: the time cannot be used, as {note}; choose another column of time with '
+                '--time, or give the sampling rate with --rate'
             )
         problem = clock_problem(states.receive, states.values[0])
         if problem:
             raise RecordingError(
-                f'{where}: the messages have no usable time: {note}, and the times of reception '
+                f'{where}: the messages have no usable time, as {note} and times of reception '
                 f'{problem}; record again'
             )
     series = merged([ordered(states, clock, counts) for states in gathered], joints, counts)

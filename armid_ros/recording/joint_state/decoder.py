@@ -214,7 +214,7 @@ class JointStateDecoder:
 
 @dataclass(frozen=True)
 class _Plan:
-    """Columns of the requested joints, and of other joints by name, in messages of one layout."""
+    """Positions of requested joints, and of other joints by name, in the arrays of a message."""
 
     layout: JointStateLayout
     dtype: np.dtype[np.void]

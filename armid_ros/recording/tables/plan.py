@@ -322,7 +322,7 @@ def _time_unit(table: Table, column: TableColumn, given: str | None) -> str:
 
 def converted(plan: TablePlan) -> Recording:
     """
-    Return the recording in a table, by the columns and units of a plan.
+    Convert a table to a recording, by the columns and units of a plan.
 
     Raises
     ------
@@ -391,7 +391,7 @@ def _temperatures(
 
 
 def _times(plan: TablePlan) -> tuple[FloatArray, int]:
-    """Return the time of each row [s] after a stamp, and this stamp [ns], 1 s if it is unknown."""
+    """Return row times [s] from a reference stamp, and this stamp [ns], 1 s if it is unknown."""
     if plan.time is None:
         assert plan.rate_hz is not None
         return np.arange(len(plan.table)) / plan.rate_hz, 10**9
