@@ -172,7 +172,7 @@ def judge(
     kinds: Sequence[tuple[Sequence[ParameterHistory], Mapping[tuple[str, str], Spread]]],
 ) -> list[Judged]:
     """
-    Test the histories of all arms for changes.
+    Test the parameters of all arms for steps and trends over time.
 
     Parameters
     ----------
@@ -262,7 +262,7 @@ def without_days(series: Sequence[ParameterHistory]) -> list[ParameterHistory]:
 
 
 def _largest_change(series: ParameterHistory, spread: Spread) -> HistoryChange:
-    """Return the trend of a series if it explains the series as well, else its largest step."""
+    """Return the largest step of a series, or the trend if it explains the series as well."""
     split, count = _splits(series, spread), len(series.values)
     scores, trend = split.scores / spread.steps, split.trend / spread.trends
     best = int(np.argmax(scores))
@@ -277,13 +277,13 @@ def _largest_change(series: ParameterHistory, spread: Spread) -> HistoryChange:
 
 
 def _p(score: float, freedom: float, tried: int) -> float:
-    """Return the p-value of a score in standard deviations, the largest of several scores."""
+    """Return the p-value of the largest of several scores, in standard deviations."""
     # lower bound of the p-value, which underflows for larger scores
     return min(1.0, tried * max(float(tail(score**2, 1, freedom)), 1e-300))
 
 
 class _Splits(NamedTuple):
-    """Means before and after each possible step of a series, and its straight line."""
+    """Means of a series before and after each possible step, and a straight line through it."""
 
     low: FloatArray  # (K - 1,)
     high: FloatArray
@@ -297,7 +297,7 @@ class _Splits(NamedTuple):
 
 
 def _splits(series: ParameterHistory, spread: Spread) -> _Splits:
-    """Return possible steps and the trend of a series, in standard deviations of its scatter."""
+    """Return each possible step of a series and its trend, in standard deviations."""
     variance, freedom = _variances(series, spread)
     std = np.sqrt(variance)
     # outliers are clipped to three standard deviations around the median of five bags
@@ -316,7 +316,7 @@ def _splits(series: ParameterHistory, spread: Spread) -> _Splits:
 def _by_parameter(
     series: Sequence[ParameterHistory],
 ) -> dict[tuple[str, str], list[ParameterHistory]]:
-    """Return the series of all arms of each parameter, by name and joint."""
+    """Return the series of all arms grouped by parameter, a name and a joint."""
     groups: dict[tuple[str, str], list[ParameterHistory]] = {}
     for one in series:
         groups.setdefault(one.parameter, []).append(one)
@@ -324,7 +324,8 @@ def _by_parameter(
 
 
 def _spread(group: Sequence[ParameterHistory]) -> Spread:
-    """Return the scatter t between bags, from median(d^2 / (s_k^2 + s_k+1^2 + 2 t^2)) = chi^2."""
+    """Return the scatter of a parameter between bags, from differences of successive values."""
+    # the scatter t solves median(d^2 / (s_k^2 + s_k+1^2 + 2 t^2)) = median of chi-squared
     squares = np.concatenate([np.diff(one.values) ** 2 for one in group])
     stated = np.concatenate([one.std[1:] ** 2 + one.std[:-1] ** 2 for one in group])
     # degrees of freedom of a variance from the median of n squares
@@ -371,14 +372,14 @@ def _prior_freedom(
 
 
 def _ratio(series: ParameterHistory, spread: Spread) -> float:
-    """Return the variance of a series divided by the usual variance."""
+    """Return the observed variance of a series over the variance expected from all arms."""
     stated = series.std[1:] ** 2 + series.std[:-1] ** 2 + 2.0 * spread.std**2
     squares = np.diff(series.values) ** 2 / np.maximum(stated, 1e-300)
     return max(float(np.median(squares)) / MEDIAN_SQUARE, 1e-100)
 
 
 def _freedom(bags: int) -> float:
-    """Return the degrees of freedom of a series' variance, from the median of squares."""
+    """Return the degrees of freedom of a variance that follows from a number of bags."""
     # a line through simulated series of white noise; right to 6 % from 4 to 80 bags
     return 0.8 + 0.31 * bags
 

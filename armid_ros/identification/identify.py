@@ -93,7 +93,7 @@ class IdentificationSettings:
         """Check that the method exists, and that it permits physical constraints if requested."""
         if self.method not in ESTIMATORS:
             raise IdentificationError(
-                f"no method '{self.method}'; use one of {', '.join(ESTIMATORS)}"
+                f"method '{self.method}' does not exist; use {', '.join(ESTIMATORS)}"
             )
         if self.physical is not None and self.method == 'iv':
             raise IdentificationError(
@@ -107,7 +107,7 @@ class IdentificationSettings:
 
     @property
     def holds_description(self) -> bool:
-        """Whether parameters keep their described values if the data determine them worse."""
+        """Whether the fit keeps described values that are more certain than the data."""
         return self.physical is None and self.method != 'iv'
 
 
@@ -327,7 +327,7 @@ def _fitted(
     settings: IdentificationSettings,
     rng: np.random.Generator,
 ) -> tuple[BaseParameters, FittedValues]:
-    """Fit the parameters that the data determine; return base parameters of any motion and fit."""
+    """Return the identifiable base parameters, and a fit of those that the data determine."""
     base, problem, recordings, used = data
     method, rigid = settings.least_squares, len(arm.robot.rigid_parameters)
     refitted = False

@@ -145,7 +145,7 @@ def parse_payload(text: str) -> tuple[str, str, pin.Inertia]:
 
 
 def with_payload(robot: Robot, link: str, payload: pin.Inertia) -> Robot:
-    """Return the robot model whose link carries a payload; raise an error for no such link."""
+    """Return the robot model whose link carries a payload; raise an error for an unknown link."""
     frames = {f.name: f for f in robot.model.frames if f.type == pin.FrameType.BODY}
     frame = frames.get(link)
     if frame is None or frame.parentJoint == 0:

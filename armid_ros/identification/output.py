@@ -153,13 +153,14 @@ def with_contents(document: Mapping[str, Any]) -> dict[str, Any]:
 
 def identified_from(path: str | Path) -> tuple[Path, ...]:
     """
-    Return the existing recordings of an identification, held-out recordings included.
+    Return the paths of the recordings that a model was identified from, if they exist.
 
     Parameters
     ----------
     path : str or Path
-        Path of model.yaml; the identification.json in its folder names the recordings. Relative
-        paths start in the working directory, in that folder, or in the parent of that folder.
+        Path of model.yaml; the identification.json in its folder names the recordings, held-out
+        recordings too. Relative paths start in the working directory, in that folder, or in its
+        parent.
 
     Raises
     ------

@@ -362,7 +362,7 @@ def _covariance(rows: list[list[float]] | None, size: int) -> FloatArray | None:
     if rows is None:
         return None
     if [len(row) for row in rows] != list(range(1, size + 1)):
-        raise ValueError(f'the covariance has to be a lower triangle with {size} rows')
+        raise ValueError(f"the key 'covariance' has to be a lower triangle with {size} rows")
     matrix = np.zeros((size, size))
     for index, row in enumerate(rows):
         matrix[index, : index + 1] = matrix[: index + 1, index] = row

@@ -25,7 +25,7 @@ MIN_RESIDUAL_SHARE = 0.1
 
 
 def sandwich(bread: FloatArray, middle: FloatArray) -> FloatArray:
-    """Return B M B' for bread B and middle M, made positive semi-definite, shape (p, p)."""
+    """Return the sandwich covariance B M B' of bread B and middle M, positive semi-definite."""
     covariance = bread @ middle @ bread.T
     std = np.sqrt(np.maximum(np.abs(np.diag(covariance)), 1e-300))
     sizes, axes = np.linalg.eigh(covariance / np.outer(std, std))
@@ -62,7 +62,7 @@ def score_products(scores: Sequence[FloatArray], lags: int) -> FloatArray:
 
 
 def widened(covariance: FloatArray, bread: FloatArray, middle: FloatArray) -> FloatArray:
-    """Return a covariance, (p, p), with variances not below those of the sandwich B M B'."""
+    """Return a covariance whose variances are raised to those of the sandwich B M B' if larger."""
     ratio = np.diag(bread @ middle @ bread) / np.diag(covariance)
     factor = np.sqrt(np.maximum(ratio, 1.0))
     return np.asarray(covariance * np.outer(factor, factor))

@@ -140,7 +140,7 @@ def determined(
     arm: ArmModel, base: BaseParameters, problem: Sequence[Regression], method: Method
 ) -> tuple[BaseParameters, tuple[Regression, ...], Solution]:
     """
-    Fit base parameters, and fix those at described values that the data determine worse.
+    Fit base parameters, but keep the described value of those that the data determine worse.
 
     Parameters are fixed one at a time, as each fixed parameter makes the others more certain.
 

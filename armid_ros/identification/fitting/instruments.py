@@ -116,8 +116,8 @@ def _by_instruments(
         by_w, by_z = inverse @ inverse.T, scipy.linalg.inv(z.T @ w)
     except scipy.linalg.LinAlgError:
         raise IdentificationError(
-            'the smoothed motion does not correlate with the recorded one in every parameter: '
-            'use wls, or record a richer motion'
+            'the smoothed motion does not correlate with the recorded motion in every parameter: '
+            'use method wls, or record a richer motion'
         ) from None
     free = values = by_z @ (z.T @ target)
     if limits is not None:
@@ -156,7 +156,7 @@ def _smoothed(recordings: Sequence[Recording], used: Conditioning) -> list[Recor
 @dataclass(frozen=True)
 class NoiseCheck:
     """
-    Test whether encoder noise biases an identification, and size of this bias.
+    Result of the test whether encoder noise biases an identification, and size of the bias.
 
     Attributes
     ----------
@@ -196,7 +196,7 @@ class NoiseCheck:
 
     @property
     def relative_bias(self) -> FloatArray:
-        """Bias of each parameter, in its standard deviations, shape (r,)."""
+        """Bias of each parameter over its standard deviation, shape (r,)."""
         return np.asarray(self.bias / np.where(self.std > 0.0, self.std, np.inf))
 
     @property

@@ -50,7 +50,7 @@ IN_WORDS: dict[Estimator, str] = {
 @dataclass(frozen=True)
 class Solution:
     """
-    Result of a least-squares fit.
+    Result of a least-squares fit: parameters with covariance, and weights of the samples.
 
     Attributes
     ----------
@@ -140,12 +140,12 @@ class NormalEquations:
         return int(self.products.shape[2]) - 1
 
     def summed(self, scale: npt.ArrayLike = 1.0) -> FloatArray:
-        """Return the sum over joints, (r + 1, r + 1), with the rows of each divided by a scale."""
+        """Return the sum over joints, each joint divided by a scale, shape (r + 1, r + 1)."""
         weight = np.broadcast_to(np.asarray(scale, dtype=float), self.counts.shape) ** -2.0
         return np.asarray(np.tensordot(weight, self.products, axes=1))
 
     def squares(self, values: FloatArray) -> FloatArray:
-        """Return the sum of squared residuals of each joint for values, (n,) [(N m)^2]."""
+        """Return the squared residuals of each joint for given parameters, (n,) [(N m)^2]."""
         ends = np.append(values, -1.0)
         # smaller values are rounding errors of the products
         return np.asarray(
@@ -153,26 +153,26 @@ class NormalEquations:
         )
 
     def relative_error_percent(self, values: FloatArray) -> float:
-        """Return the residual of given values over the target of all joints, 100 |r| / |y| [%]."""
+        """Return the relative error of given parameters over all joints, 100 |r| / |y| [%]."""
         whole = self.products[:, -1, -1].sum()
         return float(100.0 * np.sqrt(self.squares(values).sum() / whole))
 
     def joint_std(self, values: FloatArray) -> FloatArray:
-        """Return the standard deviation of each joint's residual for values, (n,) [N m]."""
+        """Return the standard deviation of each joint's residual for parameters, (n,) [N m]."""
         counts = np.maximum(self.counts, 1.0)
         rows = float(counts.sum())
         freedom = rows / max(1.0, rows - len(values))  # correction for degrees of freedom
         return np.asarray(np.sqrt(freedom * self.squares(values) / counts))
 
     def packed(self) -> FloatArray:
-        """Return all numbers in one array: number of joints, counts and upper triangles."""
+        """Return the normal equations as one array: number of joints, counts, upper triangles."""
         upper = np.triu_indices(self.rank + 1)
         numbers = self.products[:, upper[0], upper[1]].ravel()
         return np.concatenate([[len(self.counts)], self.counts, numbers])
 
     @classmethod
     def unpacked(cls, numbers: FloatArray) -> NormalEquations:
-        """Return normal equations from the numbers of `packed`."""
+        """Return the normal equations from an array of `packed`."""
         joints = int(numbers[0])
         triangles = numbers[1 + joints :].reshape(joints, -1)
         size = int(np.sqrt(2 * triangles.shape[1]))
@@ -305,7 +305,7 @@ def _positive(scale: FloatArray) -> FloatArray:
 
 def factored(products: FloatArray) -> tuple[FloatArray, FloatArray]:
     """
-    Return a factor F of products = F' F, shape (p, p), and its inverse.
+    Return a square root F of products of columns, F' F, and the inverse of F, each (p, p).
 
     Eigenvalues below the rounding error are raised to the rounding error.
 

@@ -223,7 +223,7 @@ def torques(arm: ArmModel, recordings: Sequence[Recording], used: Conditioning) 
 def exact_at(
     problem: Sequence[Regression], predicted: Torques, values: FloatArray
 ) -> tuple[Regression, ...]:
-    """Return linear problems with constants for which given values predict given torques."""
+    """Return linear problems whose constants make given parameters predict given torques."""
     return tuple(
         replace(part, constant=torque - part.columns @ values)
         for part, torque in zip(problem, predicted, strict=True)
@@ -325,7 +325,7 @@ class _State:
         return self.cost() - self.cost(predicted)
 
     def damped(self, damping: float, limits: tuple[FloatArray, FloatArray]) -> FloatArray:
-        """Return the values after a Levenberg-Marquardt step, within limits."""
+        """Return the parameters after a Levenberg-Marquardt step, within limits."""
         w, _ = weighted_rows(self.problem, self._weights)
         size = np.linalg.norm(w, axis=0)
         scaled = w / np.where(size > 0.0, size, 1.0)
@@ -334,7 +334,7 @@ class _State:
         return np.clip(self.values + step / np.where(size > 0.0, size, np.inf), *limits)
 
     def cost(self, predicted: Torques | None = None) -> float:
-        """Return the sum of squared residuals of predicted torques over the present rms errors."""
+        """Return the sum of squared residuals, in units of the present rms error of each joint."""
         if predicted is None:
             return float(np.sum((self._weights * self._residual) ** 2))
         residual = self._weights * (self._tau - np.concatenate(predicted))

@@ -128,7 +128,7 @@ class PhysicalCertificate:
 
     @property
     def held_out_ratio(self) -> float:
-        """Torque error on held-out blocks with the chosen weight, over that of free fits."""
+        """Torque error on held-out blocks, over that of unconstrained fits."""
         return dict(self.tried)[self.weight]
 
     @property

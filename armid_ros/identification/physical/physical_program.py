@@ -147,7 +147,7 @@ class PhysicalProgram:
 
     @cached_property
     def _whitened_links(self) -> FloatArray:
-        """Linear map from symmetric matrices to inertial parameters, (10 n, 10 n)."""
+        """Linear map from matrices, where the prior is the identity, to inertial parameters."""
         blocks = []
         for link in range(self.n_links):
             values = self.prior[PER_LINK * link : PER_LINK * (link + 1)]
@@ -171,7 +171,7 @@ class PhysicalProgram:
         rigid = len(self.prior) - len(self.lower)
 
         def linear(cone: Any, normal: FloatArray, offset: FloatArray) -> None:
-            """Add the constraint that normal @ theta + offset is in a cone of that dimension."""
+            """Add the constraint that the vector normal @ theta + offset is inside a cone."""
             if len(normal):
                 side = sparse.vstack([empty] * len(normal))
                 blocks.append(sparse.hstack([-sparse.csr_matrix(normal @ change), side]))

@@ -67,7 +67,7 @@ class TripleLag:
 
     @property
     def delay(self) -> float:
-        """Delay of slow signals [s]."""
+        """Delay of slow signals by the filter [s]."""
         return 3.0 / self.pole
 
     def reset(self) -> None:
@@ -329,7 +329,7 @@ class CausalFilter:
 @dataclass(frozen=True)
 class RowNoise:
     """
-    Noise of rows after the filters, relative to the white noise of samples.
+    Noise of filtered torques (rows of the regression), relative to the noise of samples.
 
     Noise of samples, of standard deviation s and density s^2 T, has the variance s^2 T B after a
     filter H. The noise bandwidth B of the filter is the integral of |H|^2 over all frequencies.
@@ -364,7 +364,7 @@ class RowNoise:
         return cls(bandwidth, gain, gain / (period * row_pole * float(np.max(response))))
 
     def independent(self, step: float) -> float:
-        """Return the number of independent observations in a row, `step` s after the last row."""
+        """Return how many independent observations a row holds, `step` s after the last row."""
         return min(1.0, self.bandwidth * step)
 
 

@@ -151,8 +151,9 @@ def check_torque(
     if driven:
         raise IdentificationError(f'{source}: {driven}')
     for part in problem:
+        bag = part.source or 'recording'
         for fault in laws_of_controllers(robot, part.motion, part.informative):
-            raise IdentificationError(f'{part.source or "recording"}: {fault}')
+            raise IdentificationError(f'{bag}: {fault}')
     if silent:
         return (f'torque constant throughout: {", ".join(silent)}',)
     return ()
@@ -306,7 +307,7 @@ def beyond_limits(robot: Robot, recordings: Sequence[Recording]) -> tuple[str, .
 
 def torque_factors(arm: ArmModel, motions: Sequence[Motion]) -> tuple[FloatArray, FloatArray]:
     """
-    Return the factor between measured torques and those of a model, joint by joint.
+    Return ratio and correlation of the measured and the modelled torque of each joint.
 
     An offset is fitted too, and friction if the model has no effects. With effects, only samples
     in motion are used, as friction holds a joint at rest with any torque.

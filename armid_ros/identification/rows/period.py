@@ -66,7 +66,7 @@ def find_period(t: FloatArray, positions: FloatArray) -> tuple[int, slice] | Non
 
 
 def refined_period(positions: FloatArray, lag: int, where: slice) -> float:
-    """Return the period at the minimum of a parabola through three lags around it [samples]."""
+    """Return a period to a fraction of a sample, by a parabola through three lags [samples]."""
     before, least, after = (_mean_change(positions, lag + shift, where) for shift in (-1, 0, 1))
     bend = before - 2.0 * least + after
     return lag + float(0.5 * (before - after) / bend) if 0.0 < bend < np.inf else float(lag)

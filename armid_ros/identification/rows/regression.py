@@ -98,7 +98,7 @@ class Regression(Stretch):
         return np.asarray(self.target - self.columns @ values)
 
     def restrict(self, columns: Sequence[int] | npt.NDArray[np.intp]) -> Regression:
-        """Return the problem with the columns of given indices; not copied if all in order."""
+        """Return the problem with only the columns of given indices."""
         if np.array_equal(columns, np.arange(self.columns.shape[2])):
             return self
         return replace(self, columns=self.columns[:, :, columns])

@@ -299,7 +299,7 @@ def decimate(values: FloatArray, used: Conditioning, stride: int = 1) -> FloatAr
 
 
 def decimated_samples(n_samples: int, used: Conditioning) -> range:
-    """Return the indices of the samples at the full rate that decimated samples belong to."""
+    """Return the indices of the samples that remain after decimation."""
     half = (len(used.taps) - 1) // 2
     return range(half, max(half, n_samples - half), used.decimation)
 

@@ -73,7 +73,7 @@ def check_recordings(recordings: Sequence[Recording]) -> None:
 
     """
     for recording in recordings:
-        rate = 1.0 / recording.period
+        source, rate = recording.source or 'recording', 1.0 / recording.period
         if rate < 2.0:  # too slow to resolve the motion of an arm
             units = (('milliseconds', 1e3), ('microseconds', 1e6), ('nanoseconds', 1e9))
             likely = [
@@ -83,12 +83,12 @@ def check_recordings(recordings: Sequence[Recording]) -> None:
                 if 20.0 <= factor * rate <= 20_000.0  # rates at which arms are recorded [Hz]
             ]
             raise IdentificationError(
-                f'{recording.source}: {len(recording)} samples in {recording.duration:.4g} s, one '
+                f'{source}: {len(recording)} samples in {recording.duration:.4g} s, one '
                 f'every {1.0 / rate:.4g} s: too slow for a motion' + (likely[0] if likely else '')
             )
         mixed = two_senders(recording)
         if mixed:
-            raise IdentificationError(f'{recording.source or "recording"}: {mixed}')
+            raise IdentificationError(f'{source}: {mixed}')
 
 
 def two_senders(recording: Recording) -> str:

@@ -241,7 +241,7 @@ class SpikeGate:
         return latest[-1] if latest else None
 
     def _in_time(self, sample: StreamSample) -> bool:
-        """Return whether a time stamp continues the stream; two others begin a new stretch."""
+        """Return whether the stamp of a sample continues the stream or confirms a new stretch."""
         tail, stray, self._jumped = self._tail, self._jumped, None
         dt = 0.0 if tail is None else sample.t - tail.t
         longest = MAX_GAP * self._period

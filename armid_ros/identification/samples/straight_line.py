@@ -101,7 +101,7 @@ class ErrorModel:
     quantile: float
 
     def growth(self, noise: Factor, acceleration: Factor) -> FloatArray:
-        """Return the growth of errors, (m,) or (N, m), from their growth by either cause."""
+        """Return the growth of errors by both causes together, shape (m,) or (N, m)."""
         squares = acceleration**2
         return np.asarray(np.sqrt(squares + self.white * (noise**2 - squares)))
 
@@ -149,7 +149,7 @@ class Innovation(NamedTuple):
 
 
 def growth_over(step: Time, ahead: Time, period: float) -> tuple[Time, Time]:
-    """Return factors of errors by noise and by acceleration for prediction over times [s]."""
+    """Return the growth of errors, by noise and by acceleration, with the time ahead [s]."""
     ratio = ahead / step
     noise: Time = ((1.0 + (1.0 + ratio) ** 2 + ratio**2) / 6.0) ** 0.5
     return noise, 0.5 * ahead * (ahead + step) / period**2

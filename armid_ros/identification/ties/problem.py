@@ -202,7 +202,7 @@ def interaction_problem(
         columns_by = np.concatenate([springs_by, body_by], axis=2)
         spread = base.grouping * robot.described_spread.ravel()
     tau, alone = motion.tau, np.zeros(springs.shape[2])  # springs have no prior
-    motion_lags, torque_lags = _passed(used)
+    motion_lags, torque_lags = _filtered_noise(used)
     if used is not None:
         tau, known, columns = (decimate(values, used) for values in (tau, known, columns))
     deviation = np.broadcast_to(np.asarray(noise[0], dtype=float), (count,))
@@ -247,8 +247,8 @@ def _free_inertias(
     return body[:, :, base.independent], base
 
 
-def _passed(used: Conditioning | None) -> tuple[FloatArray, FloatArray]:
-    """Return covariances over lags of filtered white noise: of the motion, and of torques."""
+def _filtered_noise(used: Conditioning | None) -> tuple[FloatArray, FloatArray]:
+    """Return the covariances of filtered noise between samples: of the motion, and of torques."""
     # number of samples over which errors are correlated after filtering
     n_lags = 6
     # Covariances of position, velocity, acceleration of a sample with itself and with later

@@ -131,8 +131,8 @@ def together_interaction_problem(
         )
     if not problems:
         raise IdentificationError(
-            f'{recording.source}: no stretch is long enough for a filter of '
-            f'{used.cutoff_hz:.3g} Hz'
+            f'{recording.source}: no stretch without a gap is long enough for a filter of '
+            f'{used.cutoff_hz:.3g} Hz; record longer'
         )
     return stacked(problems)
 
@@ -148,7 +148,7 @@ def stacked(problems: Sequence[InteractionProblem]) -> InteractionProblem:
 
     """
     if any(part.rigid != problems[0].rigid for part in problems):
-        raise IdentificationError('a stretch between two gaps moves too little for free inertias')
+        raise IdentificationError('a stretch between gaps has too little motion for free inertias')
     joined = {name: np.concatenate([getattr(part, name) for part in problems]) for name in STACKED}
     return replace(problems[0], **joined)  # type: ignore[arg-type]
 
