@@ -211,7 +211,7 @@ class Effect(ABC):
         return np.full(len(self.parameters(robot)), np.inf)
 
     def shape_parameters(self, robot: Robot) -> tuple[ParameterName, ...]:
-        """Return the names of the shape parameters, owner by owner."""
+        """Return the names of the shape parameters of the effect, joint by joint."""
         return tuple(
             ParameterName(s.name, owner, joint_unit(s.unit, owner, robot))
             for owner in self.owners
@@ -238,7 +238,7 @@ class Effect(ABC):
         return self.joints or ('',)
 
     def parameters(self, robot: Robot) -> tuple[ParameterName, ...]:
-        """Return the names of the P parameters, owner by owner."""
+        """Return the names of the P parameters of the effect, joint by joint."""
         return tuple(
             ParameterName(q.name, owner, joint_unit(q.unit, owner, robot), self.name)
             for owner in self.owners

@@ -32,11 +32,11 @@ class RotorInertia(Effect):
     quantities = (Quantity('rotor_inertia', 'kg m^2', lower=0.0, typical=(0.001, 1.1)),)
 
     def columns(self, motion: Motion, arm: Arm) -> FloatArray:
-        """Return dtau/dIa = ddq [rad/s^2], shape (N, n, P)."""
+        """Return the torque per rotor inertia, dtau/dIa = ddq [rad/s^2], shape (N, n, P)."""
         return joint_columns(self, motion, motion.ddq)
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
-        """Return the action on the plant: rotor inertias on the diagonal of the inertia matrix."""
+        """Return rotor inertias as a diagonal inertia matrix that is added to the plant."""
         (inertia,) = scatter(self, values, arm.robot)
         return Action(inertia=np.diag(inertia))
 
@@ -93,7 +93,7 @@ class TorqueRipple(JointLaw):
         return bool(np.all(self.shape_values > 1.05 * _MIN_RIPPLE_ORDER))
 
     def law(self, x: JointStates) -> tuple[FloatArray, ...]:
-        """Return the torque per unit of amplitude, sin(n q) and cos(n q) [-]."""
+        """Return the ripple torque per unit of amplitude, sin(n q) and cos(n q) [-]."""
         angle = self.shape_values[:, 0] * x.q
         return np.sin(angle), np.cos(angle)
 
@@ -187,14 +187,14 @@ class ActuatorSaturation(TorqueReading):
         return np.where(known, 0.8 * limits, self.shape_values)
 
     def shape_starts(self, unexplained: Unexplained, arm: Arm) -> tuple[FloatArray, ...]:
-        """Return start levels as shares of the highest measured torque."""
+        """Return start values of the saturation level: shares of the highest torque."""
         motion = unexplained.motion
         tau = arm.joint_torque(motion) if motion.tau is None else motion.tau
         highest = np.maximum(np.max(np.abs(tau[:, self.indices(motion.joints)]), axis=0), 1e-3)
         return (np.outer(highest, [0.3, 0.4, *np.linspace(0.5, 0.95, 10)]),)
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
-        """Return the action on the drives: lost torque, and torque that is not reported."""
+        """Return the torque that saturated drives lose, and the torque that they hide."""
         lost = scatter(self, values, arm.robot)[0]
         (level,) = scatter(self, self.shape_values, arm.robot)
 
@@ -205,7 +205,7 @@ class ActuatorSaturation(TorqueReading):
         return Action(drive=drive if np.any(lost) else None, reading=reading.reading)
 
     def read(self, values: FloatArray, motion: Motion, tau: FloatArray) -> FloatArray:
-        """Return the reported torque, shape (N, n) [N m]."""
+        """Return the torque that saturated drives report, shape (N, n) [N m]."""
         lost, clipped, level = self._spread(values, motion)
         hidden = clipped * _beyond(tau, level)
         if motion.tau is None:
@@ -215,20 +215,20 @@ class ActuatorSaturation(TorqueReading):
     def transfer(
         self, values: FloatArray, motion: Motion, tau: FloatArray, columns: FloatArray
     ) -> FloatArray:
-        """Return regressor columns of true torque as readings: scaled beyond the level."""
+        """Return regressor columns of true torque as reported by saturated drives."""
         lost, clipped, level = self._spread(values, motion)
         slope = (lost / (1.0 - lost) if motion.tau is None else 0.0) - clipped
         return np.asarray((1.0 + slope * (np.abs(tau) > level))[:, :, np.newaxis] * columns)
 
     def sensitivity(self, values: FloatArray, motion: Motion, tau: FloatArray) -> FloatArray:
-        """Return the derivative of the reported torque by both shares, shape (N, n, P) [N m]."""
+        """Return the derivatives of the reported torque by both shares, shape (N, n, P)."""
         lost, _, level = self._spread(values, motion)
         beyond = _beyond(tau, level)
         asked = beyond / (1.0 - lost) ** 2 if motion.tau is None else _beyond(motion.tau, level)
         return joint_columns(self, motion, asked, -beyond)
 
     def _spread(self, values: FloatArray, motion: Motion) -> tuple[FloatArray, ...]:
-        """Return shares and level with a value for every joint of a motion, each of shape (n,)."""
+        """Return lost share, clipped share and saturation level of each joint, shape (n,)."""
         spread = np.zeros((3, motion.n_joints))
         spread[2] = np.inf
         columns = self.indices(motion.joints)

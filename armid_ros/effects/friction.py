@@ -35,11 +35,11 @@ class ViscousFriction(Effect):
     quantities = (Quantity('viscous_coefficient', 'N m s/rad', lower=0.0, typical=(0.004, 10.0)),)
 
     def columns(self, motion: Motion, arm: Arm) -> FloatArray:
-        """Return dtau/dFv = dq [rad/s], shape (N, n, P)."""
+        """Return the viscous torque per coefficient, dtau/dFv = dq [rad/s], shape (N, n, P)."""
         return joint_columns(self, motion, motion.dq)
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
-        """Return the action on the plant: a damping matrix."""
+        """Return viscous friction as a damping matrix of the plant."""
         (viscous,) = scatter(self, values, arm.robot)
         return Action(damping=np.diag(viscous))
 
@@ -61,11 +61,11 @@ class CoulombFriction(Effect):
     holds_at_rest = True
 
     def columns(self, motion: Motion, arm: Arm) -> FloatArray:
-        """Return dtau/dFc = sign(dq) [-], shape (N, n, P)."""
+        """Return the Coulomb torque per unit of Fc, sign(dq) [-], shape (N, n, P)."""
         return joint_columns(self, motion, direction(motion))
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
-        """Return the action on the plant: dry friction between -Fc and Fc."""
+        """Return Coulomb friction as dry friction of the plant, between -Fc and Fc."""
         (coulomb,) = scatter(self, values, arm.robot)
         return Action(dry_friction=DryFriction(np.eye(len(coulomb)), -coulomb, coulomb))
 
@@ -99,7 +99,7 @@ class AsymmetricFriction(JointLaw):
         return bool(np.all(shift <= known + MIN_Z_SCORE * doubt))
 
     def law(self, x: JointStates) -> tuple[FloatArray, ...]:
-        """Return the torque per unit of dFc and dFv, |sign(dq)| and |dq|."""
+        """Return the asymmetric friction per unit of dFc and dFv, |sign(dq)| and |dq|."""
         return x.forwards**2, x.forwards * x.dq
 
 
@@ -121,7 +121,7 @@ class QuadraticFriction(JointLaw):
     quantities = (Quantity('quadratic_coefficient', 'N m s^2/rad^2', typical=(0.0004, 1.0)),)
 
     def law(self, x: JointStates) -> tuple[FloatArray, ...]:
-        """Return the torque per unit of Fq, dq |dq| [rad^2/s^2]."""
+        """Return the quadratic friction per unit of Fq, dq |dq| [rad^2/s^2]."""
         return (x.dq * np.abs(x.dq),)
 
 
@@ -148,7 +148,7 @@ class StribeckFriction(JointLaw):
     holds_at_rest = True
 
     def law(self, x: JointStates) -> tuple[FloatArray, ...]:
-        """Return the torque per unit of dFs, exp(-|dq / vs|^d) sign(dq) [-]."""
+        """Return the Stribeck friction per unit of dFs, exp(-|dq / vs|^d) sign(dq) [-]."""
         velocity, exponent = self.shape_values.T
         return (np.exp(-(np.abs(x.dq / velocity) ** exponent)) * x.forwards,)
 
@@ -175,11 +175,11 @@ class ThermalFriction(JointLaw):
 
     @classmethod
     def as_change(cls) -> type[Effect]:
-        """Return the class that also describes a change present from the beginning."""
+        """Return the effect class for changes of viscous friction since the baseline."""
         return ThermalChange
 
     def law(self, x: JointStates) -> tuple[FloatArray, ...]:
-        """Return the torque per unit of dFv, (1 - exp(-t / T)) dq [rad/s]."""
+        """Return the thermal friction per unit of dFv, (1 - exp(-t / T)) dq [rad/s]."""
         return (-np.expm1(-x.t / self.shape_values[:, 0]) * x.dq,)
 
 
@@ -196,7 +196,7 @@ class ThermalChange(ThermalFriction):
     quantities = (*ThermalFriction.quantities, replace(*ViscousFriction.quantities, lower=-np.inf))
 
     def law(self, x: JointStates) -> tuple[FloatArray, ...]:
-        """Return the torque per unit of dFv and c, (1 - exp(-t / T)) dq and dq [rad/s]."""
+        """Return the friction change per unit of dFv and c, (1 - exp(-t / T)) dq and dq."""
         return *super().law(x), x.dq
 
     def named_as(self, values: FloatArray, arm: Arm) -> tuple[tuple[Effect, FloatArray], ...]:
@@ -241,13 +241,13 @@ class TemperatureDependentFriction(Effect):
     lasting = True
 
     def __post_init__(self) -> None:
-        """Set the default reference temperature of joints that have none."""
+        """Set the reference temperature of joints without one to its default."""
         super().__post_init__()
         known = dict.fromkeys(self.joints, _REFERENCE_TEMPERATURE) | dict(self.reference)
         object.__setattr__(self, 'reference', tuple(known.items()))
 
     def along(self, motion: Motion) -> Self:
-        """Return the effect with the temperatures that were measured with a motion."""
+        """Return the effect with the joint temperatures that were measured with a motion."""
         return replace(self, course=motion.temperature) if motion.temperature else self
 
     def referred_to(self, temperatures: Mapping[str, float]) -> Self:
@@ -255,7 +255,7 @@ class TemperatureDependentFriction(Effect):
         return replace(self, reference=tuple(temperatures.items()))
 
     def particulars(self) -> dict[str, Any]:
-        """Return the reference temperature of each joint."""
+        """Return the reference temperature of each joint, for model.yaml."""
         return {'reference_temperature': self.reference_temperatures}
 
     def with_particulars(self, entry: Mapping[str, Any]) -> Self:
@@ -270,7 +270,7 @@ class TemperatureDependentFriction(Effect):
         return {joint: known[joint] for joint in self.joints}
 
     def plausible(self, values: FloatArray, std: FloatArray, arm: Arm) -> bool:
-        """Return whether viscous friction decreases, and both change by at most 5 % per K."""
+        """Return whether friction changes by 5 % per kelvin or less, and its viscous part falls."""
         action, n = arm.action(), arm.robot.n_joints
         known = np.zeros((2, n))
         if action.damping is not None:
@@ -284,12 +284,12 @@ class TemperatureDependentFriction(Effect):
         return not (steep.any() or np.any(slopes[0] > doubts[0]))
 
     def columns(self, motion: Motion, arm: Arm) -> FloatArray:
-        """Return dtau/d(a, b) = (T - T0) (dq, sign(dq)), shape (N, n, P)."""
+        """Return the friction per unit of a and b, (T - T0) (dq, sign(dq)), shape (N, n, P)."""
         warmer = self.along(motion).warmer(motion.t, motion.joints)
         return joint_columns(self, motion, warmer * motion.dq, warmer * direction(motion))
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
-        """Return the action on the plant: dry friction and the torque of changed friction."""
+        """Return temperature-dependent friction as dry friction and a torque of the plant."""
         viscous, coulomb = scatter(self, values, arm.robot)
         if self.course is None:
             return Action()

@@ -33,7 +33,7 @@ class _GravityEffect(Effect):
         return ()
 
     def __post_init__(self) -> None:
-        """Raise a ModelError if joints are given."""
+        """Raise a ModelError if joints are given, as gravity acts on the whole arm."""
         if self.joints:
             raise ModelError(f'{self.name} acts on the whole arm, not on joint {self.joints[0]}')
         super().__post_init__()
@@ -54,7 +54,7 @@ class GravityMagnitude(_GravityEffect):
     quantities = (Quantity('gravity_difference', 'm/s^2', typical=(0.05, 10.0)),)
 
     def columns(self, motion: Motion, arm: Arm) -> FloatArray:
-        """Return dtau/dg along gravity [N m per m/s^2], shape (N, n, 1)."""
+        """Return the torque per change of gravity magnitude [N m per m/s^2], shape (N, n, 1)."""
         direction = _unit(arm.robot.gravity)[:, np.newaxis]
         return np.asarray(arm.gravity_columns(motion) @ direction)
 
@@ -63,7 +63,7 @@ class GravityMagnitude(_GravityEffect):
         return bool(values[0] > -np.linalg.norm(arm.robot.gravity))
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
-        """Return the action on the plant: the robot under the changed gravity."""
+        """Return the robot under the changed magnitude of gravity, as part of the plant."""
         gravity = arm.robot.gravity
         return Action(robot=arm.robot.with_gravity(gravity + values[0] * _unit(gravity)))
 
@@ -88,7 +88,7 @@ class BaseTilt(_GravityEffect):
     linear = False
 
     def columns(self, motion: Motion, arm: Arm) -> FloatArray:
-        """Return dtau/dtilt [N m/rad], shape (N, n, 2), at the tilt of the arm model."""
+        """Return the torque per angle of base tilt [N m/rad], shape (N, n, 2)."""
         values, size = arm.values_of(self), 1e-5  # step of the differences [rad]
         turned = [
             (_turned(arm.robot.gravity, values + step) - _turned(arm.robot.gravity, values - step))
@@ -98,7 +98,7 @@ class BaseTilt(_GravityEffect):
         return np.asarray(arm.gravity_columns(motion) @ np.transpose(turned))
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
-        """Return the action on the plant: the robot with gravity as its tilted base sees it."""
+        """Return the robot with the gravity vector in the frame of its tilted base."""
         return Action(robot=arm.robot.with_gravity(_turned(arm.robot.gravity, values)))
 
 
@@ -118,15 +118,15 @@ class GravityVector(_GravityEffect):
     quantities = tuple(Quantity(f'gravity_difference_{axis}', 'm/s^2') for axis in 'xyz')
 
     def columns(self, motion: Motion, arm: Arm) -> FloatArray:
-        """Return dtau/dg along the axes of the base [N m per m/s^2], shape (N, n, 3)."""
+        """Return the torque per component of the gravity vector [N m per m/s^2], (N, n, 3)."""
         return arm.gravity_columns(motion)
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
-        """Return the action on the plant: the robot with the changed gravity vector."""
+        """Return the robot with the changed gravity vector, as part of the plant."""
         return Action(robot=arm.robot.with_gravity(arm.robot.gravity + values))
 
     def named_as(self, values: FloatArray, arm: Arm) -> tuple[tuple[Effect, FloatArray], ...]:
-        """Return the equivalent base_tilt and gravity_magnitude with their values."""
+        """Return the base tilt and gravity magnitude that describe the change of gravity."""
         before = np.array(arm.robot.gravity)
         after = before + values
         lengths = np.linalg.norm(before), np.linalg.norm(after)

@@ -33,12 +33,12 @@ class LoadDependentFriction(Effect):
     holds_at_rest = True
 
     def columns(self, motion: Motion, arm: Arm) -> FloatArray:
-        """Return dtau/dKl = |tau_load| sign(dq) [N m], shape (N, n, P)."""
+        """Return the friction per unit of Kl, |tau_load| sign(dq) [N m], shape (N, n, P)."""
         load = arm.load(arm.link_motion(motion))
         return joint_columns(self, motion, np.abs(load) * direction(motion))
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
-        """Return the action on the plant: dry friction with levels that depend on the load."""
+        """Return dry friction of the plant whose levels rise with the load."""
         (share,) = scatter(self, values, arm.robot)
         zero = np.zeros_like(share)
         return Action(dry_friction=DryFriction(np.eye(len(share)), zero, zero, share))
@@ -68,7 +68,7 @@ class PreslidingHysteresis(Effect):
     instantaneous = False
 
     def columns(self, motion: Motion, arm: Arm) -> FloatArray:
-        """Return dtau/dF = h [-], which depends on the whole motion, shape (N, n, P)."""
+        """Return the presliding friction per unit of F: the state h [-], shape (N, n, P)."""
         columns = np.zeros((*motion.q.shape, len(self.joints)))
         states = self._elements(np.ones(len(self.joints)), motion.joints).along(
             motion.q, motion.dq
@@ -78,7 +78,7 @@ class PreslidingHysteresis(Effect):
         return columns
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
-        """Return the action on the plant: friction with hysteresis."""
+        """Return presliding friction as slipping springs of the plant."""
         if not np.any(values):
             return Action()
         return Action(hysteresis=self._elements(values, arm.robot.joints))

@@ -72,7 +72,7 @@ class Attached(Effect):
         """Return the function that gives the anchors of the springs at times."""
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
-        """Return the action on the links: the torque of the springs."""
+        """Return the joint torques of attached springs, as an action on the links."""
         robot, anchor = arm.robot, self._anchor(arm)
 
         def torque(t: FloatArray, q: FloatArray, dq: FloatArray) -> FloatArray:

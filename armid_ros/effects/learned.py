@@ -69,7 +69,7 @@ class TorqueMap:
     knee: float
 
     def __post_init__(self) -> None:
-        """Freeze the arrays and check them."""
+        """Freeze the arrays of the torque map, and check their shapes and signs."""
         for name in ('points', 'weights', 'noise', 'lengths'):
             object.__setattr__(self, name, read_only(getattr(self, name)))
         count = len(self.weights)
@@ -86,11 +86,11 @@ class TorqueMap:
             )
 
     def __eq__(self, other: object) -> bool:
-        """Return whether two maps have equal values."""
+        """Return whether two torque maps have equal values."""
         return isinstance(other, TorqueMap) and self._numbers == other._numbers
 
     def __hash__(self) -> int:
-        """Return a hash of all numbers of the map."""
+        """Return a hash of all numbers of the torque map."""
         return hash(self._numbers)
 
     @property
@@ -104,7 +104,7 @@ class TorqueMap:
         return bool(np.isfinite(self.lengths[2]))
 
     def given(self, torque: FloatArray) -> TorqueMap:
-        """Return the map fitted to given torques at its inducing points, shape (M,) [N m]."""
+        """Return the torque map fitted to torques at its inducing points, shape (M,) [N m]."""
         return replace(self, weights=cho_solve(self._factor, torque))
 
     def torque(self, inputs: FloatArray) -> FloatArray:
@@ -130,7 +130,7 @@ class TorqueMap:
         return np.asarray(np.exp(-0.5 * np.sum(difference**2, axis=-1)))
 
     def document(self) -> dict[str, Any]:
-        """Return the entry of the map in model.yaml, with one line per inducing point."""
+        """Return the torque map as an entry for model.yaml, with a line per inducing point."""
         rows = np.column_stack([self.points, self.weights, self.noise])
         return {
             'amplitude': float(self.amplitude),
@@ -142,7 +142,7 @@ class TorqueMap:
     @classmethod
     def of_document(cls, entry: Mapping[str, Any], joint: str) -> TorqueMap:
         """
-        Return the map of an entry in model.yaml that `document` wrote.
+        Return the torque map of an entry in model.yaml that `document` wrote.
 
         Raises
         ------
@@ -191,7 +191,7 @@ class LearnedTorque(Effect):
     learned = True
 
     def __post_init__(self) -> None:
-        """Check that each joint has a map."""
+        """Check that each joint has a torque map."""
         super().__post_init__()
         if self.maps and len(self.maps) != len(self.joints):
             raise ModelError(
@@ -205,7 +205,7 @@ class LearnedTorque(Effect):
         return {'maps': [{'joint': joint, **own.document()} for joint, own in rows]}
 
     def with_particulars(self, entry: Mapping[str, Any]) -> Self:
-        """Return the effect with the maps that an entry of model.yaml has."""
+        """Return the learned torque with the torque maps in an entry of model.yaml."""
         found = {str(row['joint']): row for row in entry.get('maps', ())}
         if not found:
             return self
@@ -232,7 +232,7 @@ class LearnedTorque(Effect):
         return joint_columns(self, motion, self.torque(arm.body, link.q, link.dq))
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
-        """Return the action on the links: the torque of the maps."""
+        """Return the learned torque as an action on the links."""
         (share,) = scatter(self, values, arm.robot)
         robot = arm.robot
 

@@ -23,27 +23,27 @@ class _LinkBody(Effect):
     changes_body = True
 
     def parameters(self, robot: Robot) -> tuple[ParameterName, ...]:
-        """Return the parameter names; the units are the same on a prismatic joint."""
+        """Return names of the parameters; units are the same on a prismatic joint."""
         return tuple(
             ParameterName(q.name, owner, q.unit) for owner in self.owners for q in self.quantities
         )
 
     def columns(self, motion: Motion, arm: Arm) -> FloatArray:
-        """Return the regressor columns of the links, shape (N, n, P)."""
+        """Return the torque per inertial parameter of the added bodies, shape (N, n, P)."""
         return arm.body_columns(motion)[:, :, list(self.adds_to(arm.robot))]
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
-        """Return the action on the plant: the robot with mass and inertia added to its links."""
+        """Return the robot whose links carry the added mass, first moments and inertia."""
         parameters = arm.robot.rigid_parameters.copy()
         parameters[list(self.adds_to(arm.robot))] += values
         return Action(robot=arm.robot.with_inertias(parameters))
 
     def spread(self, robot: Robot) -> FloatArray:
-        """Return the largest expected errors of the description of the links, shape (P,)."""
+        """Return the largest expected errors of the described links, shape (P,)."""
         return robot.described_spread.ravel()[list(self.adds_to(robot))]
 
     def adds_to(self, robot: Robot) -> tuple[int, ...]:
-        """Return the indices of the rigid-body parameters of the links."""
+        """Return the indices of the rigid-body parameters to which the bodies add."""
         size = len(LINK_PARAMETERS)
         return tuple(size * joint + i for joint in self.indices(robot.moving) for i in range(size))
 
@@ -81,7 +81,7 @@ class Payload(_LinkBody):
 
     @classmethod
     def places(cls, robot: Robot) -> tuple[tuple[str, ...], ...]:
-        """Return all links, because any link may carry a body."""
+        """Return all moving links as places of a payload."""
         return tuple((joint,) for joint in robot.moving)
 
     @classmethod
@@ -90,7 +90,7 @@ class Payload(_LinkBody):
         return PayloadChange
 
     def plausible(self, values: FloatArray, std: FloatArray, arm: Arm) -> bool:
-        """Return whether a body can have the values, with its centre within the arm's length."""
+        """Return whether a body within the arm's length can have the values of the payload."""
         if not self._weighs(values, std, arm):
             return False
         # the inertia of a body about the joint is at least that of a point mass at its centre
@@ -118,7 +118,7 @@ class Payload(_LinkBody):
 
     def spread(self, robot: Robot) -> FloatArray:
         """
-        Return the largest payload: the mass of the arm, with a small offset, shape (P,).
+        Return the values of the largest expected payload, as heavy as the arm, shape (P,).
 
         First moments and inertia are proportional to the mass.
 
@@ -141,7 +141,7 @@ class PayloadChange(Payload):
 
     def plausible(self, values: FloatArray, std: FloatArray, arm: Arm) -> bool:
         """
-        Return whether the change is plausible for a load that was picked up or put down.
+        Return whether a load that was picked up or put down can cause the change.
 
         The load may be heavier than the links, because descriptions often lack the previous load.
 
@@ -149,7 +149,7 @@ class PayloadChange(Payload):
         return self._weighs(np.concatenate([np.abs(values[:1]), values[1:]]), std, arm)
 
     def named_as(self, values: FloatArray, arm: Arm) -> tuple[tuple[Effect, FloatArray], ...]:
-        """Return the change as a payload."""
+        """Return the change of the payload as a payload with the same values."""
         return ((Payload(self.joints), values),)
 
 

@@ -23,7 +23,7 @@ class _Pairs(Effect):
     """Base class of effects on pairs of joints (i, k), which are consecutive in ``joints``."""
 
     def __post_init__(self) -> None:
-        """Check that the joints are pairs."""
+        """Check that the joints form pairs of different joints, each pair given once."""
         if not self.joints or len(self.joints) % 2:
             raise ModelError(
                 f'{self.name} needs pairs of joints, such as joint_5 and joint_6; got '
@@ -52,7 +52,7 @@ class _Pairs(Effect):
 
     @classmethod
     def places(cls, robot: Robot) -> tuple[tuple[str, ...], ...]:
-        """Return the pairs of joints that may be coupled: neighbours."""
+        """Return the pairs of neighbouring joints, which may be coupled."""
         return tuple(pairwise(robot.joints))
 
     @property
@@ -104,7 +104,7 @@ class CoupledJointFriction(_Pairs):
         return super()._default_joints(robot)[-2:]
 
     def columns(self, motion: Motion, arm: Arm) -> FloatArray:
-        """Return dtau/d(Ia, Fv, Fc) of every pair, shape (N, n, P)."""
+        """Return the torque per inertia, viscous and Coulomb friction of each shaft, (N, n, P)."""
         columns = np.zeros((len(motion), motion.n_joints, 3 * len(self.owners)))
         for position, (i, k) in enumerate(self.pairs(motion.joints)):
             forwards = direction(motion, (i, k))
@@ -115,7 +115,7 @@ class CoupledJointFriction(_Pairs):
         return columns
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
-        """Return the action on the plant: coupled inertia and damping, and dry shaft friction."""
+        """Return coupled inertia and damping, and dry friction of the shared shafts."""
         n = arm.robot.n_joints
         inertia, damping = np.zeros((n, n)), np.zeros((n, n))
         pairs = self.pairs(arm.robot.joints)
@@ -160,11 +160,11 @@ class JointCoupling(_Pairs):
 
     @classmethod
     def places(cls, robot: Robot) -> tuple[tuple[str, ...], ...]:
-        """Return all pairs; their order has no influence."""
+        """Return all pairs of joints as places of a coupling; their order has no influence."""
         return tuple(combinations(robot.joints, 2))
 
     def columns(self, motion: Motion, arm: Arm) -> FloatArray:
-        """Return the derivative of the torque by the coupling stiffness, (N, n, P) [rad]."""
+        """Return the torque per coupling stiffness of each pair [rad], shape (N, n, P)."""
         q = arm.link_motion(motion).q
         columns = np.zeros((*q.shape, len(self.owners)))
         for position, (i, k) in enumerate(self.pairs(motion.joints)):
@@ -195,7 +195,7 @@ class TorqueCrosstalk(_Pairs, TorqueReading):
 
     @classmethod
     def places(cls, robot: Robot) -> tuple[tuple[str, ...], ...]:
-        """Return all ordered pairs: the joint with the wrong reading, then that of the cause."""
+        """Return all ordered pairs of joints: that of the reading, then that of the torque."""
         return tuple(permutations(robot.joints, 2))
 
     def parameters(self, robot: Robot) -> tuple[ParameterName, ...]:
@@ -211,7 +211,7 @@ class TorqueCrosstalk(_Pairs, TorqueReading):
         )
 
     def read(self, values: FloatArray, motion: Motion, tau: FloatArray) -> FloatArray:
-        """Return the torque plus shares of the other torques, shape (N, n) [N m]."""
+        """Return torque readings with shares of other joints' torques, shape (N, n) [N m]."""
         return tau + tau @ self._shares(values, motion).T
 
     def transfer(
@@ -221,7 +221,7 @@ class TorqueCrosstalk(_Pairs, TorqueReading):
         return np.asarray(columns + self._shares(values, motion) @ columns)
 
     def sensitivity(self, values: FloatArray, motion: Motion, tau: FloatArray) -> FloatArray:
-        """Return the derivatives of the readings: the torque of k in row i, shape (N, n, P)."""
+        """Return the derivatives of the readings by the crosstalk shares, shape (N, n, P)."""
         columns = np.zeros((*tau.shape, len(values)))
         for position, (i, k) in enumerate(self.pairs(motion.joints)):
             columns[:, i, position] = tau[:, k]

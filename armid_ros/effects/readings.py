@@ -40,11 +40,11 @@ class Displacing(Effect):
         """
 
     def columns(self, motion: Motion, arm: Arm) -> FloatArray:
-        """Return the change of torque due to the displacements, dtau/dtheta, (N, n, P)."""
+        """Return the change of torque due to link displacements, dtau/dtheta, shape (N, n, P)."""
         return arm.torque_change(motion, self.displacements(motion, arm))
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
-        """Return the action on sensors: a displacement in proportion to the values."""
+        """Return a link displacement in proportion to the parameter values, as an action."""
 
         def displacement(motion: Motion) -> Displacement:
             parts = self.displacements(motion, arm)
@@ -97,7 +97,7 @@ class TorqueReading(Effect):
         return self.sensitivity(arm.values_of(self), motion, arm.torque_before(self, motion))
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
-        """Return the action on sensors: the function from true torque to reading."""
+        """Return the function from true torque to torque reading, as an action on sensors."""
         if not np.any(values):
             return Action()
 

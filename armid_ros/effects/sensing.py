@@ -31,11 +31,11 @@ class TorqueOffset(Effect):
     quantities = (Quantity('torque_offset', 'N m', typical=(0.004, 2.0)),)
 
     def columns(self, motion: Motion, arm: Arm) -> FloatArray:
-        """Return dtau/doffset = 1 [-], shape (N, n, P)."""
+        """Return the torque per unit of offset, which is 1 [-], shape (N, n, P)."""
         return joint_columns(self, motion, np.ones_like(motion.q))
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
-        """Return the action on the plant: a constant torque."""
+        """Return the torque offset as a constant torque of the plant."""
         (offset,) = scatter(self, values, arm.robot)
 
         def torque(t: FloatArray, q: FloatArray, dq: FloatArray) -> FloatArray:
@@ -60,13 +60,13 @@ class TorqueGain(TorqueReading):
     quantities = (Quantity('gain_error', '', lower=-0.95, typical=(0.005, 0.3)),)
 
     def read(self, values: FloatArray, motion: Motion, tau: FloatArray) -> FloatArray:
-        """Return the scaled torque, shape (N, n) [N m], or scaled regressor columns."""
+        """Return torque readings with the gain error, shape (N, n) [N m], or regressor columns."""
         gain = np.ones(motion.n_joints)
         gain[self.indices(motion.joints)] += values
         return np.asarray(tau * gain.reshape(-1, *(1,) * (tau.ndim - 2)))
 
     def sensitivity(self, values: FloatArray, motion: Motion, tau: FloatArray) -> FloatArray:
-        """Return the derivative by the gain error: the torque [N m], shape (N, n, P)."""
+        """Return the derivative of the reading by the gain error: the torque [N m], (N, n, P)."""
         return joint_columns(self, motion, tau)
 
 
@@ -95,7 +95,7 @@ class TorqueDrift(TorqueReading):
         return (np.tile(times, (len(self.joints), 1)),)
 
     def read(self, values: FloatArray, motion: Motion, tau: FloatArray) -> FloatArray:
-        """Return the torque with the drift, shape (N, n) [N m]."""
+        """Return the torque readings with drift, shape (N, n) [N m]."""
         return np.asarray(tau + self.sensitivity(values, motion, tau) @ values)
 
     def transfer(
@@ -105,7 +105,7 @@ class TorqueDrift(TorqueReading):
         return columns
 
     def sensitivity(self, values: FloatArray, motion: Motion, tau: FloatArray) -> FloatArray:
-        """Return the derivative by the drift, 1 - exp(-t / T) [-], shape (N, n, P)."""
+        """Return the derivative of the reading by the drift, 1 - exp(-t / T) [-], (N, n, P)."""
         constants = np.ones(motion.n_joints)
         constants[self.indices(motion.joints)] = self.shape_values[:, 0]
         return joint_columns(self, motion, -np.expm1(-motion.t[:, np.newaxis] / constants))
@@ -129,6 +129,6 @@ class EncoderOffset(Displacing):
     linear = False
 
     def displacements(self, motion: Motion, arm: Arm) -> Displacement:
-        """Return 1 in the position of each joint and 0 in velocity and acceleration."""
+        """Return the displacement per encoder offset: 1 in position, 0 in its derivatives."""
         shift = joint_columns(self, motion, np.ones_like(motion.q))
         return Displacement(shift, np.zeros_like(shift), np.zeros_like(shift))

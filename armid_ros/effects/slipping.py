@@ -35,17 +35,17 @@ class Hysteresis:
     distance: FloatArray
 
     def start(self, dq: FloatArray) -> FloatArray:
-        """Return the states after a long motion at a velocity; zero at rest, shape (m,)."""
+        """Return the states of slipping springs after long motion at a velocity, shape (m,)."""
         return np.asarray(np.sign(self.directions @ dq))
 
     def advance(self, state: FloatArray, dq: FloatArray) -> FloatArray:
-        """Return the states, (m,), after a joint displacement, (n,), without a reversal."""
+        """Return the states of slipping springs after a joint displacement without reversal."""
         travel = self.directions @ dq
         end = np.sign(travel)
         return np.asarray(end - (end - state) * np.exp(-np.abs(travel) / self.distance))
 
     def torque(self, state: FloatArray) -> FloatArray:
-        """Return the joint torques, (..., n) [N m], for states of the springs, (..., m)."""
+        """Return the joint torques, (..., n) [N m], for states of slipping springs, (..., m)."""
         return np.asarray((self.level * state) @ self.directions)
 
     def along(self, q: FloatArray, dq: FloatArray) -> FloatArray:
@@ -103,7 +103,7 @@ class Hysteresis:
 
 
 def _stretches(travel: FloatArray) -> list[tuple[int, int, float]]:
-    """Return first and last sample of every stretch between reversals, and its direction."""
+    """Return first and last sample of every motion between reversals, and its direction."""
     step = np.sign(np.diff(travel))
     turns = np.flatnonzero(np.diff(step)) + 1
     ends = zip(np.append(0, turns), np.append(turns, len(step)), strict=True)

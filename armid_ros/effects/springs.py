@@ -36,11 +36,11 @@ class JointSpring(JointLaw):
     on_links = True
 
     def law(self, x: JointStates) -> tuple[FloatArray, ...]:
-        """Return the torque per unit of stiffness, which is q, and of preload, which is 1."""
+        """Return the spring torque per unit of stiffness, q, and per unit of preload, 1."""
         return x.q, np.ones_like(x.q)
 
     def plausible(self, values: FloatArray, std: FloatArray, arm: Arm) -> bool:
-        """Return whether the stiffness is significant; a preload alone is an offset."""
+        """Return whether the spring stiffness is significant; a preload alone is an offset."""
         return bool(values[0] > MIN_Z_SCORE * std[0])
 
 
@@ -86,6 +86,6 @@ class SoftLimit(JointLaw):
         return lowest + depth, highest - depth
 
     def law(self, x: JointStates) -> tuple[FloatArray, ...]:
-        """Return the torque per unit of stiffness: the signed compression of each bumper [rad]."""
+        """Return the torque per unit of bumper stiffness: the signed compression [rad]."""
         lower, upper = self.shape_values.T
         return -np.maximum(lower - x.q, 0.0), np.maximum(x.q - upper, 0.0)

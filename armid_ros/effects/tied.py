@@ -47,12 +47,12 @@ class Tied(Attached):
 
     @property
     def points(self) -> tuple[str, ...]:
-        """Names of the points of the other machine."""
+        """Names of the points of the other machine to which the arm is tied."""
         return tuple(tie.name for tie in self.ties)
 
     def along(self, motion: Motion) -> Self:
         """
-        Return the effect with the positions of its anchors along a motion.
+        Return the springs with the recorded positions of their anchors.
 
         Raises
         ------
@@ -90,14 +90,14 @@ class Tied(Attached):
         return self.anchor or unknown
 
     def shape_starts(self, unexplained: Unexplained, arm: Arm) -> tuple[FloatArray, ...]:
-        """Return the start values of the slacks; the anchors are known."""
+        """Return start values of the slack of straps; the anchors are known."""
         return Attached.shape_starts(self, unexplained, arm)
 
     def _default_shape(self, robot: Robot) -> FloatArray:
         return self.shape_values
 
     def particulars(self) -> dict[str, Any]:
-        """Return the other machine and the end points of the springs."""
+        """Return the other machine and the end points of the springs, for model.yaml."""
         rows = [
             {
                 'name': tie.name,

@@ -69,11 +69,11 @@ class TimeDelay(LateReading):
         return ()
 
     def sensitivity(self, values: FloatArray, motion: Motion, tau: FloatArray) -> FloatArray:
-        """Return -dtau/dt at the earlier time [N m/s], shape (N, n, P)."""
+        """Return the derivative of the reading by the delay, -dtau/dt [N m/s], (N, n, P)."""
         return _by_owner(self, motion, -self._delayed(values, motion, tau, derivative=1))
 
     def memory(self, values: FloatArray) -> float:
-        """Return the longest delay [s]."""
+        """Return the longest torque delay [s]."""
         return float(np.max(np.abs(values)))
 
     def read(self, values: FloatArray, motion: Motion, tau: FloatArray) -> FloatArray:
@@ -118,7 +118,7 @@ class TorqueLag(LateReading):
         return result
 
     def sensitivity(self, values: FloatArray, motion: Motion, tau: FloatArray) -> FloatArray:
-        """Return dreading/dT [N m/s], which is -dtau/dt for a zero lag, (N, n, P)."""
+        """Return the derivative of the reading by the lag [N m/s], shape (N, n, P)."""
         rates = -rate_of_change(motion.t, tau)
         more = 1.0001  # factor between two lags whose difference is the derivative
         for lag, rows in zip(values, self._owned(motion), strict=True):

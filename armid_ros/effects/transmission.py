@@ -54,7 +54,7 @@ class JointElasticity(Displacing):
         return _twist(self, motion, load)
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
-        """Return the action: springs and dampers, and the displacement of encoder readings."""
+        """Return springs and dampers of the plant, and displaced encoder readings."""
         (compliance,) = scatter(self, values, arm.robot)
         (retardation,) = scatter(self, self.shape_values, arm.robot)
         with np.errstate(divide='ignore'):
@@ -102,7 +102,7 @@ class Backlash(Displacing):
         return _twist(self, motion, place)
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
-        """Return the action: gaps of transmissions, and the displacement of encoder readings."""
+        """Return gaps of the plant's transmissions, and displaced encoder readings."""
         (gap,) = scatter(self, values, arm.robot)
         if not np.any(values):
             return Action()

@@ -48,7 +48,7 @@ class FourierTrajectory:
     b: FloatArray
 
     def __post_init__(self) -> None:
-        """Freeze the arrays and check shapes and values."""
+        """Freeze the Fourier coefficients, and check their shapes and values."""
         object.__setattr__(self, 'joints', tuple(self.joints))
         freeze(self, 'q0', 'a', 'b')
         n = len(self.joints)

@@ -60,7 +60,7 @@ class Limits:
     prismatic: npt.NDArray[np.bool_]
 
     def __post_init__(self) -> None:
-        """Freeze the arrays; raise a TrajectoryError for an empty range."""
+        """Freeze the limits; raise a TrajectoryError if a joint cannot move within them."""
         n = len(self.joints)
         for limit in ('lower', 'upper', 'velocity', 'acceleration', 'torque'):
             values = read_only(getattr(self, limit))
@@ -186,7 +186,7 @@ class Violation:
     unit: str
 
     def __str__(self) -> str:
-        """Return the violation in one line."""
+        """Return the exceeded limit in one line of text."""
         return (
             f'joint {self.joint}: {self.limit} {self.value:.4g} {self.unit} at {self.time:.3f} s, '
             f'limit {self.bound:.4g} {self.unit} ({self.samples} samples beyond it)'

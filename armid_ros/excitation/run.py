@@ -57,12 +57,12 @@ class Run:
 
     @property
     def joints(self) -> tuple[str, ...]:
-        """Joint names."""
+        """Names of the joints of the run."""
         return self.excitation.joints
 
     @property
     def duration(self) -> float:
-        """Duration from rest to rest [s]."""
+        """Duration of the whole run from rest to rest [s]."""
         back = 0.0 if self.back is None else self.back.duration
         return self.approach.duration + self._excitation_duration + back
 

@@ -53,7 +53,7 @@ class Excitation:
     run_in: float = 2.0
 
     def __post_init__(self) -> None:
-        """Check that periods and run-in are possible."""
+        """Check that the number of periods, the run-in and the duration are possible."""
         if int(self.n_periods) != self.n_periods or self.n_periods < 1:
             raise TrajectoryError(
                 f'excitation: {self.n_periods} periods are too few; at least one is needed'
@@ -68,12 +68,12 @@ class Excitation:
 
     @property
     def joints(self) -> tuple[str, ...]:
-        """Joint names."""
+        """Names of the joints of the excitation."""
         return self.trajectory.joints
 
     @property
     def duration(self) -> float:
-        """Duration from rest to rest [s]."""
+        """Duration of the excitation from rest to rest [s]."""
         return self.n_periods * self.trajectory.period + 2.0 * self.run_in
 
     def at(self, t: npt.ArrayLike) -> Motion:

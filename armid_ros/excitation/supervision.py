@@ -48,7 +48,7 @@ class MeasuredPose:
     stamps: npt.NDArray[np.int64]
 
     def __post_init__(self) -> None:
-        """Freeze the arrays."""
+        """Freeze the arrays of positions and arrival times."""
         freeze(self, 'q', 'seen')
 
     @classmethod

@@ -202,7 +202,7 @@ class VelocityLoop:
     integral: FloatArray
 
     def __post_init__(self) -> None:
-        """Freeze the gains."""
+        """Freeze the gains of the velocity loop."""
         freeze(self, 'proportional', 'integral')
 
 
@@ -233,7 +233,7 @@ class MotorControl(Controller):
     acts_once: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
-        """Set the integrals to zero."""
+        """Set the integrals of the velocity errors to zero."""
         self.integral = np.zeros(len(self.loop.proportional))
 
     @classmethod
@@ -292,7 +292,7 @@ class MotorControl(Controller):
     def torque(
         self, q: FloatArray, dq: FloatArray, desired: Desired, feedforward: FloatArray
     ) -> FloatArray:
-        """Update the integrals and return the torque, shape (n,)."""
+        """Return the torque of the velocity loops, shape (n,), and update their integrals."""
         error = desired[1] - dq
         self.integral = self.integral + self.dt * error
         torque = self.loop.proportional * error + self.loop.integral * self.integral

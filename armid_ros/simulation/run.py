@@ -56,7 +56,7 @@ class SimulatedRun:
     sides: ElasticRun | None = None
 
     def __post_init__(self) -> None:
-        """Freeze the arrays."""
+        """Freeze the arrays of the recording."""
         freeze(self, 't', 'q', 'dq', 'tau')
 
     @property

@@ -179,12 +179,12 @@ class RecentPast:
         return (tau[1:] + tau[:-1]) / 2 if self._plant.springs is None else tau[1:]
 
     def drop(self, count: int) -> None:
-        """Remove the last samples, which `extend` added."""
+        """Remove the latest samples of the history."""
         self._rows, self._steps = self._rows[:, :-count], self._steps - count
 
     def latest(self, ahead: int = 0) -> tuple[FloatArray, FloatArray, FloatArray]:
         """
-        Return the readings of position, velocity and torque, each of shape (n,).
+        Return the latest readings of position, velocity and torque, each of shape (n,).
 
         Parameters
         ----------
@@ -237,7 +237,7 @@ class LinkAccelerometers:
         self._placements = [pin.SE3(np.eye(3), place) for place in array]
 
     def read(self, q: FloatArray, dq: FloatArray, ddq: FloatArray) -> FloatArray:
-        """Return the readings in one state, (n, 3) [m/s^2]; at rest, minus gravity."""
+        """Return accelerometer readings in one state, (n, 3) [m/s^2]; at rest, minus gravity."""
         model, data = self._robot.model, self._data
         pin.forwardKinematics(model, data, *self._robot.state(q, dq, ddq))
         up = -model.gravity.linear

@@ -149,7 +149,7 @@ class SimulatedArm:
 
     @property
     def steps(self) -> int:
-        """Time as a number of steps of the plant."""
+        """Time of the arm as a number of plant steps."""
         return self._state.steps - self._ahead
 
     @property
@@ -159,7 +159,7 @@ class SimulatedArm:
 
     @property
     def ends_at(self) -> float:
-        """Time at which the trajectory ends, or has ended [s]."""
+        """Time at which the present trajectory ends, or has ended [s]."""
         return self._begun * self.plant.dt + self._reference.duration
 
     def reset(self, steps: int = 0) -> None:
@@ -176,7 +176,7 @@ class SimulatedArm:
 
     def start_on(self, reference: Reference) -> Reference:
         """
-        Start on the first point of a reference, with its velocity.
+        Set the arm to the first point of a reference, with its velocity.
 
         The result is the reference with its joints in the order of the robot.
 

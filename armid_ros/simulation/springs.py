@@ -104,7 +104,7 @@ class ElasticJoints:
         dt: float,
     ) -> ElasticJoints:
         """
-        Return the elastic joints of an arm.
+        Return the springs and matrices of the elastic joints of an arm.
 
         The arguments are the arm, the settings, the directions of dry friction, (m, n), the
         inertia matrix of the links in the middle of the ranges, (n, n) [kg m^2], and the step of

@@ -68,7 +68,7 @@ class Approach:
     distance: float
 
     def __str__(self) -> str:
-        """Return the approach in one line."""
+        """Return the two bodies, their distance and the time in one line."""
         return f'{self.first} and {self.second}: {self.distance:.4f} m apart at {self.time:.3f} s'
 
 

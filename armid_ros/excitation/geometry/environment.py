@@ -69,7 +69,7 @@ class Obstacle:
     ignore: tuple[str, ...] = field(default=())
 
     def __post_init__(self) -> None:
-        """Check the names, the kind and the numbers."""
+        """Check names, kind, size and place of the obstacle."""
         if not all(isinstance(name, str) for name in (self.name, self.kind, *self.ignore)):
             raise TrajectoryError(
                 f"obstacle '{self.name}': names and kind have to be strings; quote them"

@@ -180,11 +180,11 @@ class Floor:
     source: str
 
     def __post_init__(self) -> None:
-        """Freeze the normal."""
+        """Freeze the normal vector of the floor."""
         freeze(self, 'up')
 
     def __str__(self) -> str:
-        """Return the height and its source."""
+        """Return the height of the floor and its source in one line."""
         if self.height is None:
             return f'none ({self.source})'
         return f'{self.height:g} m above the base ({self.source})'

@@ -56,12 +56,12 @@ class Information:
     scale: FloatArray
 
     def __post_init__(self) -> None:
-        """Freeze the arrays."""
+        """Freeze the information matrix and the scale."""
         freeze(self, 'matrix', 'scale')
 
     @property
     def log_det(self) -> float:
-        """Natural logarithm of the determinant; -inf if a parameter is not identifiable."""
+        """Logarithm of the determinant of the information matrix; -inf if it is singular."""
         sign, value = np.linalg.slogdet(self.matrix)
         return float(value) if sign > 0 else -np.inf
 
@@ -188,7 +188,7 @@ class Criterion:
 
 
 def _log_norm(values: FloatArray, norm: float) -> tuple[float, FloatArray]:
-    """Return the log of a p-norm of positive numbers, and its gradient."""
+    """Return the logarithm of a p-norm of positive numbers, and its gradient."""
     powers = (values / values.max()) ** norm
     total = powers.sum()
     return float(np.log(values.max()) + np.log(total) / norm), powers / (total * values)
