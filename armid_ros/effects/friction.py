@@ -270,7 +270,7 @@ class TemperatureDependentFriction(Effect):
         return {joint: known[joint] for joint in self.joints}
 
     def plausible(self, values: FloatArray, std: FloatArray, arm: Arm) -> bool:
-        """Return whether friction changes by 5 % per kelvin or less, and its viscous part falls."""
+        """Return whether friction changes by at most 5 % per kelvin, and falls if viscous."""
         action, n = arm.action(), arm.robot.n_joints
         known = np.zeros((2, n))
         if action.damping is not None:

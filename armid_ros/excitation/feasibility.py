@@ -45,8 +45,6 @@ def trajectory_faults(
     """
     Return the limits that a periodic trajectory exceeds, and two bodies that come too close.
 
-    The check holds at and between all samples.
-
     Parameters
     ----------
     arm : ArmModel

@@ -220,9 +220,8 @@ class _Solution(NamedTuple):
     """
     Solution of the fit: change x of all P parameters, indices and covariance of F free ones.
 
-    Covariances (F, F) are from the variances of joints and from the scatter of the rests. The
-    information (F, F) is without the prior. Further values are the used readings (K, n), and the
-    smallest number of redundant readings of a joint.
+    Covariances (F, F) are from the variances of joints and from the scatter of the rests;
+    information (F, F) is without the prior; freedom is the fewest redundant readings of a joint.
 
     """
 
