@@ -21,8 +21,9 @@ from armid_ros.errors import TrajectoryError
 from armid_ros.excitation.fourier import FourierTrajectory
 from armid_ros.files import finite, load_yaml, read_text, reading, write_file
 from armid_ros.files.cells import csv_text
-from armid_ros.motion import FloatArray, Motion
+from armid_ros.motion import Motion
 import numpy as np
+from numpy.polynomial import Polynomial
 import numpy.typing as npt
 import yaml
 
@@ -30,6 +31,9 @@ import yaml
 _SAMPLE_TOLERANCE = 1e-6
 #: The longest run [s]. Its samples are kept in memory, 1 GB for six joints at 50 Hz.
 MAX_DURATION = 86400.0
+#: Step from 0 to 1 with zero slope and curvature at both ends, its derivative and its integral.
+_STEP = Polynomial([0.0, 0.0, 0.0, 10.0, -15.0, 6.0])
+_STEP_SLOPE, _STEP_INTEGRAL = _STEP.deriv(), _STEP.integ()
 
 
 @dataclass(frozen=True)
@@ -93,15 +97,15 @@ class Excitation:
         if not (before.any() or after.any()):  # within the periods
             orbit = self.trajectory.motion(phase)
             return Motion(self.joints, time, orbit.q, orbit.dq, orbit.ddq)
-        # x = 1 - before is the completed share of the run-in; the phase rate is _step(x), and the
-        # remaining phase before the first period is run_in * integral of _step from x to 1. The
-        # integral of _step from 0 to 1 is a half.
-        lead = self.run_in * (0.5 - _step_integral(1.0 - before))
-        lag = self.run_in * (0.5 - _step_integral(1.0 - after))
+        # x = 1 - before is the completed share of the run-in; the phase rate is _STEP(x), and the
+        # remaining phase before the first period is run_in * integral of _STEP from x to 1. The
+        # integral of _STEP from 0 to 1 is a half.
+        lead = self.run_in * (0.5 - _STEP_INTEGRAL(1.0 - before))
+        lag = self.run_in * (0.5 - _STEP_INTEGRAL(1.0 - after))
         end = self.n_periods * self.trajectory.period
         phase = np.where(before > 0.0, -lead, np.where(after > 0.0, end + lag, phase))
-        speed = _step(1.0 - before) * _step(1.0 - after)
-        change = (_step_slope(1.0 - before) - _step_slope(1.0 - after)) / self.run_in
+        speed = _STEP(1.0 - before) * _STEP(1.0 - after)
+        change = (_STEP_SLOPE(1.0 - before) - _STEP_SLOPE(1.0 - after)) / self.run_in
         orbit = self.trajectory.motion(phase)
         speed, change = speed[:, np.newaxis], change[:, np.newaxis]
         return Motion(
@@ -195,19 +199,6 @@ class Excitation:
                 f'it has to be a whole number: take {whole / self.trajectory.period:.9g} Hz'
             )
         return whole
-
-
-def _step(x: FloatArray) -> FloatArray:
-    """Evaluate the quintic step from 0 to 1, with zero slope and curvature at both ends."""
-    return np.asarray(x**3 * (10.0 - 15.0 * x + 6.0 * x**2))
-
-
-def _step_slope(x: FloatArray) -> FloatArray:
-    return np.asarray(30.0 * x**2 * (1.0 - x) ** 2)
-
-
-def _step_integral(x: FloatArray) -> FloatArray:
-    return np.asarray(x**4 * (2.5 - 3.0 * x + x**2))
 
 
 SCHEMA = 'armid/excitation/1'
