@@ -58,7 +58,7 @@ def trajectory_faults(
 
     """
     count = _CHECK_SAMPLES * trajectory.harmonics
-    # from the first sample to the one after the period, which have no bound beside them
+    # two samples beyond the period, as the first and the last sample get no bound
     path = trajectory.motion(np.arange(count + 2) * (trajectory.period / count))
     violations = _violations(arm, limits, path)
     if clearance is None:

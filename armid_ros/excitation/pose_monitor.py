@@ -42,7 +42,7 @@ class _Source:
     upper: list[float]
     velocity: list[float]
     states: deque[_State] = field(default_factory=deque)
-    rivals: list[_State] = field(default_factory=list)
+    contradicting: list[_State] = field(default_factory=list)
 
 
 class PoseMonitor:
@@ -147,13 +147,13 @@ class PoseMonitor:
         fault = self._unreachable(source, state, last)
         if fault:
             self._reject(fault, now)
-            if source.rivals and self._unreachable(source, state, source.rivals[-1]):
-                source.rivals.clear()
-            source.rivals.append(state)
-            if len(source.rivals) < MIN_AGREEING or seen >= source.rivals[0].arrived:
+            if source.contradicting and self._unreachable(source, state, source.contradicting[-1]):
+                source.contradicting.clear()
+            source.contradicting.append(state)
+            if len(source.contradicting) < MIN_AGREEING or seen >= source.contradicting[0].arrived:
                 return
             source.states.clear()
-        source.rivals.clear()
+        source.contradicting.clear()
         states = source.states
         states.append(state)
         while len(states) > MIN_AGREEING and now - states[1].arrived > _REJECTION_WINDOW:

@@ -20,7 +20,6 @@ from armid_ros.excitation import (
     with_obstacles,
 )
 from armid_ros.excitation.run import _unwound
-from armid_ros.excitation.transfer import Transfer
 from armid_ros.robots import collision_model, robot_from_urdf
 import numpy as np
 import pinocchio as pin
@@ -38,19 +37,6 @@ def planner(robot, *obstacles, speed='slow', margin=MARGIN):
 
 def dense(way, count=4001):
     return way.at(np.linspace(0.0, way.duration, count))
-
-
-def test_velocity_and_acceleration_are_the_derivatives_of_the_way():
-    way = Transfer(('a',), np.array([0.0, 1.0, 2.5]), np.array([[0.0], [1.0], [-1.0]]))
-    motion = dense(way)
-    np.testing.assert_allclose(
-        motion.dq, np.gradient(motion.q, motion.t, axis=0, edge_order=2), atol=1e-3
-    )
-    np.testing.assert_allclose(
-        motion.ddq, np.gradient(motion.dq, motion.t, axis=0, edge_order=2), atol=0.02
-    )
-    np.testing.assert_allclose(motion.dq[[0, -1]], 0.0, atol=1e-12)
-    np.testing.assert_allclose(way.reversed().at([0.0, 2.5]).q[:, 0], [-1.0, 0.0], atol=1e-12)
 
 
 @pytest.mark.parametrize('speed', ['slow', 0.05])

@@ -149,7 +149,7 @@ class ClearanceModel:
         numbers = np.arange(len(pairs))
         return cls(collision, margin, joints, spheres, planes, numbers, pairs, between, most)
 
-    def watched(self, q: FloatArray, reach: float) -> ClearanceModel:
+    def without_distant_pairs(self, q: FloatArray, reach: float) -> ClearanceModel:
         """Return the model of only the pairs closer than ``reach`` [m] in some pose q, (N, n)."""
         kept = np.unique(self.near(q, reach).pair)
         return replace(

@@ -150,16 +150,16 @@ class Search:
 
     def _improve(self, starts: list[FourierTrajectory]) -> None:
         """Optimise several trajectories in rounds; drop the worse half after some rounds."""
-        objective, watched = Objective(self.problem, self.prior), self.clearance
-        if watched is not None:  # ignore pairs of bodies that are far apart in many poses
+        objective, nearby = Objective(self.problem, self.prior), self.clearance
+        if nearby is not None:  # ignore pairs of bodies that are far apart in many poses
             limits = self.problem.limits
             lower, upper = limits.position_range()
             # The solver ignores pairs of bodies that stay 1 cm beyond the margin in 1000 random
             # poses, and adds 1 mm to it. The proof of clearance checks all pairs.
             poses = self.rng.uniform(lower, upper, (1000, len(lower)))
-            watched = watched.watched(poses, watched.margin + 0.01)
-            watched = replace(watched, margin=watched.margin + 0.001)
-        branches = [_Branch(self, objective, watched, start) for start in starts]
+            nearby = nearby.without_distant_pairs(poses, nearby.margin + 0.01)
+            nearby = replace(nearby, margin=nearby.margin + 0.001)
+        branches = [_Branch(self, objective, nearby, start) for start in starts]
         while branches:
             for branch in branches:
                 for _ in range(_ROUNDS_PER_HALVING):
@@ -174,7 +174,7 @@ class _Branch:
 
     search: Search
     objective: Objective
-    watched: ClearanceModel | None
+    nearby: ClearanceModel | None
     trajectory: FourierTrajectory
     cost: float = np.inf
 
@@ -203,7 +203,7 @@ class _Branch:
         # the solver keeps a reserve of 0.2 % to every limit
         constraints = Constraints(
             problem,
-            self.watched,
+            self.nearby,
             reserve=0.002,
             sharpness=self.sharpness,
             more_times=self.times,
