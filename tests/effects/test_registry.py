@@ -3,6 +3,8 @@
 """Effects of one's own: registered, named like those that are shipped, and checked."""
 
 from dataclasses import replace
+from pathlib import Path
+import re
 
 import armid_ros as ar
 from armid_ros.arm import testing
@@ -94,6 +96,14 @@ def test_a_class_that_is_defined_anew_takes_the_place_of_the_old(hose):
     again = type('Hose', (Hose,), {'__module__': Hose.__module__, 'summary': 'longer'})
     assert ar.register(again) is again
     assert CATALOGUE['hose'].summary == 'longer'
+
+
+def test_the_guide_lists_at_most_twelve_members_of_an_effect():
+    guide = Path(__file__).parents[2] / 'docs/howto/own_effect.md'
+    rows = re.findall(r'^\| (`.*?`) \|', guide.read_text('utf-8'), flags=re.MULTILINE)
+    members = set(re.findall(r'`(?:Hose\.)?(\w+)', ' '.join(rows)))
+    assert len(members) <= 12 and {'name', 'columns', 'on'} <= members
+    assert members <= {*ar.Effect.__annotations__, *dir(ar.Effect)}
 
 
 def test_the_contract_holds_for_what_is_right():
