@@ -114,8 +114,8 @@ class Transmission:
     """
     Springs, dampers and free play between motors and links.
 
-    The link of joint j is twisted against its motor by x = q_motor - q_link, and carries the
-    torque K (x - gap) + D dx beyond the gap. Within the gap the torque is zero. Position readings
+    The link of a joint is twisted against its motor by x = q_motor - q_link. Beyond the gap it
+    carries the torque K (x - gap) + D dx. Within the gap the torque is zero. Position readings
     are those of the motors.
 
     Attributes
@@ -139,9 +139,9 @@ class Action:
     """
     Terms that effects with given values add to the plant and its sensors; None if absent.
 
-    The actuators have to supply damping @ dq + inertia @ ddq + dry friction + hysteresis +
-    torque(t, q, dq) on the motor side, and the rigid body's torque + link_torque(t, q, dq) on the
-    link side.
+    On the motor side, the actuators have to supply damping @ dq + inertia @ ddq + dry friction +
+    hysteresis + torque(t, q, dq). On the link side, they have to supply the torque of the rigid
+    body + link_torque(t, q, dq).
 
     Attributes
     ----------

@@ -51,9 +51,9 @@ class TorqueRipple(JointLaw):
     Torque that repeats at a fixed angle, tau = A sin(n q) + B cos(n q).
 
     Cogging of a motor with N_c cycles per turn behind a gear of ratio N has n = N N_c per turn of
-    the joint; the kinematic error of a strain-wave gear n = 2 N. The order does not depend on the
-    speed: search for it before filters of fixed frequency remove it. Confounded with joint_spring
-    and gravity at orders of 1 and below, which are not searched.
+    the joint. The kinematic error of a strain-wave gear has n = 2 N. The order does not depend on
+    the speed: search for it before filters of fixed frequency remove it. Confounded with
+    joint_spring and gravity at orders of 1 and below, which are not searched.
     Source: Taghirad and Belanger 1998.
 
     """
@@ -164,9 +164,9 @@ class ActuatorSaturation(TorqueReading):
     where the drive reports the commanded torque and supplies tau = reported - lost e(reported). A
     value of lost = 1 is a hard torque limit; a smaller value is a motor constant that decreases at
     high current. A value of clipped = 1 is a report that is limited to L. The column of ``lost``
-    is computed from the measured torque, if it was recorded: the torque is linear in it, and it
-    explains only torque beyond L. Confounded with quadratic_friction where high torque means high
-    speed, with torque_gain if L is low; a sweep of amplitudes distinguishes them.
+    is computed from the measured torque, if it was recorded. The torque is linear in the column,
+    which explains only torque beyond L. Confounded with quadratic_friction where high torque means
+    high speed, and with torque_gain if L is low. A sweep of amplitudes distinguishes them.
 
     """
 

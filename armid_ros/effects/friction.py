@@ -75,8 +75,8 @@ class AsymmetricFriction(JointLaw):
     """
     Difference of friction between the two directions of motion.
 
-    tau = dFc |sign(dq)| + dFv |dq|, where dFc = (Fc+ - Fc-) / 2 and dFv = (Fv+ - Fv-) / 2 of a
-    joint with Fc+, Fv+ forwards and Fc-, Fv- backwards; the means belong to coulomb_friction and
+    tau = dFc |sign(dq)| + dFv |dq|, where dFc = (Fc+ - Fc-) / 2 and dFv = (Fv+ - Fv-) / 2. The
+    joint has Fc+, Fv+ forwards and Fc-, Fv- backwards. The means belong to coulomb_friction and
     viscous_friction. While the joint moves, dFc is exactly collinear with a torque offset.
 
     """
@@ -133,7 +133,7 @@ class StribeckFriction(JointLaw):
     tau = dFs exp(-|dq / vs|^d) sign(dq), where dFs = Fs - Fc is the breakaway torque beyond the
     Coulomb torque. The additional friction is below 3 vs. Confounded with presliding_hysteresis,
     with the curvature of quadratic_friction, and with a velocity that was filtered too much at
-    reversals; constant velocities from 0.01 to 2 rad/s in both directions distinguish them.
+    reversals. Constant velocities from 0.01 to 2 rad/s in both directions distinguish them.
     Source: Bo and Pavelescu 1982; Armstrong-Helouvry, Dupont and Canudas de Wit 1994.
 
     """
@@ -214,8 +214,8 @@ class TemperatureDependentFriction(Effect):
     Friction that changes with the measured temperature, tau = (T - T0) (a dq + b sign(dq)).
 
     The viscous and the Coulomb coefficient of the model are those at the reference temperature T0.
-    Grease gets thinner with temperature, Fv exp(-k (T - T0)) with k from 0.01 to 0.03 1/K: the
-    slope a is the first order of this law, -k Fv. Without measured temperature, the joints are at
+    Grease gets thinner with temperature, Fv exp(-k (T - T0)) with k from 0.01 to 0.03 1/K. The
+    slope a is the first-order term, -k Fv. Without measured temperature, the joints are at
     T0. Unlike thermal_friction, the effect is the same on a cold and on a warm day.
     Source: Bittencourt and Axelsson 2014, in the form of first order.
 

@@ -73,9 +73,10 @@ class BaseTilt(_GravityEffect):
     """
     Tilt of the robot base relative to the base of the model.
 
-    The base is turned by the rotation vector (tilt_x, tilt_y) about two axes normal to gravity:
-    the base's own x and y for a base that is upright in the model. A rotation about gravity has no
-    effect. Confounded with an encoder offset of the first joint when its axis is horizontal.
+    The base is turned by the rotation vector (tilt_x, tilt_y) about two axes normal to gravity.
+    These are its own x and y axes for a base that is upright in the model. A rotation about
+    gravity has no effect. Confounded with an encoder offset of the first joint when its axis is
+    horizontal.
 
     """
 

@@ -3,9 +3,9 @@
 """
 Springs and dampers between a link and a person, another machine or the world.
 
-The spring is between a point of a link (``attachment``, in the frame of its joint) and an anchor:
-a fixed point of the base frame, or one whose motion was recorded, see ``tied``. The force of the
-spring acts on the arm, the opposite force on the anchor.
+The spring is between a point of a link (``attachment``, in the frame of its joint) and an anchor.
+The anchor is a fixed point of the base frame, or a point whose motion was recorded; see ``tied``.
+The force of the spring acts on the arm, the opposite force on the anchor.
 
 """
 
@@ -104,7 +104,7 @@ class HumanInteraction(Attached):
     the anchor is at rest at the position of the attachment in the middle of the range of motion. A
     spring fixed at another point r' has the force f = k (r' - r), so that an unknown anchor is
     three linear parameters. Confounded with joint_spring on a single moving joint and with the
-    weight of the limb; the sum of the torques of a pair does not contain the spring, their
+    weight of the limb. The sum of the torques of a pair does not contain the spring, their
     difference does.
     Source: the human-exoskeleton leg pair, springs between corresponding segments.
 

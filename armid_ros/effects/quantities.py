@@ -122,10 +122,9 @@ class Shape:
         """
         Return whether a confidence interval of the shape is informative.
 
-        The interval is uninformative if it covers all possible values. For a non-negative shape,
-        it is also uninformative if its half width exceeds a multiple of the value, or of the
-        smallest start value if that is larger. For any other shape, the half width is compared
-        with the range of the start values.
+        The interval is uninformative if it covers all possible values. The half width of a
+        non-negative shape may be three times the value, or the smallest start value if that is
+        larger. The half width of any other shape may be the range of the start values.
 
         Parameters
         ----------
@@ -139,7 +138,6 @@ class Shape:
             return False
         if self.lower >= 0.0:
             least = min((start for start in self.grid if start > 0.0), default=0.0)
-            # values with wider confidence intervals are uninformative
             return half_width <= 3.0 * max(value, least)
         span = max(self.grid, default=0.0) - min(self.grid, default=0.0)
         return span <= 0.0 or half_width <= span

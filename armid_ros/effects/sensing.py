@@ -118,7 +118,7 @@ class EncoderOffset(Displacing):
 
     To first order, the torque changes by dtau/dq times the offset, which is the same at all loads.
     Confounded with base_tilt (exactly, for the first joint of a planar arm), and with the
-    direction of the link's first moment: free rigid parameters of a planar arm absorb the second
+    direction of the link's first moment. Free rigid parameters of a planar arm absorb the second
     joint's offset exactly. Hard stops, or centres of mass known from drawings, distinguish them.
 
     """

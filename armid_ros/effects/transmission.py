@@ -32,7 +32,7 @@ class JointElasticity(Displacing):
     To first order, the torque changes by -(dtau/dq tau + dtau/ddq dtau/dt + M d^2tau/dt^2) / K,
     summed over the elastic joints. With a damper D parallel to the spring, the twist follows the
     torque with the retardation time D / K. Confounded with time_delay and torque_lag at low
-    frequency, and with an elastic base; a sweep through antiresonance and resonance, or an encoder
+    frequency, and with an elastic base. A sweep through antiresonance and resonance, or an encoder
     at the link, distinguishes them.
     Source: Spong 1987.
 
@@ -73,12 +73,11 @@ class Backlash(Displacing):
     """
     Free play of a gear, q_link = q_motor - b / 2 on the loaded flank.
 
-    When the load changes its sign, the link leaves its flank and crosses to the other flank, with
-    the acceleration load / M_jj relative to the motor, and lands without a bounce. The
-    torque is linear in the quantity ``backlash``; the shape ``crossing_width`` determines the
-    duration of a crossing. Both are equal for a real gap. Confounded with
-    presliding_hysteresis and with a hardening spring; reversals with and without load, or an
-    encoder at the link, distinguish them.
+    When the load changes its sign, the link leaves its flank and crosses to the other flank. Its
+    acceleration relative to the motor is load / M_jj, and it lands without a bounce. The torque is
+    linear in the quantity ``backlash``. The shape ``crossing_width`` determines the duration of a
+    crossing. Both are equal for a real gap. Confounded with presliding_hysteresis and with a
+    hardening spring. Reversals with and without load, or an encoder at the link, distinguish them.
     Source: Nordin and Gutman 2002.
 
     """

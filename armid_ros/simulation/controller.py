@@ -241,9 +241,9 @@ class MotorControl(Controller):
         """
         Return velocity loops designed for an arm with elastic joints.
 
-        The feedforward uses the same arm. The velocity gain is the smallest of three: the gain of
-        a rigid joint for 8 Hz, the gain sqrt(K M) with the best damping of the link on its spring,
-        and the largest stable gain of a sampled loop on a rotor. The position gain makes the joint
+        The feedforward uses the same arm. The velocity gain is the smallest of three gains: that
+        of a rigid joint for 8 Hz; sqrt(K M), with the best damping of the link on its spring; and
+        the largest stable one of a sampled loop on a rotor. The position gain makes the joint
         critically damped.
 
         """

@@ -106,9 +106,8 @@ class ElasticJoints:
         """
         Return the springs and matrices of the elastic joints of an arm.
 
-        The arguments are the arm, the settings, the directions of dry friction, (m, n), the
-        inertia matrix of the links in the middle of the ranges, (n, n) [kg m^2], and the step of
-        the plant [s].
+        `directions` are those of dry friction, (m, n). `mass` is the inertia matrix of the links
+        in the middle of the ranges, (n, n) [kg m^2]. `dt` is the step of the plant [s].
 
         Raises
         ------

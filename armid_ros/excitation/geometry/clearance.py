@@ -211,9 +211,9 @@ class ClearanceModel:
         """
         Prove that all pairs keep the margin along a path, or return the closest approach found.
 
-        On an interval, the distance of a pair is at least the mean of the distances at both ends,
-        minus half the distance that the joints between the bodies can move them. An interval for
-        which this bound is below the margin is halved.
+        On an interval, the joints between two bodies move them by a limited travel. Their distance
+        is at least the mean of the distances at both ends, minus half this travel. An interval
+        for which this bound is below the margin is halved.
 
         Parameters
         ----------

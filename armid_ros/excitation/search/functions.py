@@ -7,10 +7,10 @@ Columns that depend only on the state are differentiated by finite differences o
 samples at once. Columns that depend on the past of the motion are differentiated by finite
 differences of every coefficient.
 
-Each limit of each joint is one constraint, c <= 0: the soft maximum (Kreisselmeier and Steinhauser
-1979) of its excess over all samples, relative to the limit. A soft maximum is never below the
-maximum, so a trajectory with c <= 0 keeps the limits in every sample. It
-exceeds the maximum by at most log(samples) / sharpness.
+Each limit of each joint is one constraint, c <= 0. It is the soft maximum (Kreisselmeier and
+Steinhauser 1979) of the excess over all samples, relative to the limit. A soft maximum is never
+below the maximum, so a trajectory with c <= 0 keeps the limits in every sample. It exceeds the
+maximum by at most log(samples) / sharpness.
 
 """
 
