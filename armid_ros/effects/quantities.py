@@ -71,7 +71,7 @@ class Quantity:
 
     def largest(self, joint: str, robot: Robot) -> float:
         """
-        Return the largest plausible size on a joint of a robot, or on the whole arm (`''`).
+        Return the largest plausible size of a quantity on a joint, or on the whole arm (`''`).
 
         The size is limited by the bounds, by the torque limit of the joint if described, and by a
         multiple of the typical size. It is inf without any of these limits.
@@ -120,7 +120,7 @@ class Shape:
 
     def determined(self, value: float, half_width: float) -> bool:
         """
-        Return whether a confidence interval of the shape is informative.
+        Return whether the confidence interval of a shape parameter is informative.
 
         The interval is uninformative if it covers all possible values. The half width of a
         non-negative shape may be three times the value, or the smallest start value if that is

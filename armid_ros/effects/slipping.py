@@ -50,7 +50,7 @@ class Hysteresis:
 
     def along(self, q: FloatArray, dq: FloatArray) -> FloatArray:
         """
-        Return the states of the springs along a path, shape (N, m).
+        Return the states of slipping springs along a path, shape (N, m).
 
         Parameters
         ----------

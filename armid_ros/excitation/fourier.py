@@ -117,7 +117,7 @@ class FourierTrajectory:
         Returns
         -------
         Motion
-            With tau None.
+            Motion without torque.
 
         """
         time = np.asarray(t, dtype=float)
@@ -130,7 +130,7 @@ class FourierTrajectory:
         return Motion(self.joints, time, *states)
 
     def one_period(self, n_samples: int) -> Motion:
-        """Return n_samples equally spaced samples of one period, without its end."""
+        """Return n_samples equally spaced samples of one period of the trajectory."""
         return self.motion(np.arange(n_samples) * (self.period / n_samples))
 
     def with_margins(self, n_samples: int) -> Motion:

@@ -169,7 +169,7 @@ class Excitation:
         Returns
         -------
         Motion
-            With tau None; t starts at 0 and is k / rate.
+            Motion without torque; t starts at 0 and is k / rate.
 
         Raises
         ------

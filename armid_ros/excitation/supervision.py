@@ -219,7 +219,7 @@ class Rehearsal:
 
     def add(self, phase: float, q: FloatArray, tau: FloatArray) -> None:
         """
-        Add a measured joint state to the results.
+        Add a measured joint state to the results of a rehearsal.
 
         Parameters
         ----------
@@ -240,7 +240,7 @@ class Rehearsal:
         return np.asarray(np.abs(self._arm.joint_torque(wanted)).max(axis=0))
 
     def report(self) -> tuple[str, tuple[str, ...]]:
-        """Return a summary of the results, and a sentence on each joint of unexpected torque."""
+        """Return a summary of a rehearsal, and a sentence on each joint of unexpected torque."""
         if not self._count:
             fault = 'no joint state was received during the rehearsal'
             return fault, (fault,)

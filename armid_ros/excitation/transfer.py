@@ -64,7 +64,7 @@ class TransferPlanner:
 
     @classmethod
     def of(cls, arm: ArmModel, scene: CollisionScene, speed: str | float) -> TransferPlanner:
-        """Return the planner for an arm and its surroundings, with a speed as in `Limits.of`."""
+        """Return the transfer planner of an arm and its surroundings, for a speed of the run."""
         clearance = ClearanceModel.of(scene.bodies, scene.clearance)
         return cls(arm, transfer_limits(arm.robot, speed), clearance)
 

@@ -217,7 +217,7 @@ class SimulatedArm:
 
     def successor(self, arm: ArmModel) -> Plant:
         """
-        Return the plant of this arm with another arm model.
+        Return the plant that simulates another arm model in place of the present one.
 
         Raises
         ------

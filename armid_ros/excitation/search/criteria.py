@@ -126,7 +126,7 @@ class Criterion:
 
     def smooth(self, matrix: FloatArray) -> tuple[float, FloatArray]:
         """
-        Return a smooth approximation of the cost and its gradient.
+        Return a smooth approximation of the cost of an information matrix, and its gradient.
 
         Returns
         -------

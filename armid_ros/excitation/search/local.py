@@ -46,7 +46,7 @@ _BOX_HALF_WIDTH = 0.5
 
 
 class _OutOfTime(Exception):
-    """The time budget is used up."""
+    """Signal that the time budget of a search is used up."""
 
 
 class Search:
