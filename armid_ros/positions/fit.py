@@ -260,8 +260,7 @@ def _fit_at(problem: _Problem, x: FloatArray, free: npt.NDArray[np.bool_]) -> Po
     weighted = problem.slopes(x, np.arange(count)) / sigma[:, np.newaxis]
     gradients = np.einsum('mjp,mj->mp', weighted, residuals / sigma)
     t = np.concatenate([k * 1e6 + window.t for k, window in enumerate(problem.windows)])
-    # residuals are correlated within blocks of 0.5 s
-    _, block = np.unique(np.floor(t / 0.5), return_inverse=True)
+    _, block = np.unique(np.floor(t / 0.5), return_inverse=True)  # 0.5 s: correlated residuals
     scores = np.zeros((block.max() + 1, count))
     np.add.at(scores, block, gradients)
     information = np.einsum('mjp,mjr->pr', weighted, weighted)
