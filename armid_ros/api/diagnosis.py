@@ -61,7 +61,7 @@ _Made = TypeVar('_Made')
 @dataclass(frozen=True, repr=False, eq=False)
 class DiagnosisResult(ShownModel):
     """
-    Result of a diagnosis: named effects, the patched model, and the evidence.
+    Result of a diagnosis: named effects, the model with these effects, and the evidence.
 
     Attributes
     ----------
@@ -80,7 +80,7 @@ class DiagnosisResult(ShownModel):
     residual : Residual or None
         Learned map of the unexplained residual; None if none was learned.
     forward : tuple of ForwardValidation
-        Held-out recordings simulated with the given and with the patched model.
+        Held-out recordings, simulated with the given model and with the named effects added.
     next_run : NextRun or None
         A motion that separates ambiguous names.
     no_run : str
@@ -129,7 +129,7 @@ class DiagnosisResult(ShownModel):
 
     @property
     def arm(self) -> ArmModel:
-        """Return the patched model, with the learned residual if there is one."""
+        """Return the model with the named effects, and with the learned residual if any."""
         return self.core.arm if self.residual is None else self.residual.arm
 
     def plot(self) -> npt.NDArray[np.object_]:
@@ -270,7 +270,7 @@ class DiagnosisResult(ShownModel):
         if self.simulated is not None:
             sources = ', '.join(one.source for one in self.simulated.recordings)
             error = f'{self.simulated.error_percent:.2g} %'
-            lines.append(f'simulator: identified from {sources} to {error}')
+            lines.append(f'simulator: identified from {sources} with a torque error of {error}')
         if self.baseline:
             lines.append(f'baseline: {", ".join(one.source for one in self.baseline)}')
         lines += cause_sentences(self.core)

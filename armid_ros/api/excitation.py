@@ -143,14 +143,14 @@ class ExcitationResult(Shown):
             f'{robot.position_units[j]})'
             for j in np.flatnonzero(nearest)
         )
-        limits = f'not inside the position limits, 2 % at each end unused: {ranges}'
+        limits = f'zero is outside the used 96 % of the position range of {ranges}'
         fault = self.planner.fault(nearest)
-        reasons = [limits] * bool(ranges) + [f'not free: {fault}'] * bool(fault)
-        return f'zero is no start: {"; ".join(reasons)}' if reasons else ''
+        reasons = [limits] * bool(ranges) + [f'the zero pose is not free: {fault}'] * bool(fault)
+        return f'the start pose is not zero: {"; ".join(reasons)}' if reasons else ''
 
     @cached_property
     def run(self) -> Run:
-        """Return the trajectory with motions to and from it; TrajectoryError without free path."""
+        """Return approach, trajectory and way back as one run; TrajectoryError without a path."""
         excitation = self.core.excitation
         return plan_run(excitation, self.planner, self.start, WAYPOINT_RATE, seed=self.seed)
 

@@ -128,12 +128,6 @@ class IdentificationResult(ShownModel):
         return Score.of(self.core.training)
 
     @property
-    def held_out_score(self) -> Score | None:
-        """Errors on held-out recordings; None if there are none."""
-        fits = [fit for part in self.validation.values() for fit in part]
-        return Score.of(fits) if fits else None
-
-    @property
     def error_percent(self) -> float:
         """Torque error of the worst joint in the grade, 100 |tau - tau_hat| / |tau| [%]."""
         return self.graded.error_percent
@@ -263,7 +257,7 @@ class IdentificationResult(ShownModel):
         bodies = []
         if core.bodies_cost is not None:
             grows = f'(torque error {100.0 * max(core.bodies_cost, 0.0):.2g} % larger)'
-            bodies = [f'no consistent links near the described fit as well {grows}: --physical']
+            bodies = [f'physically consistent links fit worse {grows}; --physical fits them']
             if self.exports:
                 bodies = [f'links are physically consistent {grows}; {", ".join(self.exports)}']
                 bodies += far_from_described(

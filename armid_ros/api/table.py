@@ -124,7 +124,7 @@ class Shown(ABC):
         return Path(path)
 
     def fill(self, folder: Path, origin: ResultOrigin = DEFAULT_ORIGIN) -> dict[str, Any]:
-        """Write all files of the result into a folder that exists; return its document."""
+        """Write all files of the result into an existing folder; return the JSON document."""
         document = self.document(origin)
         write_file(folder / self.files[1], self.page(origin))
         write_file(folder / self.files[0], json_text(document, indent=1))

@@ -177,7 +177,7 @@ def _speed(context: click.Context, parameter: click.Parameter, value: Any) -> st
     help='Number of random trajectories to search from; default 4, 1 above 20 joints.',
 )
 @click.option(
-    '--iterations', default=150, show_default=True, help='Number of iterations of each restart.'
+    '--iterations', default=150, show_default=True, help='Number of iterations of each search.'
 )
 @click.option(
     '--time-budget',
@@ -303,7 +303,7 @@ def _driven(source: str, gravity: str, joints: str | None, bags: tuple[Path, ...
     )
     if others:
         drives = f'{", ".join(others)}; --joints A,B,... drives them'
-        say(f'not driven, as they belong to no arm: {drives}', 'yellow')
+        say(f'not driven, because they belong to no arm: {drives}', 'yellow')
     return robot
 
 

@@ -117,7 +117,7 @@ class FleetFit:
         return cls(base, tuple(kept), replace(fit, values=values))
 
     def noise(self, rows: Iterable[Regression]) -> FloatArray:
-        """Return the covariance of the sums of column times residual over the rows, (r, r)."""
+        """Return the noise covariance of the normal equations of given rows, shape (r, r)."""
         products = np.zeros((len(self.kept), len(self.kept)))
         for part in rows:
             some = part.restrict(self.kept)
@@ -127,7 +127,7 @@ class FleetFit:
         return products
 
     def estimate(self, normal: NormalEquations, noise: FloatArray) -> FleetEstimate:
-        """Return the estimate, with standard deviations from the noise products of its rows."""
+        """Return the estimate, with standard deviations from the noise covariance of its rows."""
         some, inverse = normal.restrict(self.kept), self.fit.inverse
         return FleetEstimate(
             self.base.parameters,

@@ -29,8 +29,6 @@ import numpy as np
 
 #: Number of times that Dask repeats a task if its store failed.
 RETRIES = 3
-#: Status of tasks if the scheduler was lost.
-_LOST_STATUS = ('cancelled', 'lost')
 
 
 @dataclass(frozen=True)
@@ -126,7 +124,7 @@ def fit(groups: Sequence[MergedBags], job: Job) -> Fitted:
 
 
 def noise(taken: Sequence[BagSummary | Refused], fitted: Fitted, job: Job) -> FloatArray | None:
-    """Task: compute the noise products of a group of bags at the estimate of their arm."""
+    """Task: compute the noise covariance of the normal equations of a group of bags."""
     known, found = fitted[1], None
     for one in taken:
         if known is not None and isinstance(one, BagSummary):
@@ -269,7 +267,7 @@ class _Run:
                 # An arm that had finished also fails if its worker ends and its tasks cannot be
                 # repeated.
                 outcome = None
-            if future.status in _LOST_STATUS:
+            if future.status in ('cancelled', 'lost'):
                 raise FleetError(
                     'the scheduler was lost, and with it the tasks; finished results are kept: '
                     'run the same command again with --resume'

@@ -82,10 +82,10 @@ class Inspection:
             if self.recording.tau is None:
                 return 'No efforts: nothing can be identified from motion alone.'
             if any(remark.weight == 'bad' for remark in self.remarks):
-                return 'Not fit for identification as it is.'
-            return 'No fault found; add --robot to check limits and try a fit.'
+                return 'The recording is not fit for identification.'
+            return 'No fault found; add --robot to check limits and try an identification.'
         if self.trial.refused:
-            return 'Refused by `armid identify`.'
+            return '`armid identify` refuses the recording.'
         if self.trial.grade != 'good':
             reason = self.trial.reasons[0]
             known = _contains_any(reason, [remark.text for remark in self.remarks])

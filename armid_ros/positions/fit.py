@@ -119,7 +119,7 @@ def start_values(
     model: LoopModel, runs: Sequence[Run], gains: FloatArray | None
 ) -> tuple[FloatArray, FloatArray]:
     """
-    Return start values of the fit, and the size at which each value explains the torque, (P,).
+    Return start values of the P parameters, and the size of each that alone explains the torque.
 
     The torque balance of each joint is linear in gains, rotor inertia and friction. It is solved
     for nonnegative values and several delays. The result has the delay with the smallest

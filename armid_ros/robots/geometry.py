@@ -163,7 +163,7 @@ def collision_geometry(
 
 def sticks(model: pin.Model) -> list[tuple[int, FloatArray]]:
     """
-    Return the lines of a stick figure: index of a joint, and end of its line in its frame [m].
+    Return the lines of a stick figure of a robot: joint index, and end in the joint's frame [m].
 
     A line ends at the next joint; the line of the last body ends beyond its centre of mass.
     Index 0 is the base.

@@ -334,10 +334,6 @@ def _text(numbers: Sequence[float]) -> str:
     return ' '.join(map(repr, numbers))
 
 
-#: Suffix of the mounting file in the folder of NAME.urdf or NAME.urdf.xacro.
-_MOUNTING_SUFFIX = '.mounting.yaml'
-
-
 def read_mounting(robot: Robot) -> tuple[float | None, Path] | None:
     """
     Read the height of the floor from NAME.mounting.yaml beside NAME.urdf; None without this file.
@@ -358,7 +354,7 @@ def read_mounting(robot: Robot) -> tuple[float | None, Path] | None:
     if robot.path is None:
         return None
     stem = robot.path.name.removesuffix('.xacro').removesuffix('.urdf')
-    path = robot.path.with_name(stem + _MOUNTING_SUFFIX)
+    path = robot.path.with_name(f'{stem}.mounting.yaml')
     if not path.is_file():
         return None
     with reading(path, RobotError):
@@ -371,16 +367,12 @@ def read_mounting(robot: Robot) -> tuple[float | None, Path] | None:
     return float(floor), path
 
 
-#: Suffix of the file of coupled joints that a URDF lacks, in the folder of NAME.urdf,
-#: NAME.urdf.xacro or NAME.xml.
-_MECHANISM_SUFFIX = '.mechanism.yaml'
-
-
 def with_mechanism(text: str, path: Path) -> str:
     """
     Return a URDF with the coupled joints of NAME.mechanism.yaml added, if this file exists.
 
-    The additional elements of the result are ignored by other readers of a URDF.
+    The file is in the folder of NAME.urdf, NAME.urdf.xacro or NAME.xml. Other readers of a URDF
+    ignore the additional elements.
 
     Raises
     ------
@@ -391,7 +383,7 @@ def with_mechanism(text: str, path: Path) -> str:
     name = path.name
     for end in ('.xacro', '.urdf', '.xml'):
         name = name.removesuffix(end)
-    path = path.with_name(name + _MECHANISM_SUFFIX)
+    path = path.with_name(f'{name}.mechanism.yaml')
     if not path.is_file():
         return text
     with reading(path, RobotError):

@@ -138,7 +138,7 @@ class Mechanism:
 
     def _solved(self, u: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """
-        Close the loops for one pose of the driven joints; return positions and Jacobian J.
+        Solve the closure of loops for one pose of the driven joints; return positions and J.
 
         The third result, (m, 3 L), is the change of the moving joints per metre between the ends.
 

@@ -15,7 +15,7 @@ from armid_ros.robots.robot import Robot
 @dataclass(frozen=True)
 class HeldJoint:
     """
-    Movable joint that is not driven.
+    Movable joint that is not driven, and its locked position.
 
     Attributes
     ----------
