@@ -1,3 +1,3 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Published methods and machines, one plug-in per paper; no other module imports a plug-in."""
+"""Plug-ins that repeat published methods, one paper each; no other room imports a plug-in."""

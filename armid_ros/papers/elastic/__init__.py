@@ -1,3 +1,3 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Elastic joints, as in the paper on the two-link arm: identification and report."""
+"""Identification of arms with elastic joints, and its report."""

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Identification of two links on springs in three steps, from bags to parameters."""
+"""The command `armid elastic`: joint stiffness, inertia and friction from bags."""
 
 from __future__ import annotations
 
@@ -19,9 +19,10 @@ import click
     multiple=True,
     type=click.Path(path_type=Path),
     metavar='BAG',
-    help='Step responses, for the tuning of the parameters.',
+    help='Bag with responses to steps of the velocity reference, for the tuning; may be given '
+    'several times.',
 )
-@click.option('--demo', is_flag=True, help='Simulate the shipped arm, and identify it.')
+@click.option('--demo', is_flag=True, help='Simulate the shipped two-link arm and identify it.')
 @click.option(
     '--experiments',
     default=48,
@@ -34,10 +35,14 @@ import click
 @click.option(
     '--start',
     type=click.Choice(['found', 'before', 'after']),
-    help='Start values of the tuning: the result of the earlier steps, or a published set of '
-    'parameters. Default: found; with --demo: before, as in the source.',
+    help='Start values of the tuning: found (result of the earlier steps), or a published set of '
+    'parameters. Default: found; with --demo: before.',
 )
-@click.option('--accelerometers', metavar='R1,R2', help='Distances from the joints [m].')
+@click.option(
+    '--accelerometers',
+    metavar='R1,R2',
+    help='Distances of the accelerometers from the joints [m].',
+)
 @click.option(
     '--gear', metavar='N1,N2', help='Gear ratios: turns of the motor per turn of the joint.'
 )
@@ -48,7 +53,8 @@ import click
 @click.option(
     '--model',
     type=click.Path(path_type=Path),
-    help='model.yaml with the inertias of an arm that is no planar pair of links.',
+    help='model.yaml with the inertias of the links, for an arm that is not a planar two-link '
+    'arm.',
 )
 @parameters.folder
 @parameters.reading
@@ -70,11 +76,11 @@ def elastic(
     **given: str | None,
 ) -> None:
     """
-    Identify elastic joints.
+    Identify the stiffness of elastic joints.
 
-    A pair of links that move in a horizontal plane is identified in three steps, with its
-    resonances. The springs of any other arm are identified joint by joint, from encoders on both
-    sides of each joint and known inertias.
+    A two-link arm in a horizontal plane is identified in three steps, from its resonances. In
+    other arms, the stiffness of each joint follows from encoders on both sides of the joint and
+    from known link inertias.
 
     """
     from armid_ros.cli import options
@@ -94,14 +100,14 @@ def elastic(
     if not planar_pair(robot):
         if demo or steps:
             raise RobotError(
-                f'--demo and --steps need a pair of links that move in a horizontal plane, which '
-                f'{robot.name} is not; without them its springs are identified joint by joint'
+                f'--demo and --steps need a two-link arm in a horizontal plane, not {robot.name}; '
+                'leave them out to identify each joint of this arm'
             )
         identify_springs(bags, robot, robot_source, model, out, as_json)
         return
     if model is not None:
         raise RobotError(
-            '--model is not available here: this method identifies the inertias itself'
+            '--model is not available with a planar two-link arm, whose inertias are identified'
         )
     radius, drives, loop = work.machine(**given)
     staged = options.stage(out, report.SCHEMA, robot_source)
@@ -109,7 +115,7 @@ def elastic(
         if demo:
             bags, steps = work.simulate(robot, radius, staged, experiments, seed, tick)
         elif not bags:
-            raise RecordingError('no bag is given; give one, or --demo to simulate one')
+            raise RecordingError('no bag is given; name a bag, or give --demo to simulate an arm')
         how = options.read_settings(), options.tell_damage
         runs, responses = (
             [run for path in paths for run in read_runs(path, robot, radius, *how)]
@@ -123,7 +129,7 @@ def elastic(
         if robot.name == ROBOT:
             known, table = shipped, 'Table 1 of the source, after tuning'
         elif printed is not None:
-            table = f"the set '{begin}', which the tuning began with"
+            table = f"the parameter set '{begin}', the start of the tuning"
         seeds = seed if demo else None
         origin = provenance([*bags, *steps], {'start of the tuning': begin}, seeds)
         page = report.elastic_report(result, robot.name, known, table, origin)

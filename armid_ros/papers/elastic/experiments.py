@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Simulated experiments with the shipped two-link arm, under its velocity loops."""
+"""Simulated experiments with the shipped two-link arm under velocity control."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _JOINTS = ('joint1', 'joint2')
 
 def resonance_experiments(count: int, rng: np.random.Generator) -> list[Reference]:
     """
-    Return experiments that excite both joints of the shipped arm through their resonances.
+    Return references of experiments that excite the resonances of both joints.
 
     The motors follow a slow sine of velocity under a loop of low gain, so that friction rarely
     changes its sign. A multisine of torque is added. Poses are random around the stretched arm,
@@ -55,7 +55,7 @@ def resonance_experiments(count: int, rng: np.random.Generator) -> list[Referenc
 
 
 def step_experiments() -> list[Reference]:
-    """Return steps of the reference velocity, in poses that make all parameters identifiable."""
+    """Return references with a velocity step, in poses that make all parameters identifiable."""
     angles = (0.0, np.pi / 2, np.pi / 4, 3 * np.pi / 4)  # of joint 2 [rad]
     velocities = ((1.0, 0.0), (0.0, 1.0), (1.0, -1.0), (1.0, 1.0))  # [rad/s]
     return [
@@ -65,7 +65,7 @@ def step_experiments() -> list[Reference]:
 
 
 def step_of_velocity(pose: FloatArray, velocity: FloatArray) -> Reference:
-    """Return 0.5 s at constant velocity, (2,) [rad/s], after a sample of rest in a pose, (2,)."""
+    """Return a reference that rests in a pose, (2,), then moves at a velocity, (2,), for 0.5 s."""
     t = np.array([0.0, _DT, _DT + 0.5])
     return Reference(_JOINTS, t, np.array([pose, pose, pose + 0.5 * velocity]))
 
@@ -79,20 +79,20 @@ def run_experiment(
     sensors: Sensors | None = None,
 ) -> ElasticRun:
     """
-    Simulate an experiment from rest.
+    Simulate an experiment of the two-link arm from rest, and return motor and link motion.
 
     Parameters
     ----------
     reference : Reference
         Motion of the motors, and torque that is added to the torque of the loops.
     drives : TwoLinkSet
-        The arm and its loops.
+        Parameters of the arm and gains of its velocity loops.
     rng : numpy.random.Generator
         Source of the sensors' noise.
     gain : float
-        Factor on the gains of the loops.
+        Factor on the gains of the velocity loops.
     sensors : Sensors, optional
-        Noise; none by default.
+        Noise of the sensors; none by default.
 
     """
     arm = make_simulated_arm(

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The report and the document of two links on springs: stiffness and responses of the joints."""
+"""Report and JSON document of the identification of a two-link arm with elastic joints."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def elastic_report(
     provenance: Provenance,
 ) -> str:
     """
-    Return report.html of an identification of elastic joints.
+    Return the HTML page of the identification of a two-link arm with elastic joints.
 
     Parameters
     ----------
@@ -82,7 +82,7 @@ def elastic_report(
 
 
 def verdict(result: TwoInertiaIdentification) -> VerdictSection:
-    """Return the verdict: stiffness of the springs, intervals, and poor joints."""
+    """Return the verdict box: stiffness with 95 % intervals, and joints with a poor fit."""
     springs = []
     for k, joint in enumerate(result.joints):
         value = f'{result.parameters.stiffness[k]:.0f}'
@@ -113,9 +113,7 @@ def verdict(result: TwoInertiaIdentification) -> VerdictSection:
             f'The error of the step responses fell from {digits(before)} to {digits(after)} rad/s '
             'rms by tuning, noise included.'
         )
-        beware.append(
-            'Only the sum of the viscous friction of link and motor is known, not the shares.'
-        )
+        beware.append('Only the sum of the viscous friction of link and motor is identifiable.')
     if poor:
         step = f'Look at the frequency responses of {", ".join(poor)}.'
     grade, tone = ('uncertain', 'fair') if poor else ('found', 'good')
@@ -123,7 +121,7 @@ def verdict(result: TwoInertiaIdentification) -> VerdictSection:
 
 
 def named_rows(document: dict[str, Any]) -> list[dict[str, Any]]:
-    """Return the rows of parameters and total damping of a document, with names in words."""
+    """Return parameters and total damping of an elastic.json document, with names in words."""
     words = {symbol: f'{name_in_words(field)} ({symbol})' for field, symbol, _ in PER_JOINT}
     rows = [*document['parameters'], *document.get('total_damping', [])]
     return [row | {'name': words.get(row['name'], row['name'])} for row in rows]
@@ -132,14 +130,14 @@ def named_rows(document: dict[str, Any]) -> list[dict[str, Any]]:
 def _parameters_section(
     result: TwoInertiaIdentification, known: TwoLinkParameters | None, source: str
 ) -> ContentSection:
-    """Return a section with parameters, intervals and reference parameters."""
+    """Return the section with parameters, 95 % intervals and reference values."""
     untuned = np.concatenate([unpack(result.untuned), result.untuned.total_damping])
-    text = 'From the frequency responses. Step responses would tune them and give intervals.'
+    text = 'Fitted to the frequency responses. Step responses would add 95 % intervals.'
     heads = ['Parameter', 'Joint', 'Estimate']
     if result.tuning is not None:
         text = (
-            'Tuned to the step responses; intervals hold 95 %. Of dl and dm only the sum is known '
-            'well, dl + dm gear². The shares of link and motor are those of the start values.'
+            'Tuned to the step responses. Only the sum dl + dm gear² of link and motor damping is '
+            'identifiable; its division between both is that of the start values.'
         )
         heads += ['± 95 %', 'Untuned']
     if known is not None:
@@ -162,7 +160,7 @@ def _parameters_section(
 
 
 def rigid_section(fit: RigidFit) -> ContentSection:
-    """Return a section with the parameters of step 1, the arm with rigid joints."""
+    """Return the section with the parameters of step 1, in which joints are rigid."""
     estimate = fit.estimate
     rows = [
         (pretty(name.name), name.joint, *measured(value, HALF_WIDTH * std), pretty(name.unit))
@@ -171,9 +169,9 @@ def rigid_section(fit: RigidFit) -> ContentSection:
         )
     ]
     text = (
-        f'Step 1, least squares below {CUTOFF:g} Hz. The inertias of motor and link of joint 1, '
-        f'and the friction of motors and links, are known as sums. The relative torque error is '
-        f'{fit.relative_error:.2f} %.'
+        f'Step 1, least squares below {CUTOFF:g} Hz. Motor and link inertia of joint 1 are '
+        f'identifiable only as a sum, and so is the friction of motors and links. The relative '
+        f'torque error is {fit.relative_error:.2f} %.'
     )
     heads = ('Parameter', 'Joint', 'Estimate', '± 95 %', 'Unit')
     return ContentSection('Rigid arm', [Paragraph(text), DataTable(heads, rows, words=(0, 1, 4))])
@@ -185,12 +183,12 @@ _SIZE = 'magnitude [dB re rad/(N m s)]'
 
 
 def responses_section(result: TwoInertiaIdentification) -> ContentSection:
-    """Return a section with responses from motor torque to motor velocity of both joints."""
+    """Return the section with frequency responses of motor velocity to motor torque."""
     text = (
         'Motor velocity per motor torque at each frequency. At the dip (antiresonance), the link '
         'swings on its spring; at the peak (resonance), motor and link swing against each other. '
-        'Without the torque of the other joint (decoupled), a joint is a motor and a link on a '
-        'spring. Drag across a plot, or pinch it, to zoom; double-click or double-tap to reset.'
+        'Decoupled: without the torque of the other joint. Drag across a plot, or pinch it, to '
+        'zoom; double-click or double-tap to reset.'
     )
     hint = (
         'Dashed lines: antiresonance and resonance of the joint alone. Errors are from 5 to 60 Hz.'
@@ -204,7 +202,7 @@ def responses_section(result: TwoInertiaIdentification) -> ContentSection:
 def response_error(
     result: TwoInertiaIdentification, joint: int, *, decoupled: bool = True
 ) -> float:
-    """Return the difference of measured and model responses of a joint, 5 to 60 Hz [dB]."""
+    """Return the rms error of the modelled frequency response of a joint, 5 to 60 Hz [dB]."""
     measured = result.measured[joint]
     seen = (measured.frequency >= _COMPARED_BAND[0]) & (measured.frequency <= _COMPARED_BAND[1])
     ideal = ideal_response(result.parameters, joint, measured.frequency[seen])[:, 0, 0]
@@ -213,7 +211,7 @@ def response_error(
 
 
 def _joint(result: TwoInertiaIdentification, k: int) -> list[Templated]:
-    """Return magnitude, phase and facts of the response of one joint."""
+    """Return charts of magnitude and phase, and resonances and errors, of one joint."""
     measured = result.measured[k]
     seen = (measured.frequency >= _SHOWN_BAND[0]) & (measured.frequency <= _SHOWN_BAND[1])
     own = measured.frequency[seen]
@@ -259,7 +257,7 @@ def _joint(result: TwoInertiaIdentification, k: int) -> list[Templated]:
 
 
 def steps_section(tuning: Tuning) -> ContentSection:
-    """Return a section with link velocities after reference steps, before and after tuning."""
+    """Return the section with measured and simulated link velocities after reference steps."""
     before, after = tuning.rms
     text = (
         'Velocities of the links after steps of the reference. The rms residual is '
@@ -297,7 +295,7 @@ MAIN = ('alpha', 'beta', 'gamma', 'mm', 'kg')
 
 
 def elastic_document(result: TwoInertiaIdentification, robot: str) -> dict[str, Any]:
-    """Return an identification of elastic joints as the document that elastic.json holds."""
+    """Return the content of elastic.json for a two-link arm."""
     parameters, rigid = result.parameters, result.rigid.estimate
     names = parameter_names(result.joints)
     std = [None] * len(names) if result.tuning is None else list(result.tuning.estimate.std)
@@ -335,7 +333,7 @@ def elastic_document(result: TwoInertiaIdentification, robot: str) -> dict[str, 
 
 
 def total_damping(result: TwoInertiaIdentification) -> list[dict[str, Any]]:
-    """Return dl + dm gear^2 of both joints, the identifiable sum of the two."""
+    """Return the total viscous friction dl + dm gear^2 of both joints with its deviation."""
     assert result.tuning is not None
     estimate, gear = result.tuning.estimate, result.parameters.gear
     rows = []
@@ -359,7 +357,7 @@ def tuning_story(
     tuning: Tuning, start: TwoLinkParameters, truth: TwoLinkParameters
 ) -> dict[str, Any]:
     """
-    Return the errors of a tuning against the true parameters of a simulated arm.
+    Return parameter and velocity errors before and after the tuning, for a simulated arm.
 
     Returns
     -------

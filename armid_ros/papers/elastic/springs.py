@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Springs of any arm, joint by joint, for `armid elastic`: work, report and document."""
+"""Identification and report of joint stiffness in arms with encoders on motors and links."""
 
 from __future__ import annotations
 
@@ -32,14 +32,14 @@ _MOTORS = (
 
 
 def _springs(found: Sequence[SpringEstimate]) -> ContentSection:
-    """Return a section with stiffness, free play and motor of every joint."""
+    """Return the section with stiffness, backlash, inertia and friction of each joint."""
     text = (
-        'The twist between motor and link is the torque of the rigid body over the stiffness. '
-        'Backlash adds a step where the load changes its sign; with a correlation near ±1 '
+        'The twist between motor and link is the rigid-body torque divided by the stiffness. '
+        'Backlash adds a step where the load changes its sign. If their correlation is near ±1, '
         'stiffness and backlash are not distinguishable. R² is the explained share of the twist.'
     )
     hint = (
-        'Frequencies are those of each joint alone, the others held, at its mean inertia in the '
+        'Frequencies of a joint while the other joints are locked, at its mean inertia in the '
         'recording.'
     )
     springs = DataTable(_SPRINGS, [_spring_row(one) for one in found])
@@ -72,27 +72,27 @@ def _motor_row(one: SpringEstimate) -> tuple[str, ...]:
 
 
 def verdict(found: Sequence[SpringEstimate]) -> VerdictSection:
-    """Return the verdict: number of identified springs, and the softest one."""
+    """Return the verdict box: number of joints with a known stiffness, and the softest joint."""
     known = [one for one in found if one.informative]
     lost = [one.joint for one in found if not one.informative]
     beware = [
-        'Inertias are those of the description or model: a stiffness is as accurate as they are.'
+        'Link inertias are those of the description or model; their errors change the stiffness.'
     ]
     step = f'Record {", ".join(lost)} again under more load, or with finer encoders.'
     if lost:
         beware.append(f'{", ".join(lost)}: the twist does not depend on the load.')
     if not known:
-        shown = ['No spring was identified.']
+        shown = ['The stiffness of no joint was identified.']
         return VerdictSection('not identifiable', 'bad', shown, beware, step=step)
     softest = min(known, key=lambda one: one.transmission.stiffness[0])
     value, low, high = softest.transmission.stiffness
     sentences = [
-        f'Stiffness of {len(known)} of {counted(len(found), "joint")} found; the softest is '
+        f'Stiffness of {len(known)} of {counted(len(found), "joint")} found; the softest joint is '
         f'{softest.joint} with {value:.4g} N m/rad ({low:.4g} to {high:.4g}, 95 %).'
     ]
     loose = [one.joint for one in known if one.transmission.backlash_seen]
     if loose:
-        sentences.append(f'Free play is seen at {", ".join(loose)}.')
+        sentences.append(f'{", ".join(loose)}: backlash is significant.')
     if not lost:
         spring = f'joint_elasticity@{softest.joint}:compliance={1.0 / value:.3g}'
         step = f'Simulate the springs: armid simulate --effect {spring}, one --effect per joint.'
@@ -110,11 +110,13 @@ def identify_springs(
     bags: Sequence[Path], robot: Robot, source: str, model: Path | None, out: Path,
     as_json: bool,
 ) -> None:  # fmt: skip
-    """Fit springs to bags with both encoders of any arm, and write the results."""
+    """Fit the stiffness of each joint to bags with motor and link encoders, and write results."""
     staged = options.stage(out, SPRINGS_SCHEMA, source)
     body = robot if model is None else options.model_of(model, robot).body
     if not bags:
-        raise RecordingError('no bag is given; give one with encoders on both sides of the joints')
+        raise RecordingError(
+            'no bag is given; name a bag with encoders on both sides of the joints'
+        )
     with progress('reading') as tick:
         try:
             sides = [read_sides(path, robot, options.read_settings()) for path in bags]
@@ -134,7 +136,7 @@ def identify_springs(
 
 
 def springs_document(found: Sequence[SpringEstimate], robot: str) -> dict[str, Any]:
-    """Return the springs of all joints as the document of elastic.json."""
+    """Return the content of elastic.json: stiffness, backlash and inertia of each joint."""
 
     def number(value: float) -> float | None:
         return float(value) if np.isfinite(value) else None

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Drives, simulated bags and tables of `armid elastic`."""
+"""Drives of the two-link arm, simulated bags and terminal tables of `armid elastic`."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ DEMO_BAGS = ('resonances', 'steps')
 
 
 def machine(**given: str | None) -> tuple[FloatArray, TwoLinkParameters, VelocityLoop]:
-    """Return where accelerometers are, drives and loop: as given, or of the shipped arm."""
+    """Return accelerometer positions, drives and velocity loop; defaults of the shipped arm."""
     shipped = two_link_set('after')
     loop = two_link_loop(shipped)
     defaults = {
@@ -64,7 +64,7 @@ def machine(**given: str | None) -> tuple[FloatArray, TwoLinkParameters, Velocit
 def simulate(
     robot: Robot, radius: FloatArray, staged: Staged, experiments: int, seed: int, tick: Tick
 ) -> tuple[list[Path], list[Path]]:
-    """Write bags of the simulated arm: through the resonances, and steps."""
+    """Simulate the two-link arm, and return bags of resonance and step experiments."""
     for name in DEMO_BAGS:
         require_new(staged.out / name)
     resonances, steps = (staged.folder / name for name in DEMO_BAGS)
@@ -84,7 +84,7 @@ def simulate(
 
 
 def resonances_table(document: dict[str, Any]) -> Table:
-    """Return stiffness, resonances and Coulomb torque of both joints."""
+    """Return a table of stiffness, resonances and Coulomb torque of both joints."""
     heads = ('joint', 'stiffness [N m/rad]', 'antiresonance', 'resonance', 'Coulomb [N m]')
     stiffness = {
         row['joint']: row['value'] for row in document['parameters'] if row['name'] == 'kg'
@@ -102,7 +102,7 @@ def resonances_table(document: dict[str, Any]) -> Table:
 
 
 def values_table(document: dict[str, Any]) -> Table:
-    """Return all parameters with their standard deviations."""
+    """Return a table of all parameters with their standard deviations."""
     return ('parameter', 'joint', 'value', 'std', 'unit'), [
         (
             row['name'],

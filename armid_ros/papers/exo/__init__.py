@@ -1,3 +1,3 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""An exoskeleton and its wearer: simulation, springs and report."""
+"""Exoskeleton and wearer: simulation, identification of the straps, and report."""

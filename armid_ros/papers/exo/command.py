@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Identification of the springs between a machine and its wearer, from torques and angles."""
+"""The command `armid exo`: stiffness of the straps between exoskeleton and wearer."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from pathlib import Path
 from armid_ros.cli import parameters
 import click
 
-#: Motions of a leg and its exoskeleton; `armid_ros.papers.exo.plant.leg_pair.EXERCISES`.
+#: Names of `armid_ros.papers.exo.plant.leg_pair.EXERCISES`, repeated for a fast start.
 EXERCISES = ('step', 'quick_step', 'swing', 'lift', 'squat', 'rock')
 
 
@@ -23,34 +23,46 @@ EXERCISES = ('step', 'quick_step', 'swing', 'lift', 'squat', 'rock')
     '--topics',
     default='/exo/joint_states,/human/joint_states',
     show_default=True,
-    help='JointState topics of the machine and of its wearer.',
+    help='JointState topics of the exoskeleton and of the wearer.',
 )
 @click.option(
     '--inertias',
     type=click.Choice(['known', 'free']),
     default='known',
     show_default=True,
-    help="Whether the machine's inertias are those of its description, or estimated as well.",
+    help='Inertias of the exoskeleton: known from its description, or free (estimated).',
 )
 @click.option(
     '--gait',
     'gait_file',
     type=click.Path(path_type=Path),
-    help='Gait (CSV); default level walking.',
+    help='CSV file with the joint angles of a gait cycle; default: level walking.',
 )
 @click.option(
-    '--stiffness', type=float, help='Stiffness of simulated springs [N/m]; default: as assumed.'
+    '--stiffness', type=float, help='Stiffness of the simulated straps [N/m]; default: 10000.'
 )
 @click.option(
     '--motion',
     type=click.Choice(list(EXERCISES)),
     default='step',
     show_default=True,
-    help='What the simulated pair does on one foot.',
+    help='Simulated motion on one foot.',
 )
-@click.option('--duration', default=10.0, show_default=True, help='Length of the simulation [s].')
-@click.option('--torque-noise', default=0.5, show_default=True, help='Torque noise (std) [N m].')
-@click.option('--angle-noise', default=0.05, show_default=True, help='Angle noise (std) [deg].')
+@click.option(
+    '--duration', default=10.0, show_default=True, help='Length of the simulated recording [s].'
+)
+@click.option(
+    '--torque-noise',
+    default=0.5,
+    show_default=True,
+    help='Standard deviation of the simulated torque noise [N m].',
+)
+@click.option(
+    '--angle-noise',
+    default=0.05,
+    show_default=True,
+    help='Standard deviation of the simulated angle noise [deg].',
+)
 @parameters.seed
 @parameters.reading
 @parameters.as_json
@@ -69,9 +81,10 @@ def exo(
     as_json: bool,
 ) -> None:
     """
-    Identify the springs between an exoskeleton and its wearer.
+    Identify the stiffness of the straps between an exoskeleton and its wearer.
 
-    Without a BAG the shipped pair walks, is recorded with noise, and its springs are found again.
+    Without a BAG, a motion of the shipped exoskeleton and wearer is simulated, recorded with noise
+    and identified.
 
     """
     from armid_ros.cli import options
@@ -91,7 +104,7 @@ def exo(
     names = topics.split(',')
     if len(names) != 2:
         raise ModelError(
-            f'--topics {topics}: two topics are needed, one of the machine and one of its wearer'
+            f'--topics {topics}: give two topics, exoskeleton first, then wearer, with a comma'
         )
     if bag is None:
         require_new(out / 'recording')
@@ -123,5 +136,5 @@ def exo(
         (row['segment'], f'{row["value"]:.1f}', f'{row["std"]:.1f}')
         for row in document['stiffness']
     ]
-    table = None if as_json else (('spring', 'stiffness [N/m]', 'std'), rows)
+    table = None if as_json else (('strap', 'stiffness [N/m]', 'std'), rows)
     options.deliver_page(staged, page, 'exo', document, verdict(found, walked), table)

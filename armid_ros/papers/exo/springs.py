@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Springs between two machines: online identification, and slack of the straps.
+Online identification of the stiffness and slack of straps between two machines.
 
 A strap with slack pulls with k (|D| - slack) along D if |D| exceeds the slack; otherwise not. The
 torque is nonlinear in the slack, so the stiffness is fitted at several slacks, in the search for
@@ -29,12 +29,12 @@ from scipy.optimize import minimize_scalar
 @dataclass(frozen=True)
 class Slack:
     """
-    The slack of the ties between two machines.
+    Common slack of the straps between two machines, and their stiffness with this slack.
 
     Attributes
     ----------
     value, std : float
-        Common slack of all ties and its standard deviation [m].
+        Slack and its standard deviation [m].
     gain : float
         Decrease of the misfit relative to the fit without slack, in units of its noise.
     interaction : Interaction
@@ -49,20 +49,19 @@ class Slack:
 
     @property
     def seen(self) -> bool:
-        """Whether the slack is significant."""
-        # decrease of the misfit, in standard deviations of its noise, above which slack is
-        # significant
+        """Whether the fit with slack is significantly better than the fit without."""
+        # significance limit of the decrease of the misfit, in units of its noise
         return self.gain > 25.0
 
 
 def find_slack(problem: Callable[[float], InteractionProblem]) -> Slack:
     """
-    Fit one slack that all ties (straps) share, together with their stiffnesses.
+    Fit a common slack of all straps, together with their stiffness.
 
     Parameters
     ----------
     problem : callable
-        Callback that returns the regression for a slack [m].
+        Callback that returns the stiffness regression for a slack [m].
 
     """
     fits: dict[float, Interaction] = {}
@@ -93,7 +92,7 @@ _AVERAGED_RATE = 100.0
 
 @dataclass
 class _Averages:
-    """Means of successive samples at the averaged rate."""
+    """Buffer of the last seconds of samples, averaged to 100 Hz."""
 
     memory: float
     t: deque[float] = field(default_factory=deque)
@@ -101,6 +100,7 @@ class _Averages:
     _group: list[tuple[float, FloatArray]] = field(default_factory=list)
 
     def take(self, t: float, row: FloatArray) -> None:
+        """Add a sample; time that runs backwards clears the buffer."""
         if self._group and not 0.0 < t - self._group[-1][0] < 1.0 / _AVERAGED_RATE:
             if t <= self._group[-1][0]:
                 self.clear()
@@ -126,12 +126,12 @@ class _Averages:
 
 class OnlineInteraction:
     """
-    Identify the springs between two machines while they move.
+    Online estimator of the stiffness and slack of straps between two machines.
 
     Parameters
     ----------
     machines : TiedMachines
-        Both machines, and the attachment points of the springs.
+        Both machines, and the attachment points of the straps.
     memory : float
         Length of the time window of the estimate [s].
     period : float
@@ -144,15 +144,15 @@ class OnlineInteraction:
     Raises
     ------
     IdentificationError
-        If the times are inconsistent.
+        If the time window is shorter than 3 s or than the period.
 
     Attributes
     ----------
     together, separate : Interaction or None
-        Estimates with one stiffness for all springs, and with one for each; None before there are
-        enough data.
+        Estimates of one stiffness for all straps, and of one for each strap; None before the first
+        estimate.
     slack : Slack or None
-        Slack of the straps; None while springs without slack explain the torques.
+        Slack of the straps; None while straps without slack explain the torques.
 
     """
 
@@ -167,8 +167,8 @@ class OnlineInteraction:
     ) -> None:
         if not (memory >= 3.0 and 0.0 < period <= memory and slack_period > 0.0):
             raise IdentificationError(
-                f'a memory of {memory:g} s and estimates every {period:g} s: the memory has to '
-                'be at least 3 s and at least the time between estimates'
+                f'memory = {memory:g} s and period = {period:g} s: memory has to be at least 3 s '
+                'and at least the period'
             )
         self.machines, self._inertias = machines, inertias
         self._memory, self._period, self._slack_period = memory, period, slack_period
@@ -183,19 +183,19 @@ class OnlineInteraction:
         self.slack: Slack | None = None
 
     def interrupt(self) -> None:
-        """Discard the samples, for a break in the motion; estimates are kept."""
+        """Discard the samples after a break in the motion, but keep the estimates."""
         self._own.clear()
         self._far.clear()
         self._due: float | None = None
         self._slack_due: float | None = None
 
     def take_other(self, t: float, q: FloatArray) -> None:
-        """Add a sample of positions of the other machine, shape (m,) [rad], at a time [s]."""
+        """Add positions of the second machine, shape (m,) [rad], at a time [s]."""
         self._far.take(t, q)
 
     def take(self, t: float, q: FloatArray, tau: FloatArray) -> bool:
         """
-        Add a sample of positions and torques of the machine.
+        Add positions and torques of the first machine, and update the estimates if due.
 
         Parameters
         ----------
@@ -207,12 +207,12 @@ class OnlineInteraction:
         Returns
         -------
         bool
-            Whether there is a new estimate.
+            Whether the estimates are new.
 
         Raises
         ------
         IdentificationError
-            If the last seconds do not identify the springs, or the times of the machines do not
+            If the samples do not determine the stiffness, or the times of the machines do not
             overlap.
 
         """
@@ -235,10 +235,13 @@ class OnlineInteraction:
         return True
 
     def _problem(self, *, separate: bool, slack: float = 0.0) -> InteractionProblem:
+        """Return the stiffness regression of the samples in the buffers."""
         robot, other = self.machines.robot, self.machines.other
         n = robot.n_joints
         if len(self._own.t) < 2 or len(self._far.t) < 2:
-            raise IdentificationError(f'joint states of {robot.name} and {other.name} are needed')
+            raise IdentificationError(
+                f'too few joint states of {robot.name} or {other.name} in the time window'
+            )
         begin = self._own.t[0]
         rows = np.array(self._own.rows)
         own, far = (

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Recordings, estimates and the document of `armid exo`."""
+"""Simulated recordings, estimates and the JSON document of `armid exo`."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def record(
     noise: tuple[float, float],
     rng: Generator,
 ) -> None:
-    """Record both machines along a motion, with noise of angles [deg] and torques [N m]."""
+    """Write a bag of both machines with noise of angles [deg] and of torques [N m]."""
     tau = pair_torques(pair, *motions).tau
     tau = tau + noise[1] * rng.normal(size=tau.shape)
     stamps = 10**9 + np.rint(motions.own.t * 1e9).astype(np.int64)
@@ -54,7 +54,7 @@ def record(
 
 
 def walk(pair: TiedPair, gait: Gait, stiffness: float | None, tick: Tick) -> SimulatedWalk:
-    """Simulate the walking exoskeleton and wearer, and single joints driven by torque."""
+    """Simulate a gait cycle of exoskeleton and wearer, and joints driven by their torque."""
     tick(0.6, 'walking a whole cycle')
     walkers = walking_pair(stiffness)
     cycle, rate = gait_cycle(walkers, gait), read_assumptions()['torque_rate'].value
@@ -70,7 +70,7 @@ def walk(pair: TiedPair, gait: Gait, stiffness: float | None, tick: Tick) -> Sim
 def identify_ties(
     pair: TiedPair, machine: Recording, wearer: Recording, inertias: Any, tick: Tick
 ) -> list[Interaction]:
-    """Estimate one stiffness for all springs, and one for each."""
+    """Estimate one common stiffness of all straps, then one stiffness for each strap."""
     found = []
     for share, separate in ((0.1, False), (0.35, True)):
         tick(share, 'identifying')
@@ -86,7 +86,7 @@ def identify_ties(
 
 
 def single_support(pair: TiedPair, gait: Gait) -> tuple[PairMotion, FloatArray, str]:
-    """Return the motion of single support as a function of the gait cycle of the swing leg."""
+    """Return the motion on one foot, its gait phase, and the label of the phase axis."""
     known = read_assumptions()
     begin, end = known['single_support'].value
     cycle = known['cycle_time'].value
@@ -98,7 +98,7 @@ def single_support(pair: TiedPair, gait: Gait) -> tuple[PairMotion, FloatArray, 
 def recorded_motions(
     pair: TiedPair, machine: Recording, wearer: Recording
 ) -> tuple[PairMotion, FloatArray, str]:
-    """Return the recorded motion; the report uses only its positions."""
+    """Return the recorded positions on one time base, the times, and the label of the axis."""
     both = recorded_together(machine, wearer, pair.other)
     assert both.partner is not None
     motions = PairMotion(
@@ -113,7 +113,7 @@ def recorded_motions(
 def exo_document(
     found: list[Interaction], walked: SimulatedWalk | None, source: str
 ) -> dict[str, Any]:
-    """Return springs, and for simulated data the gait cycle, as the document of exo.json."""
+    """Return the content of exo.json: stiffness of straps and, if simulated, the gait cycle."""
     rows = [
         {
             'segment': segment,

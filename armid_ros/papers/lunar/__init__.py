@@ -1,3 +1,3 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Reproduction of the experiments of the lunar paper with a humanoid arm."""
+"""Repetition of the experiments of a paper on identifying a humanoid arm on the moon."""

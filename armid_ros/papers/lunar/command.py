@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Command that reproduces the paper on the lunar humanoid arm."""
+"""The command `armid lunar`: repeat the experiments of the paper on the lunar arm."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ import click
 _HEADS = {
     'paper': 'paper',
     'against noise': 'against_noise',
-    'weight': 'weight_alone',
-    'whole': 'whole_dynamics',
+    'gravity': 'weight_alone',
+    'dynamics': 'whole_dynamics',
 }
 
 
@@ -25,7 +25,7 @@ _HEADS = {
 @parameters.seed
 @parameters.as_json
 def lunar(out: Path, seed: int, every: bool, as_json: bool) -> None:
-    """Reproduce the lunar paper: tables, gravity parameters and torques, with its numbers."""
+    """Repeat the identification of a humanoid arm on the moon, beside the paper's numbers."""
     from armid_ros.cli import options
     from armid_ros.cli.options import provenance
     from armid_ros.cli.terminal import progress

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The report and the document of the reproduction of the lunar paper."""
+"""Report and JSON document of the repetition of the lunar paper."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ SCHEMA = 'armid/lunar/1'
 
 def lunar_report(found: Reproduction, provenance: Provenance) -> str:
     """
-    Return report.html of the reproduction.
+    Return the HTML page that compares the repetition with the paper.
 
     Parameters
     ----------
@@ -56,7 +56,7 @@ def lunar_report(found: Reproduction, provenance: Provenance) -> str:
 
 
 def verdict(found: Reproduction) -> VerdictSection:
-    """Return the verdict: ratios of errors to the errors of the paper, and the load."""
+    """Return the verdict box: torque errors beside those of the paper, and the load."""
     lines, held = [], True
     for one in found.repeated:
         slow, whole = (one.ratio(method.held_out) for method in one.methods)
@@ -65,7 +65,7 @@ def verdict(found: Reproduction) -> VerdictSection:
             low, high = (digits(float(end)) for end in np.sort(one.table.ratio)[[0, -1]])
             lines.append(
                 f'{name}: error over noise at most {digits(float(slow.max()))} with gravity '
-                f'alone, {digits(float(whole.max()))} with the whole dynamics. '
+                f'alone, {digits(float(whole.max()))} with the full dynamics. '
                 f'The paper has {low} to {high}; less is better.'
             )
             held &= bool(slow.max() <= 0.15)  # of the noise
@@ -74,10 +74,10 @@ def verdict(found: Reproduction) -> VerdictSection:
         paper = 100.0 * float(np.mean(one.table.ratio))
         held &= bool(100.0 * slow.mean() <= 1.0)  # % of the peak
         lines += [
-            f'{name}: mean torque error {digits(100.0 * float(noisy.mean()))} % of the peak; the '
-            f'paper has {digits(paper)} %.',
-            f'Against torques without noise it is {digits(100.0 * float(slow.mean()))} % with '
-            f'gravity alone, {digits(100.0 * float(whole.mean()))} % with the whole dynamics.',
+            f'{name}: mean torque error {digits(100.0 * float(noisy.mean()))} % of the peak '
+            f'torque; the paper has {digits(paper)} %.',
+            f'Without torque noise it is {digits(100.0 * float(slow.mean()))} % with gravity '
+            f'alone, {digits(100.0 * float(whole.mean()))} % with the full dynamics.',
         ]
     lines.append(
         f'The {len(found.composites)} gravity parameters give a load of {_load(found)} in the '
@@ -88,16 +88,17 @@ def verdict(found: Reproduction) -> VerdictSection:
 
 
 def _load(found: Reproduction) -> str:
+    """Format the identified load with its 95 % interval."""
     return ' ± '.join(measured(found.load, HALF_WIDTH * found.load_std)) + ' kg'
 
 
 def tables_section(repeated: Sequence[Repeated]) -> ContentSection:
-    """Return a section with the tables of paper and reproduction, joint by joint."""
+    """Return the section with the tables of the paper beside those of the repetition."""
     text = (
-        'Peak: from the paper, and the largest gravity torque of the joint. Errors are '
-        'those of held-out trajectories against the true torque; noisy: against the noisy torque '
-        "of the run, as the paper may have it. Gravity: the gravity model, the paper's method. "
-        'Dynamics: the full dynamics.'
+        'Peak: torque of the paper, and largest gravity torque of the joint. Errors are those of '
+        'held-out trajectories against the true torque. Noisy: error against the noisy torque of '
+        'the run, as the paper may define it. Gravity: model of gravity torques alone, as in the '
+        'paper. Dynamics: full dynamics.'
     )
     folds = [
         Fold(f'Table {one.table.number}: {one.table.title}', [_table(one)], opened=True)
@@ -107,6 +108,7 @@ def tables_section(repeated: Sequence[Repeated]) -> ContentSection:
 
 
 def _table(one: Repeated) -> DataTable:
+    """Return one table of the paper, with the rows of the repetition."""
     slow, whole = one.methods
     scale, error, share = 100.0, 'RMSE', 'RMSE over peak [%]'
     if one.table.uniform:
@@ -134,11 +136,12 @@ def _table(one: Repeated) -> DataTable:
 
 
 def _cells(values: FloatArray, count: int = 2) -> list[str]:
+    """Format numbers with significant digits."""
     return [digits(float(value), count) for value in values]
 
 
 def curves_section(repeated: Sequence[Repeated]) -> ContentSection:
-    """Return a section with true and predicted torque along a held-out trajectory."""
+    """Return the section with true and predicted torque along a held-out trajectory."""
     text = (
         'Gravity model, identified from the noisy run, along a held-out trajectory. Drag '
         'across a plot, or pinch it, to zoom; double-click or double-tap to see it all.'
@@ -165,12 +168,11 @@ def curves_section(repeated: Sequence[Repeated]) -> ContentSection:
 
 
 def _gravity_section(composites: Sequence[Composite], load: str) -> ContentSection:
-    """Return a section with the minimal gravity parameters, with and without the load."""
+    """Return the section with the gravity parameters, without and with the load."""
     text = (
-        'Masses and first moments times the gravity of the moon, in N mm, by the gravity model; '
-        "± 95 %. An arm with revolute joints has an even number of them; of the paper's table "
-        'nine are legible, and all nine have this form. The two runs differ by '
-        f'{load} at the hand.'
+        'First moments times the gravity of the moon [N mm], from gravity torques alone, with '
+        '95 % intervals. Nine parameters of the paper are legible; all have this form. '
+        f'The two runs give a load of {load} in the hand.'
     )
     heads = ('Parameter', 'Joint', 'True', 'Identified', 'True, loaded', 'Identified, loaded')
     rows = [
@@ -191,7 +193,7 @@ def _gravity_section(composites: Sequence[Composite], load: str) -> ContentSecti
 
 def lunar_document(found: Reproduction) -> dict[str, Any]:
     """
-    Return the reproduction as the document of lunar.json.
+    Return the content of lunar.json.
 
     Parameters
     ----------

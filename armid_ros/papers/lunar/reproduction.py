@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-The paper's experiments on the 6-DOF humanoid arm, repeated on the simulated arm.
+Experiments of the paper on a 6-DOF humanoid arm, repeated in simulation.
 
 Table 3 is the arm on the moon, Table 4 the arm on the moon with 0.3 kg in the hand, Table 6 the
 real arm on Earth. The torque columns are peaks; the percentage is the RMSE as a share of the peak.
@@ -45,7 +45,7 @@ LOAD = 0.3
 @dataclass(frozen=True, eq=False)
 class PaperTable:
     """
-    One table of the paper, as published.
+    Published values of one table of the paper.
 
     Attributes
     ----------
@@ -77,16 +77,17 @@ class PaperTable:
 
     @property
     def uniform(self) -> bool:
-        """Whether noise and errors of the table are mean absolute values."""
+        """Whether the table gives mean absolute errors, and not rms errors."""
         return self.number == 6
 
     @property
     def ratio(self) -> FloatArray:
-        """Return the error relative to the peak, in Table 6 to the noise, shape (6,)."""
+        """Published error relative to the peak, in Table 6 to the noise, shape (6,)."""
         return self.error / (self.noise if self.uniform else self.peak)
 
 
 def _milli(*values: float) -> FloatArray:
+    """Convert torques from N mm to N m."""
     return np.array(values) * 1e-3
 
 
@@ -128,7 +129,7 @@ _RATE = 100.0
 @dataclass(frozen=True, eq=False)
 class MethodErrors:
     """
-    Torque errors of one method of identification.
+    Torque errors of a model with gravity torques alone, or with the full dynamics.
 
     Attributes
     ----------
@@ -150,7 +151,7 @@ class MethodErrors:
 @dataclass(frozen=True, eq=False)
 class Repeated:
     """
-    Result of the reproduction of one table.
+    Repetition of one table of the paper.
 
     Attributes
     ----------
@@ -177,14 +178,14 @@ class Repeated:
     test: Fit
 
     def ratio(self, errors: FloatArray) -> FloatArray:
-        """Return errors relative to the peak or to the noise, as in the paper, shape (6,)."""
+        """Return errors, (6,), relative to the peak or to the noise, as the table does."""
         return errors / (self.table.noise if self.table.uniform else self.peak_run)
 
 
 @dataclass(frozen=True)
 class Composite:
     """
-    One gravity parameter of the paper's minimal set.
+    True and identified value of one gravity parameter, without and with the load.
 
     Attributes
     ----------
@@ -212,7 +213,7 @@ class Composite:
 @dataclass(frozen=True)
 class Reproduction:
     """
-    Reproduction of the whole paper.
+    Repetition of all experiments of the paper.
 
     Attributes
     ----------
@@ -235,7 +236,7 @@ def reproduce(
     *, seed: int, progress: Callable[[float, str], None] = lambda share, what: None
 ) -> Reproduction:
     """
-    Reproduce all tables of the paper.
+    Repeat all experiments of the paper in simulation.
 
     Parameters
     ----------
@@ -275,7 +276,7 @@ def reproduce(
 
 
 def attainable(robot: Robot, rng: np.random.Generator) -> FloatArray:
-    """Return the largest gravity torque of every joint over all poses, shape (n,) [N m]."""
+    """Return the largest gravity torque of each joint over all poses, shape (n,) [N m]."""
     n = robot.n_joints
 
     def torque(q: FloatArray) -> FloatArray:
@@ -296,6 +297,7 @@ def attainable(robot: Robot, rng: np.random.Generator) -> FloatArray:
 def _repeat(
     table: PaperTable, run: Excitation, tests: Sequence[Motion], rng: np.random.Generator
 ) -> Repeated:
+    """Repeat one table: simulate the run, identify the arm, and predict the held-out motions."""
     robot = load_robot(table.robot, gravity=table.gravity)
     truth = ArmModel(robot)
     made = simulate(
@@ -342,7 +344,7 @@ def _repeat(
 
 
 def _size(errors: FloatArray, table: PaperTable) -> FloatArray:
-    """Return the mean absolute error or the root mean square error, as in the table."""
+    """Return the mean absolute or rms error of each joint, as the table defines it, (6,)."""
     if table.uniform:
         return np.asarray(np.mean(np.abs(errors), axis=0))
     return np.asarray(np.sqrt(np.mean(errors**2, axis=0)))
@@ -351,7 +353,7 @@ def _size(errors: FloatArray, table: PaperTable) -> FloatArray:
 def _compared(
     bare: Repeated, loaded: Repeated, rng: np.random.Generator
 ) -> tuple[tuple[Composite, ...], float, float]:
-    """Return the composites of two runs, and the load with its standard deviation."""
+    """Return gravity parameters of the runs without and with load, and the load with std."""
     robots = [load_robot(r.table.robot, gravity='moon') for r in (bare, loaded)]
     theory = ArmModel(robots[0], quasi_static=True).base_parameters(rng)
     gravity = 1e3 * float(np.linalg.norm(robots[0].gravity))

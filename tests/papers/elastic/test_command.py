@@ -53,7 +53,7 @@ def test_experiments_without_steps_leave_out_the_tuning(runs, truth, tmp_path) -
         ([], RecordingError, 'no bag'),
         (['missing'], RecordingError, 'no bag or file'),
         (['x', '--robot', 'humanoid_arm'], RecordingError, 'no bag or file'),
-        (['--demo', '--robot', 'humanoid_arm'], RobotError, 'joint by joint'),
+        (['--demo', '--robot', 'humanoid_arm'], RobotError, 'each joint of this arm'),
         (['x', '--model', 'model.yaml'], RobotError, '--model'),
         (['x', '--gear', '50'], RobotError, '--gear'),
     ],

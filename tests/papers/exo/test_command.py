@@ -55,7 +55,7 @@ def test_a_recording_gives_the_same_again(result, tmp_path) -> None:
 def test_one_topic_is_not_enough(tmp_path) -> None:
     done = CliRunner().invoke(main, ['exo', '--out', str(tmp_path), '--topics', '/exo'])
     assert done.exit_code == 2
-    assert 'two topics are needed' in done.output
+    assert 'give two topics' in done.output
 
 
 def test_help_offers_the_motions_that_there_are():

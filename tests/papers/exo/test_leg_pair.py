@@ -81,7 +81,7 @@ def test_stepping_is_periodic(pair) -> None:
 def test_a_segment_that_is_none_is_refused() -> None:
     with pytest.raises(ModelError, match='swing_shank'):
         leg_pair(segments=('left_arm',))
-    with pytest.raises(ModelError, match='4 ties'):
+    with pytest.raises(ModelError, match='4 straps'):
         leg_pair([1.0, 2.0])
     with pytest.raises(ModelError, match='not negative'):
         leg_pair(-1.0)

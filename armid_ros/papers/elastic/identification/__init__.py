@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Identification of two links with elastic transmissions, in three steps.
+Three-step identification of a two-link arm with elastic joints.
 
 Step 1 is rigid least squares. Step 2 is subspace identification of each single joint, with
 computed interaction torques as inputs. Step 3 gives physical parameters and tunes them to

@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Experiments with a two-link arm as bags.
+Reader of bags with motor, link and reference motion of arms with elastic joints.
 
 /joint_states (or /motor/joint_states) has positions, velocities and torques of the motors,
 converted to the joint side. /link/joint_states has positions and velocities of the links, and
@@ -40,7 +40,7 @@ def read_runs(
     read: Callable[..., None] | None = None,
 ) -> list[ElasticRun]:
     """
-    Read the experiments of a bag.
+    Read the experiments with a two-link arm from a bag.
 
     Parameters
     ----------
@@ -73,8 +73,8 @@ def read_runs(
         read(*recordings)
     if recordings[0].tau is None or any(recording.dq is None for recording in recordings):
         raise RecordingError(
-            f'{path}: velocities of {motors}, {LINK} and {REFERENCE}, and torques of {motors}, '
-            'are needed; one of them was not recorded'
+            f'{path}: velocities of {motors}, {LINK} and {REFERENCE}, and efforts of {motors}, '
+            'are needed, but at least one was not recorded'
         )
     stamps = [  # [us]
         *(np.rint(r.start_ns / 1000 + r.t * 1e6).astype(int) for r in recordings),
@@ -113,7 +113,7 @@ def read_runs(
 def _accelerations(
     robot: Robot, radius: FloatArray, q: FloatArray, dq: FloatArray, sideways: Sequence[FloatArray]
 ) -> FloatArray:
-    """Return angular accelerations of the joints from sideways accelerations, shape (N, 2)."""
+    """Return angular accelerations of the joints, (N, 2), from sideways link accelerations."""
     offset = np.asarray(robot.model.jointPlacements[2].translation)
     length = np.hypot(offset[0], offset[1])
     first = sideways[0] / radius[0]
@@ -125,7 +125,7 @@ def read_sides(
     path: str | Path, robot: Robot, settings: ReadSettings = DEFAULT
 ) -> tuple[Recording, Recording]:
     """
-    Read the motions of motors and links of any arm from a bag.
+    Read the joint states of motors and of links from a bag.
 
     Raises
     ------
@@ -149,7 +149,7 @@ def _motor_topic(path: str | Path, settings: ReadSettings) -> str:
 def _experiments(
     t: FloatArray, moving: npt.NDArray[np.bool_], period: float
 ) -> list[tuple[int, int, int]]:
-    """Return parts with motion: last sample at rest, first sample of motion, and end."""
+    """Return indices of each experiment: first sample at rest, first in motion, end."""
     # time of rest between two experiments [s]
     pause, shortest = round(0.1 / period), round(_MIN_DURATION / period)
     found = []
@@ -168,7 +168,7 @@ def _experiments(
 def _common(
     path: str | Path, names: Sequence[str], stamps: Sequence[npt.NDArray[np.int64]]
 ) -> npt.NDArray[np.int64]:
-    """Return the timestamps that all topics share [us]; some messages may be lost."""
+    """Return the timestamps that all topics have in common [us]; a few may be missing."""
     common: npt.NDArray[np.int64] = reduce(np.intersect1d, stamps)
     # smallest share of samples with a common timestamp on all topics
     if len(common) < 0.9 * max(map(len, stamps)):

@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Steps 2 and 3a: single joints, with the interaction torque of the other link as input.
+Steps 2 and 3a: frequency response and parameters of each joint, without the other joint.
 
 The inertia of link 1 is alpha, that of link 2 is beta; all other terms of the link equations are
 interaction torques ti. Then alpha v1' + dl1 v1 = tau_g1 - ti1 and beta v2' + dl2 v2 = tau_g2 -
@@ -37,7 +37,7 @@ HOLD: tuple[Hold, Hold] = ('zero', 'first')
 
 def link_columns(q: FloatArray, dq: FloatArray, ddq: FloatArray) -> FloatArray:
     """
-    Return the derivatives of the link torques with respect to alpha, beta and gamma.
+    Return the regressor of the link torques for alpha, beta and gamma.
 
     Parameters
     ----------
@@ -61,7 +61,7 @@ def link_columns(q: FloatArray, dq: FloatArray, ddq: FloatArray) -> FloatArray:
 
 def interaction_torques(link: Motion, parameters: TwoLinkParameters) -> FloatArray:
     """
-    Return the torque on each link by the motion of the other link, shape (N, 2) [N m].
+    Return the torque that the motion of one link exerts on the other, shape (N, 2) [N m].
 
     Only beta and gamma of the parameters are used. The motion needs measured accelerations.
 
@@ -74,9 +74,9 @@ def interaction_torques(link: Motion, parameters: TwoLinkParameters) -> FloatArr
 
 def direction(velocity: FloatArray) -> FloatArray:
     """
-    Return the mean sign of linearly interpolated velocities between samples, shape (N, n).
+    Return the mean sign of each velocity between two samples, shape (N, n), for friction.
 
-    The last row is the sign of the last sample.
+    Velocities are interpolated linearly; the last row is the sign of the last sample.
 
     """
     size = np.abs(velocity)
@@ -88,7 +88,7 @@ def joint_signals(
     runs: Sequence[ElasticRun], parameters: TwoLinkParameters, joint: int, *, decoupled: bool
 ) -> list[Signals]:
     """
-    Return inputs and outputs of one joint in all experiments.
+    Return motor torque, interaction torque and velocities of a joint for each experiment.
 
     Inputs are the torque of the motor less Coulomb friction, and the interaction torque. Outputs
     are the velocities of motor and link. All are at the joint.
@@ -122,7 +122,7 @@ def measured_response(
     experiments: Sequence[Signals], dt: float, *, window: float = 1.0
 ) -> tuple[FloatArray, npt.NDArray[np.complex128]]:
     """
-    Estimate the frequency response from all inputs to all outputs by averaged spectra (H1).
+    Estimate the frequency response by averaged spectra (H1 estimator).
 
     The estimate needs neither model nor order. The first input is held between samples; its
     response is the response to the continuous held signal.
@@ -167,7 +167,7 @@ def measured_response(
 
 
 def decibel_error(found: npt.NDArray[np.complex128], wanted: npt.NDArray[np.complex128]) -> float:
-    """Return the rms difference of the magnitudes of two responses [dB]."""
+    """Return the rms difference between the magnitudes of two frequency responses [dB]."""
     difference = 20.0 * np.log10(np.abs(found) / np.abs(wanted))
     return float(np.sqrt(np.mean(difference**2)))
 
@@ -181,7 +181,7 @@ def ideal_response(
     parameters: TwoLinkParameters, joint: int, frequency: npt.ArrayLike
 ) -> ComplexArray:
     """
-    Return the frequency response of one link and its motor on a spring.
+    Return the frequency response of a joint that consists of motor, spring and link.
 
     Parameters
     ----------
@@ -215,7 +215,7 @@ def fit_joints(
     systems: Sequence[StateSpace], joints: Sequence[str], known: TwoLinkParameters
 ) -> tuple[TwoLinkParameters, FloatArray]:
     """
-    Fit a motor and a link on a spring to the identified responses of both joints.
+    Fit inertias, stiffness and damping of both joints to their frequency responses.
 
     Parameters
     ----------
@@ -266,13 +266,13 @@ def fit_joints(
 
 
 def frequencies(parameters: TwoLinkParameters) -> tuple[FloatArray, FloatArray]:
-    """Return antiresonance and resonance of each motor without damping, shape (2,) [Hz]."""
+    """Return undamped antiresonances and resonances of both joints, each of shape (2,) [Hz]."""
     by_link, by_motor = (parameters.stiffness / x for x in (parameters.inertia, parameters.rotor))
     return np.sqrt(by_link) / (2.0 * np.pi), np.sqrt(by_link + by_motor) / (2.0 * np.pi)
 
 
 def _response(s: ComplexArray, values: FloatArray) -> ComplexArray:
-    """Return the response of motor and link on a spring at s = i w, shape (K, 2, 2)."""
+    """Return the frequency response of motor, spring and link at s = i w, shape (K, 2, 2)."""
     rotor, inertia, stiffness, between, motor, link, gain = values
     spring = stiffness / s + between
     a, b = rotor * s + motor + spring, inertia * s + link + spring
@@ -282,14 +282,15 @@ def _response(s: ComplexArray, values: FloatArray) -> ComplexArray:
 
 
 def _first_guess(joint: str, frequency: FloatArray, found: ComplexArray) -> FloatArray:
+    """Return initial parameters of a joint from antiresonance and resonance of its response."""
     size = np.abs(found[:, 0, 0])
     lowest = int(np.argmin(size[frequency > 4.0 * frequency[0]]))
     lowest += int(np.count_nonzero(frequency <= 4.0 * frequency[0]))
     highest = lowest + int(np.argmax(size[lowest:]))
     if highest in (lowest, len(size) - 1):
         raise IdentificationError(
-            f"joint '{joint}': no antiresonance with a resonance above it between "
-            f'{frequency[0]:g} and {frequency[-1]:g} Hz; excite it there, or widen the band'
+            f"joint '{joint}': no antiresonance followed by a resonance between "
+            f'{frequency[0]:g} and {frequency[-1]:g} Hz; excite the joint at these frequencies'
         )
     anti, resonance = 2.0 * np.pi * frequency[[lowest, highest]]
     total = float(1.0 / (2.0 * np.pi * frequency[0] * size[0]))

@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Springs of any arm, joint by joint, from encoders on both sides of its transmissions.
+Stiffness of each joint from encoders on both sides of its transmission.
 
 The twist between motor and link is compliance times transmission torque, plus half the backlash
 towards the loaded flank. A twist proportional to the velocity is fitted as well, for a delay
@@ -42,20 +42,21 @@ Sides = tuple[Motion, Motion, FloatArray]
 @dataclass(frozen=True, eq=False)
 class TransmissionFit:
     """
-    Stiffness and free play of one joint, with 95 % intervals.
+    Stiffness and backlash of one joint, with 95 % intervals.
 
     Attributes
     ----------
     stiffness : tuple of float
-        Value, lower and upper bound with free play as a part of the model [N m/rad].
+        Value, lower and upper bound [N m/rad]; the model includes backlash.
     backlash : tuple of float
-        Total free play [rad]; NaN with infinite bounds if the load changes flanks too rarely.
+        Value, lower and upper bound [rad]; NaN and infinite bounds if the load changes its sign
+        too rarely.
     delay : tuple of float
-        Twist per velocity: delay of the link encoder after the motor encoder [s].
+        Delay of the link encoder after the motor encoder [s]: twist per velocity.
     correlation : float
-        Of compliance and backlash, -1 to 1; near either end the two are collinear.
+        Correlation of compliance and backlash; near -1 or 1 they are not distinguishable.
     explained : float
-        R^2 of the whole model.
+        R^2 of the twist.
 
     """
 
@@ -67,20 +68,20 @@ class TransmissionFit:
 
     @property
     def backlash_seen(self) -> bool:
-        """Whether free play exceeds its uncertainty and is identifiable apart from the spring."""
+        """Whether backlash is significant and distinguishable from compliance."""
         return self.backlash[1] > 0.0 and abs(self.correlation) < 0.95
 
 
 def fit_transmission(sides: Sequence[Sides], used: Conditioning, joint: int) -> TransmissionFit:
     """
-    Fit spring and free play of one joint.
+    Fit compliance and backlash of one joint to the twist between motor and link.
 
     Parameters
     ----------
     sides : sequence of Sides
-        Stretches; each has its own offset and slope between the encoders.
+        Unbroken stretches; each has its own offset and scale between the two encoders.
     used : Conditioning
-        Their filter.
+        Filter and decimation of the stretches.
     joint : int
         Index of the joint.
 
@@ -94,9 +95,11 @@ def fit_transmission(sides: Sequence[Sides], used: Conditioning, joint: int) -> 
     shared = np.vstack([own[:, :3] for own, _ in pieces])
     twist = np.concatenate([twist for _, twist in pieces])
     if len(twist) < 50:
-        raise IdentificationError('the joint hardly moves: its stiffness cannot be found')
+        raise IdentificationError(
+            'the joint hardly moves, so its stiffness is not identifiable; record larger motion'
+        )
     table = np.hstack([shared, block_diag(*(own[:, 3:] for own, _ in pieces))])
-    # smallest number of flank changes for an estimate of free play
+    # smallest number of load reversals for an estimate of backlash
     reverses = sum(np.count_nonzero(np.diff(np.sign(own[:, 0]))) for own, _ in pieces) >= 4
     if not reverses:
         table[:, 1] = 0.0
@@ -129,10 +132,10 @@ def fit_transmission(sides: Sequence[Sides], used: Conditioning, joint: int) -> 
 
 
 def _columns(sides: Sides, used: Conditioning, joint: int) -> tuple[FloatArray, FloatArray]:
-    """Return columns and twist of the samples of a stretch in which the joint moves."""
+    """Return the regressor columns and the twist of a stretch, where the joint moves."""
     motor, link, torque = sides[0].q[:, joint], sides[1].q[:, joint], sides[2][:, joint]
     velocity = sides[0].dq[:, joint]
-    # torque range in which the flank changes, as a share of the median torque
+    # torque range in which the tooth contact reverses, as a share of the median torque
     flank = np.tanh(torque / (0.05 * np.median(np.abs(torque))))
     ones = np.ones(len(motor))
     rows = decimate(np.column_stack([torque, flank, velocity, motor, ones, motor - link]), used)
@@ -142,25 +145,27 @@ def _columns(sides: Sides, used: Conditioning, joint: int) -> tuple[FloatArray, 
 
 
 def _interval(value: float, std: float) -> tuple[float, float, float]:
+    """Return a value with the bounds of its 95 % interval."""
     return float(value), float(value - HALF_WIDTH * std), float(value + HALF_WIDTH * std)
 
 
 @dataclass(frozen=True, eq=False)
 class SpringEstimate:
     """
-    Spring, free play and motor of one joint, from two encoders and a torque.
+    Stiffness, backlash, motor friction and inertias of one joint.
 
     Attributes
     ----------
     joint : str
         Its name.
     transmission : TransmissionFit
-        Stiffness and free play.
+        Stiffness and backlash.
     motor : ndarray, shape (3,), or None
         Rotor inertia [kg m^2], viscous friction [N m s/rad] and Coulomb torque [N m] of the motor
         at the joint; None if no torque was recorded.
     inertia : float
-        Link inertia about the joint with the other joints held, mean over the recording [kg m^2].
+        Link inertia about the joint while the other joints are locked, mean over the recording
+        [kg m^2].
 
     """
 
@@ -171,19 +176,19 @@ class SpringEstimate:
 
     @property
     def informative(self) -> bool:
-        """Whether the twist follows the load, so that the stiffness is identifiable."""
+        """Whether the load explains the twist, so that the stiffness is identifiable."""
         fit = self.transmission
         # smallest R^2 of the twist for an estimate of stiffness
         return fit.explained > 0.9 and bool(np.isfinite(fit.stiffness).all())
 
     @property
     def antiresonance(self) -> float:
-        """Natural frequency of the link on its spring with a blocked motor [Hz]."""
+        """Natural frequency of the link on the joint spring while the motor is locked [Hz]."""
         return float(np.sqrt(self.transmission.stiffness[0] / self.inertia) / (2.0 * np.pi))
 
     @property
     def resonance(self) -> float:
-        """Natural frequency of motor against link [Hz]; NaN without a rotor inertia."""
+        """Natural frequency of the motor against the link [Hz]; NaN without a rotor inertia."""
         if self.motor is None or self.motor[0] <= 0.0:
             return float('nan')
         return float(self.antiresonance * np.sqrt(1.0 + self.inertia / self.motor[0]))
@@ -193,7 +198,7 @@ def fit_springs(
     robot: Robot, recordings: Sequence[tuple[Recording, Recording]]
 ) -> list[SpringEstimate]:
     """
-    Fit a spring, free play and a motor to every joint of an arm.
+    Fit stiffness, backlash and motor parameters of each joint of an arm.
 
     Parameters
     ----------
@@ -233,7 +238,7 @@ def fit_springs(
 def _stretches(
     robot: Robot, motors: Recording, links: Recording, used: Conditioning
 ) -> list[Sides]:
-    """Return filtered motions of motors and links without pauses, with the spring torques."""
+    """Return filtered motor and link motions of unbroken stretches, with spring torques."""
     both = recorded_together(motors, links, robot)
     assert both.partner is not None
     tau = np.zeros_like(both.q) if both.tau is None else both.tau
@@ -244,7 +249,7 @@ def _stretches(
 
 
 def _motor(sides: Sequence[Sides], used: Conditioning, joint: int) -> FloatArray:
-    """Fit rotor inertia, friction and offset to the motor torque minus the load."""
+    """Return rotor inertia, viscous and Coulomb friction, fitted to motor torque minus load."""
     rows = []
     for motor, _, load in sides:
         assert motor.tau is not None

@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Closed-loop velocity responses of the two-link arm, with exact derivatives by its parameters.
+Simulated velocity responses of the two-link arm, with exact parameter derivatives.
 
 All runs are integrated together, as arrays. Derivatives are computed by the complex step, f(x +
 ih) = f + ih f', through the whole integration with friction. The real part decides which joints
@@ -37,13 +37,13 @@ SIZE = 3 + 2 * len(PER_JOINT)
 
 
 def unpack(parameters: TwoLinkParameters) -> FloatArray:
-    """Return alpha, beta, gamma, then mm, kg, dl, dm and dg of both joints, shape (13,)."""
+    """Return the tuned parameters as a vector: alpha, beta, gamma, then `PER_JOINT`; (13,)."""
     joints = [getattr(parameters, field) for field, _, _ in PER_JOINT]
     return np.concatenate([[parameters.alpha, parameters.beta, parameters.gamma], *joints])
 
 
 def pack(values: npt.ArrayLike, like: TwoLinkParameters) -> TwoLinkParameters:
-    """Return the parameters of a vector; friction and drives are copied from `like`."""
+    """Convert a vector of `unpack` to parameters, with friction and drives of `like`."""
     vector = np.asarray(values, dtype=float)
     pairs = vector[3:].reshape(len(PER_JOINT), 2)
     fields = {field: pair for (field, _, _), pair in zip(PER_JOINT, pairs, strict=True)}
@@ -52,7 +52,7 @@ def pack(values: npt.ArrayLike, like: TwoLinkParameters) -> TwoLinkParameters:
 
 
 def parameter_names(joints: tuple[str, ...]) -> tuple[ParameterName, ...]:
-    """Return the names of the vector's elements for an arm with these two joints."""
+    """Return the name and unit of each element of a vector of `unpack`."""
     rigid = [ParameterName(name, '', 'kg m^2') for name in ('alpha', 'beta', 'gamma')]
     own = [ParameterName(name, joint, unit) for _, name, unit in PER_JOINT for joint in joints]
     return (*rigid, *own)
@@ -67,7 +67,7 @@ _COMPLEX_STEP = 1e-30
 @dataclass(frozen=True, eq=False)
 class Steps:
     """
-    Closed-loop experiments of equal length, which are simulated together.
+    Initial poses, velocity references and controller of E step experiments of equal length.
 
     Attributes
     ----------
@@ -78,7 +78,7 @@ class Steps:
     dt : float
         Time between samples, at which the loop acts [s].
     loop : VelocityLoop
-        Gains.
+        Gains of the velocity loop.
     integral : ndarray, shape (E, 2)
         Initial integral of the loop [rad].
 
@@ -92,7 +92,7 @@ class Steps:
 
     @classmethod
     def of(cls, runs: Sequence[ElasticRun], loop: VelocityLoop) -> Steps:
-        """Return the experiments of several runs, cut to the length of the shortest run."""
+        """Return the step experiments of recorded runs, cut to the length of the shortest run."""
         count = min(len(run.motor) for run in runs)
         t = runs[0].motor.t
         return cls(
@@ -105,7 +105,7 @@ class Steps:
 
 
 def velocities(steps: Steps, parameters: TwoLinkParameters) -> FloatArray:
-    """Return velocities of motors (at the joints) and links, shape (N, E, 4) [rad/s]."""
+    """Simulate velocities of motors (at the joints) and links, shape (N, E, 4) [rad/s]."""
     values = _point(parameters)[np.newaxis]
     return np.asarray(_simulate(steps, values, parameters.gear).real[:, :, 0])
 
@@ -114,7 +114,7 @@ def sensitivities(
     steps: Steps, parameters: TwoLinkParameters, directions: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """
-    Return velocities and their derivatives along directions of the parameters.
+    Simulate velocities and their derivatives for given parameter changes.
 
     Parameters
     ----------
@@ -123,7 +123,7 @@ def sensitivities(
     parameters : TwoLinkParameters
         Parameters at which the derivatives are taken.
     directions : ndarray, shape (D, 15)
-        Changes of the parameters of ``names.unpack``, then of the motors' Coulomb torques;
+        Changes of the vector of ``unpack``, then of the motors' Coulomb torques;
         directions should have the magnitude of the parameters.
 
     Returns
@@ -139,11 +139,12 @@ def sensitivities(
 
 
 def _point(parameters: TwoLinkParameters) -> FloatArray:
+    """Return the vector of `unpack`, followed by the Coulomb torques of the motors, (15,)."""
     return np.concatenate([unpack(parameters), parameters.coulomb])
 
 
 def _simulate(steps: Steps, values: DualArray, gear: FloatArray) -> DualArray:
-    """Simulate E experiments from rest with D parameter vectors each; (N, E, D, 4)."""
+    """Return velocities, (N, E, D, 4), of E experiments from rest with D parameter vectors."""
     experiments, sets, substeps = len(steps.q), len(values), 2
     arm = _Arm(np.tile(values, (experiments, 1)), gear, steps.dt / substeps)
     size = experiments * sets
@@ -166,7 +167,7 @@ def _simulate(steps: Steps, values: DualArray, gear: FloatArray) -> DualArray:
 
 
 class _Arm:
-    """The two links with B parameter vectors, shape (B, 15), for one step of integration."""
+    """Equations of motion of the two-link arm for B parameter vectors, shape (B, 15)."""
 
     def __init__(self, values: DualArray, gear: FloatArray, dt: float):
         self.alpha, self.beta, self.gamma = values[:, 0], values[:, 1], values[:, 2]
@@ -202,7 +203,7 @@ class _Arm:
         modes: npt.NDArray[np.int_],
         torque: DualArray,
     ) -> tuple[DualArray, DualArray, DualArray, npt.NDArray[np.int_]]:
-        """Return angle of joint 2, state, accelerations and friction modes after one step."""
+        """Return joint angle 2, state, accelerations and friction modes after a time step."""
         dt, a = self.dt, self.a
         middle = q2 + 0.5 * dt * (x[:, 5] + 0.25 * dt * dv[:, 3])
         v = x[:, 4:] + 0.5 * dt * dv[:, 2:]
@@ -231,7 +232,7 @@ class _Arm:
         return q2 + moved[:, 5], x_next, last[:, 2:], modes
 
     def _links(self, q2: DualArray, v: DualArray) -> tuple[DualArray, DualArray]:
-        """Return the inverse inertia matrix, (B, 2, 2), and centrifugal torques, (B, 2)."""
+        """Return inverse inertia matrices, (B, 2, 2), and centrifugal torques, (B, 2)."""
         cosine, sine = self.gamma * np.cos(q2), self.gamma * np.sin(q2)
         coupling = self.beta + cosine
         first = self.alpha + self.beta + 2.0 * cosine
@@ -249,7 +250,7 @@ class _Arm:
 def _friction(
     response: DualArray, free: DualArray, level: DualArray, modes: npt.NDArray[np.int_]
 ) -> tuple[DualArray, npt.NDArray[np.int_]]:
-    """Return friction torques, (B, 2): Coulomb torque if slipping, holding torque if sticking."""
+    """Return friction torques, (B, 2), and whether each motor slips (1, -1) or sticks (0)."""
     # response: change of the final velocity per torque; free: final velocity without friction;
     # modes: initial guess, 1 slips forwards, -1 slips backwards, 0 sticks
     modes = modes.copy()

@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Step 1: the arm with rigid joints, at frequencies far below its resonances.
+Step 1: parameters of the two-link arm with rigid joints, far below its resonances.
 
 tau = (M + diag(mm gear^2)) q'' + h + (dl + dm gear^2) q' + fm gear sgn(q'). The identifiable
 parameters are alpha + mm1 gear^2, beta, gamma, mm2 gear^2, the sums of friction and the Coulomb
@@ -35,7 +35,7 @@ _ROWS_PER_PERIOD = 10
 @dataclass(frozen=True, eq=False)
 class RigidFit:
     """
-    The eight parameters of the rigid arm.
+    Eight identified parameters of the two-link arm with rigid joints.
 
     Attributes
     ----------
@@ -58,7 +58,7 @@ class RigidFit:
 
 def fit_rigid(runs: Sequence[ElasticRun]) -> RigidFit:
     """
-    Fit the rigid arm to slow motion by least squares, each joint weighted by its own noise.
+    Fit the arm with rigid joints to slow motion, by least squares weighted by joint noise.
 
     Torques and columns pass the same low-pass filter. Accelerations come from accelerometers on
     the links, positions from encoders at the links. Friction depends on the velocity of the
@@ -78,20 +78,19 @@ def fit_rigid(runs: Sequence[ElasticRun]) -> RigidFit:
     problem = [part for number, run in enumerate(runs) for part in _rows(run, str(number))]
     if not problem:
         raise IdentificationError(
-            f'the rigid fit needs experiments of more than {2 * _SETTLING_TIME:g} s; there are '
-            'none'
+            f'step 1 needs experiments of more than {2 * _SETTLING_TIME:g} s, but all are shorter'
         )
     normal = NormalEquations.of(problem)
     products = normal.summed()[:-1, :-1]
     scale = np.sqrt(np.diag(products))
     if not np.all(scale > 0.0):
-        raise IdentificationError('the rigid fit needs motion of both joints, but one rests')
+        raise IdentificationError('step 1 needs motion of both joints, but one joint rests')
     sizes = np.linalg.eigvalsh(products / np.outer(scale, scale))
     # smallest singular value of identifiable columns, relative to the largest
     if sizes[0] < 1e-6**2 * sizes[-1]:
         raise IdentificationError(
-            'the slow motion does not make the rigid parameters identifiable; let both joints '
-            'accelerate in several poses'
+            'step 1 cannot identify the inertias from the slow motion; let both joints accelerate '
+            'in several poses'
         )
     solution = solve(problem)
     joints = runs[0].motor.joints
@@ -116,7 +115,7 @@ def fit_rigid(runs: Sequence[ElasticRun]) -> RigidFit:
 
 
 def _rows(run: ElasticRun, source: str) -> list[Regression]:
-    """Return the filtered rows of an experiment; None if it is shorter than the filter."""
+    """Return the filtered regression rows of an experiment; [] if the filter is longer."""
     motor, link = run.motor, run.link
     assert motor.tau is not None
     dt = float(motor.t[-1] - motor.t[0]) / (len(motor) - 1)

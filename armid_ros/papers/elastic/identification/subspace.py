@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Multivariable subspace identification (PO-MOESP) from many experiments together.
+Subspace identification (PO-MOESP) of a linear system from several experiments.
 
 Poles and output matrix come from the column space of the projection of future on past data. Past
 inputs and outputs are the instruments (Verhaegen 1994; without past outputs, the ordinary MOESP
@@ -33,16 +33,16 @@ _HORIZON = 24
 @dataclass(frozen=True, eq=False)
 class StateSpace:
     """
-    A continuous linear system x' = a x + b u, y = c x in modal coordinates.
+    Linear system x' = a x + b u, y = c x in continuous time and modal coordinates.
 
     Attributes
     ----------
     poles : ndarray of complex, shape (r,)
         Eigenvalues of a [rad/s].
     b : ndarray of complex, shape (r, m)
-        Inputs to modes.
+        Input gains of the modes.
     c : ndarray of complex, shape (p, r)
-        Modes to outputs.
+        Output gains of the modes.
 
     """
 
@@ -60,7 +60,7 @@ class StateSpace:
 @dataclass(frozen=True, eq=False)
 class Signals:
     """
-    Inputs and outputs of one experiment.
+    Sampled inputs and outputs of one experiment.
 
     Attributes
     ----------
@@ -82,7 +82,7 @@ def identify_subspace(
     hold: Sequence[Hold],
 ) -> StateSpace:
     """
-    Identify a linear system of given order from sampled experiments.
+    Identify a linear system with a given number of states from sampled experiments.
 
     Parameters
     ----------
@@ -114,14 +114,17 @@ def identify_subspace(
         for name in ('u', 'y')
     )
     if not (np.all(u_scale > 0.0) and np.all(y_scale > 0.0)):
-        raise IdentificationError('subspace identification: an input or an output is always zero')
+        raise IdentificationError(
+            'subspace identification: an input or an output is zero in all samples; record '
+            'motion with torque'
+        )
     scaled = [Signals(e.u / u_scale, e.y / y_scale) for e in experiments]
     a, c = _observable(scaled, order)
     eigenvalues, vectors = np.linalg.eig(a)
     if np.any((np.abs(eigenvalues.imag) < 1e-12) & (eigenvalues.real <= 0.0)):
         raise IdentificationError(
-            f'subspace identification: order {order} gives impossible poles of a sampled system; '
-            'use more data or another order'
+            f'subspace identification: {order} states give poles that no sampled system has; '
+            'record more data'
         )
     poles = np.log(eigenvalues.astype(complex)) / dt
     modal = c @ vectors
@@ -130,7 +133,7 @@ def identify_subspace(
 
 
 def _observable(experiments: Sequence[Signals], order: int) -> tuple[FloatArray, FloatArray]:
-    """Return state and output matrix of a sampled system."""
+    """Return state matrix and output matrix of the sampled system."""
     m, p = experiments[0].u.shape[1], experiments[0].y.shape[1]
     triangle = np.empty((0, 2 * _HORIZON * (m + p)))
     for e in experiments:
@@ -150,7 +153,7 @@ def _observable(experiments: Sequence[Signals], order: int) -> tuple[FloatArray,
 
 
 def _hankel(values: FloatArray, rows: int) -> FloatArray:
-    """Return windows of `rows` samples side by side, shape (N - rows + 1, rows * columns)."""
+    """Return the Hankel matrix of `rows` successive samples, (N - rows + 1, rows * columns)."""
     windows = np.lib.stride_tricks.sliding_window_view(values, rows, axis=0)
     return np.asarray(windows.transpose(0, 2, 1).reshape(len(windows), -1))
 
@@ -162,7 +165,7 @@ def _inputs(
     modal: ComplexArray,
     hold: Sequence[Hold],
 ) -> ComplexArray:
-    """Fit the input matrix to whole experiments, with one initial state per experiment."""
+    """Return the input gains of the modes, fitted with a free initial state per experiment."""
     # The outputs are real, so the input gains of a conjugate pair of poles are conjugate as well.
     normal, right = [], []
     for e in experiments:
@@ -179,12 +182,12 @@ def _inputs(
 
 
 def _outputs(modal: ComplexArray, states: ComplexArray) -> ComplexArray:
-    """Return the outputs of each mode as a column, shape (N p, r), from states of shape (N, r)."""
+    """Return the output of each mode as a column, (N p, r), from mode states, (N, r)."""
     return np.asarray((states[:, np.newaxis] * modal).reshape(-1, modal.shape[1]))
 
 
 def _driven(u: FloatArray, dt: float, poles: ComplexArray, hold: Hold) -> ComplexArray:
-    """Return how modes with unit input gain respond to an input, shape (N, r)."""
+    """Return mode states, shape (N, r), under an input with unit gain."""
     states = np.empty((len(u), len(poles)), complex)
     for k, pole in enumerate(poles):
         factor = np.exp(pole * dt)

@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-The three steps in order, from measured experiments to physical parameters, and step 3b.
+All three steps of the identification of a two-link arm, and the tuning (step 3b).
 
 Step 3b fits simulated velocity responses to the measured ones: nonlinear least squares in the
 logarithms of the parameters, which are therefore positive. The data determine the sum of viscous
@@ -49,12 +49,12 @@ from scipy.optimize import least_squares
 @dataclass(frozen=True, eq=False)
 class Tuning:
     """
-    Parameters tuned to closed-loop responses.
+    Parameters after the fit to closed-loop step responses, and the simulated responses.
 
     Attributes
     ----------
     parameters : TwoLinkParameters
-        The result.
+        Tuned parameters.
     estimate : Estimate
         The thirteen values and their covariance, with the Coulomb torques as nuisance parameters.
     steps : Steps
@@ -74,7 +74,7 @@ class Tuning:
 
     @property
     def rms(self) -> tuple[float, float]:
-        """Root mean squares of the residuals before and after tuning, noise included [rad/s]."""
+        """Rms residual of the velocities before and after tuning, noise included [rad/s]."""
         return (
             float(np.sqrt(np.mean((self.before - self.measured) ** 2))),
             float(np.sqrt(np.mean((self.after - self.measured) ** 2))),
@@ -87,7 +87,7 @@ def tune(
     loop: VelocityLoop,
 ) -> Tuning:
     """
-    Tune the parameters to closed-loop velocity responses.
+    Fit the parameters to measured velocity responses in closed loop.
 
     Parameters
     ----------
@@ -101,7 +101,7 @@ def tune(
     Raises
     ------
     IdentificationError
-        If the responses do not determine the factors.
+        If the responses do not determine the parameters.
 
     """
     steps = Steps.of(runs, loop)
@@ -159,16 +159,16 @@ def tune(
 
 
 def _covariance(jacobian: FloatArray) -> FloatArray:
-    """Return the covariance of the factors for residuals of unit variance."""
+    """Return the covariance of the logarithms of the parameters, for unit residual variance."""
     scale = np.linalg.norm(jacobian, axis=0)
     if not np.all(scale > 0.0):
         raise IdentificationError(
-            'the step responses do not depend on every parameter; do both joints move in them?'
+            'the step responses do not depend on all parameters; record steps of both joints'
         )
     _, sizes, rows = np.linalg.svd(jacobian / scale, full_matrices=False)
     if sizes[-1] < 1e-10 * sizes[0]:
         raise IdentificationError(
-            'the step responses do not determine the parameters; add steps of both joints, in '
+            'the step responses do not determine all parameters; record steps of both joints in '
             'several poses'
         )
     half = rows.T / sizes
@@ -178,7 +178,7 @@ def _covariance(jacobian: FloatArray) -> FloatArray:
 @dataclass(frozen=True, eq=False)
 class MeasuredJoint:
     """
-    Measured frequency responses of one joint, from its motor torque to motor and link velocity.
+    Measured frequency responses of motor and link velocity of a joint to its motor torque.
 
     Attributes
     ----------
@@ -197,7 +197,7 @@ class MeasuredJoint:
 @dataclass(frozen=True, eq=False)
 class TwoInertiaIdentification:
     """
-    Results of the three steps.
+    Results of the three identification steps of a two-link arm.
 
     Attributes
     ----------
@@ -231,7 +231,7 @@ class TwoInertiaIdentification:
 
     @property
     def parameters(self) -> TwoLinkParameters:
-        """Return the parameters after the last step."""
+        """Return the parameters after the last step: tuned, or those of step 3a."""
         return self.untuned if self.tuning is None else self.tuning.parameters
 
 
@@ -245,7 +245,7 @@ def identify_two_inertia(
     progress: Callable[[float, str], None] = lambda share, what: None,
 ) -> TwoInertiaIdentification:
     """
-    Identify a planar two-link arm with elastic joints.
+    Identify a planar two-link arm with elastic joints in three steps.
 
     Parameters
     ----------

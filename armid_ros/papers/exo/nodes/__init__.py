@@ -1,3 +1,3 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The nodes of the leg pair."""
+"""ROS nodes that simulate and identify an exoskeleton and its wearer."""

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The interaction identifier node: identifies the springs between two machines."""
+"""Node that identifies the straps between an exoskeleton and its wearer."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ _DAMAGED = DISTURBANCES | {
 
 class InteractionIdentifierNode(ArmidNode):
     """
-    Identifies the springs between exoskeleton and wearer from torques and joint angles.
+    Node that estimates the stiffness of the straps between exoskeleton and wearer online.
 
     Attributes
     ----------
@@ -53,25 +53,25 @@ class InteractionIdentifierNode(ArmidNode):
     """
 
     table = (
-        NodeParameter('memory', 10.0, 'Time that estimates use.', 's', limits=(3.0, 600.0)),
+        NodeParameter('memory', 10.0, 'Length of the time window.', 's', limits=(3.0, 600.0)),
         NodeParameter('period', 2.0, 'Time between estimates.', 's', limits=(0.1, 600.0)),
         NodeParameter(
             'slack_period',
             30.0,
-            'Time between fits of slack, if springs without it do not explain torques.',
+            'Time between fits of slack, if straps without slack do not explain torques.',
             's',
             limits=(1.0, 3600.0),
         ),
         NodeParameter(
             'inertias',
             'known',
-            "Whether the machine's inertias are those of its description or estimated as well.",
+            'Inertias of the exoskeleton: known from its description, or free (estimated).',
             choices=('known', 'free'),
         ),
     )
 
     def __init__(self, **kwargs: Any) -> None:
-        """Make the node, which identifies the ties of the shipped leg pair."""
+        """Create the node for the shipped exoskeleton and wearer."""
         super().__init__('interaction_identifier', **kwargs)
         pair = leg_pair()
         names = ('memory', 'period', 'slack_period', 'inertias')
@@ -100,11 +100,11 @@ class InteractionIdentifierNode(ArmidNode):
 
     @property
     def hardware(self) -> str:
-        """Name of the machine."""
+        """Name of the exoskeleton, for diagnostics."""
         return str(self.identifier.machines.robot.name)
 
     def match(self) -> None:
-        """Find the publishers of joint states, and report when they stop or resume."""
+        """Subscribe to publishers of joint states, and report when they stop or resume."""
         for topic in self.topics:
             topic.match()
         stopped = any(fresh.stopped for fresh in self.freshness)
@@ -113,15 +113,15 @@ class InteractionIdentifierNode(ArmidNode):
             self.publish_diagnostics()
 
     def reset(self) -> str:
-        """Discard all samples and estimates."""
+        """Discard all samples and estimates, and return the answer of the service."""
         self.identifier.reset()
         for machine, gate in enumerate(self._gates):
             gate.reset()
             self._told[machine].clear()
-        return 'the estimate begins anew'
+        return 'samples and estimates are discarded'
 
     def condition(self) -> tuple[str, Mapping[str, object]]:
-        """Return the estimated stiffnesses for diagnostics."""
+        """Return a warning, and estimated stiffness and slack, for diagnostics."""
         core = self.identifier
         values: dict[str, object] = {'received': self.received}
         for part in (core.together, core.separate):
@@ -131,29 +131,29 @@ class InteractionIdentifierNode(ArmidNode):
             values |= _named(core.slack.interaction, ' with slack')
             if core.slack.seen:
                 return (
-                    f'the straps are slack: they give {1e3 * core.slack.value:.1f} mm before they '
-                    'pull; tighten them, or read the stiffness with slack'
+                    f'the straps have {1e3 * core.slack.value:.1f} mm of slack; tighten them, or '
+                    'use the stiffness with slack'
                 ), values
         if not self.received:
             return 'no joint states so far', values
         return '; '.join(filter(None, (f.trouble() for f in self.freshness))), values
 
     def level(self, troubled: bool) -> bytes:
-        """Return STALE if the joint states of a machine have stopped."""
+        """Return the diagnostic level: STALE if the joint states of a machine have stopped."""
         if any(fresh.stopped for fresh in self.freshness):
             return DiagnosticStatus.STALE
         return super().level(troubled)
 
     def _take(self, machine: int, message: JointState) -> None:
-        """Process joint states of the machine (0) or of its wearer (1)."""
+        """Add a joint state of the exoskeleton (0) or wearer (1); publish a new estimate."""
         self.received += 1
         self.freshness[machine].heard()
         topic, n = _TOPICS[machine], len(self._joints[machine])
         for sample in self._signals(machine, message):
             if sample.begins:
                 self.identifier.interrupt()
-                what = f'{topic}: positions step; earlier samples are discarded'
-                self.complaints.say(f'{topic} step', what)
+                text = f'{topic}: positions jump; earlier samples are discarded'
+                self.complaints.say(f'{topic} step', text)
             q, tau = sample.x[:n], sample.x[n:]
             if machine:
                 self.identifier.take_other(sample.t, q)
@@ -165,19 +165,23 @@ class InteractionIdentifierNode(ArmidNode):
                 self._estimates.publish(estimate)
 
     def _signals(self, machine: int, message: JointState) -> list[StreamSample]:
-        """Return the samples of a message; raise RecordingError if the message is damaged."""
+        """Return the valid samples of a joint state; RecordingError if it is damaged."""
         topic, gate, fields = _TOPICS[machine], self._gates[machine], _FIELDS[machine]
         order = joint_places(self._joints[machine], message.name)
         parts = [np.array(getattr(message, name)) for name in fields]
         for name, part in zip(fields, parts, strict=True):
             if len(part) != len(message.name):
-                raise RecordingError(f'{len(message.name)} names but {len(part)} values of {name}')
+                raise RecordingError(
+                    f'{len(message.name)} joint names but {len(part)} values of {name}'
+                )
         signal = np.concatenate([part[order] for part in parts])
         if not np.all(np.abs(signal) <= MAX_MAGNITUDE):
-            raise RecordingError('implausibly large values')
+            raise RecordingError(
+                f'a value of {" or ".join(fields)} is not finite or above {MAX_MAGNITUDE:g}'
+            )
         stamp = message.header.stamp
         if stamp.sec < 0 or stamp.nanosec >= 10**9:
-            raise RecordingError('an invalid timestamp')
+            raise RecordingError(f'invalid timestamp: {stamp.sec} s, {stamp.nanosec} ns')
         if self._epoch is None:
             self._epoch = stamp.sec
         good = gate.take(float(stamp.sec - self._epoch) + 1e-9 * stamp.nanosec, signal)
@@ -189,7 +193,7 @@ class InteractionIdentifierNode(ArmidNode):
 
 
 def _named(found: Interaction | None, suffix: str = '') -> dict[str, object]:
-    """Return stiffnesses with their intervals, for diagnostics."""
+    """Return stiffness values and bounds of their intervals by name, for diagnostics."""
     if found is None:
         return {}
     values: dict[str, object] = {}

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The simulated leg pair node: publishes joint states of an exoskeleton and its wearer."""
+"""Node that simulates an exoskeleton and its wearer."""
 
 from __future__ import annotations
 
@@ -25,15 +25,15 @@ from sensor_msgs.msg import JointState
 
 
 class SimulatedPairNode(ArmidNode):
-    """Publishes the stepping leg pair on exo/joint_states and human/joint_states."""
+    """Node that publishes simulated joint states of an exoskeleton and its wearer."""
 
     table = (
-        NodeParameter('gait', '', 'CSV of one leg over a cycle; empty: level walking.'),
-        NodeParameter('stiffness', 1e4, 'Stiffness of all springs.', 'N/m', limits=(0.0, 1e6)),
-        NodeParameter('segments', list(SEGMENTS), 'Where springs are; without names: none.'),
-        NodeParameter('slack', 0.0, 'Slack before springs pull.', 'm', limits=(0.0, 0.1)),
-        NodeParameter('angle_noise', 0.05, 'Standard deviation.', 'deg', limits=(0.0, 10.0)),
-        NodeParameter('torque_noise', 0.5, 'Standard deviation.', 'N m', limits=(0.0, 100.0)),
+        NodeParameter('gait', '', 'CSV file of a gait cycle; empty: level walking.'),
+        NodeParameter('stiffness', 1e4, 'Stiffness of all straps.', 'N/m', limits=(0.0, 1e6)),
+        NodeParameter('segments', list(SEGMENTS), 'Leg segments with a strap; empty: none.'),
+        NodeParameter('slack', 0.0, 'Slack of the straps.', 'm', limits=(0.0, 0.1)),
+        NodeParameter('angle_noise', 0.05, 'Noise of angles (std).', 'deg', limits=(0.0, 10.0)),
+        NodeParameter('torque_noise', 0.5, 'Noise of torques (std).', 'N m', limits=(0.0, 100.0)),
         NodeParameter('seed', 0, 'Random seed of the noise.', limits=(0, 2**62)),
         NodeParameter(
             'rate', 1000.0, 'Publishing rate of both joint states.', 'Hz', limits=(50.0, 5000.0)
@@ -82,12 +82,12 @@ class SimulatedPairNode(ArmidNode):
 
     @property
     def hardware(self) -> str:
-        """Name of the machine."""
+        """Name of the exoskeleton, for diagnostics."""
         return str(self.pair.pair.robot.name)
 
     @property
     def stamp_ns(self) -> int:
-        """Timestamp of the present state [ns]."""
+        """Timestamp of the current sample [ns]."""
         return self._origin_ns + round(self.pair.t * 1e9)
 
     def step(self) -> int:
@@ -106,21 +106,21 @@ class SimulatedPairNode(ArmidNode):
         return self.stamp_ns
 
     def catch_up(self) -> None:
-        """Simulate up to real time times the factor; skip time that cannot be caught up."""
+        """Simulate until the scaled real time is reached; skip time if the computer is slow."""
         factor = self.value('real_time_factor')
         skipped = self.real_time.catch_up(factor, 1.0 / self.value('rate'))
         if factor == 1.0:  # stamps stay those of the computer  # noqa: RUF069 - as it is written
             self._origin_ns += round(skipped * 1e9)
 
     def reset(self) -> str:
-        """Return both machines to the initial state; time continues."""
+        """Return both machines to the initial state, without a jump of the time stamps."""
         self._origin_ns = self.stamp_ns
         self.pair.reset()
         self.real_time.begin()
-        return 'both are in the initial state'
+        return 'exoskeleton and wearer are in the initial state'
 
     def condition(self) -> tuple[str, Mapping[str, object]]:
-        """Return whether the simulation keeps up with real time."""
+        """Return a warning if the simulation is slower than real time, and the skipped time."""
         values = {
             'simulated_time': self.pair.t,
             'skipped_real_time': self.real_time.given_up,

@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Walking: hip, knee and ankle over a gait cycle, and the joint motion of both legs from it.
+Hip, knee and ankle angles over a gait cycle, and the joint motion of both legs.
 
 Values that are missing in the source of the leg pair are assumptions with reasons.
 
@@ -32,7 +32,7 @@ _COLUMNS = ['phase', 'hip_deg', 'knee_deg', 'ankle_deg']
 @dataclass(frozen=True)
 class Assumption:
     """
-    One assumption of the leg pair that the source does not state.
+    Assumed value of a quantity that the paper on the exoskeleton does not state.
 
     Attributes
     ----------
@@ -52,13 +52,13 @@ class Assumption:
 
 @lru_cache
 def read_assumptions() -> Mapping[str, Assumption]:
-    """Read the assumptions of the human-exoskeleton leg pair."""
+    """Read the assumed quantities of exoskeleton and wearer, by name."""
     text = leg_pair_file('exoskeleton_legs/assumptions.yaml').read_text(encoding='utf-8')
     return {name: Assumption(**entry) for name, entry in load_yaml(text).items()}
 
 
 def leg_pair_file(name: str) -> Path:
-    """Return a file that is shipped with the leg pair, such as 'human_legs/gait.csv'."""
+    """Return the path of a shipped file, such as 'human_legs/gait.csv'."""
     return Path(str(resources.files('armid_ros.robots').joinpath(name)))
 
 
@@ -83,7 +83,7 @@ class Gait:
 
     @classmethod
     def fit(cls, phase: FloatArray, angles: FloatArray, harmonics: int = _HARMONICS) -> Gait:
-        """Fit the series to angles [rad] of shape (N, 3) at phases of shape (N,) from 0 to 1."""
+        """Fit a Fourier series to angles, (N, 3) [rad], at phases, (N,), between 0 and 1."""
         turn = 2.0 * np.pi * np.outer(phase, np.arange(harmonics + 1))
         basis = np.hstack([np.cos(turn), np.sin(turn[:, 1:])])
         solution = np.linalg.lstsq(basis, angles, rcond=None)[0]
@@ -91,7 +91,7 @@ class Gait:
         return cls(cosine, np.vstack([np.zeros((1, 3)), solution[harmonics + 1 :]]))
 
     def __call__(self, phase: FloatArray, derivative: int = 0) -> FloatArray:
-        """Return angles or their derivative with respect to phase, (N, 3), at phases (N,)."""
+        """Return joint angles, or a derivative by the phase, (N, 3) [rad], at phases, (N,)."""
         w = 2.0 * np.pi * np.arange(len(self.cosine))
         turn = np.outer(phase, w) + derivative * np.pi / 2.0
         return np.asarray(
@@ -102,7 +102,7 @@ class Gait:
 
 def read_gait(path: Path | None = None) -> Gait:
     """
-    Read a gait; by default the shipped one: level walking, hip -20..40 deg, knee 0..65 deg.
+    Read a gait from a CSV file, or the shipped gait of level walking.
 
     Parameters
     ----------
@@ -120,7 +120,7 @@ def read_gait(path: Path | None = None) -> Gait:
     lines = [line for line in text.splitlines() if line.strip() and not line.startswith('#')]
     head = [name.strip() for name in lines[0].split(',')] if lines else []
     if head != _COLUMNS:
-        raise TrajectoryError(f'{path}: has the columns {head}, a gait has {_COLUMNS}')
+        raise TrajectoryError(f'{path}: the columns are {head}, but a gait needs {_COLUMNS}')
     try:
         rows = np.array([[float(cell) for cell in line.split(',')] for line in lines[1:]])
     except ValueError as error:
@@ -129,14 +129,14 @@ def read_gait(path: Path | None = None) -> Gait:
         raise TrajectoryError(f'{path}: every row must have four finite numbers')
     if len(rows) < 2 * _HARMONICS + 1:
         raise TrajectoryError(
-            f'{path}: {len(rows)} rows; a cycle needs at least {2 * _HARMONICS + 1}'
+            f'{path}: {len(rows)} rows; a gait cycle needs at least {2 * _HARMONICS + 1}'
         )
     return Gait.fit(rows[:, 0], np.radians(rows[:, 1:]))
 
 
 def stance_motion(gait: Gait, joints: tuple[str, ...], t: FloatArray, phase: FloatArray) -> Motion:
     """
-    Return the motion of a seven-link body that stands on one foot.
+    Return the joint motion of a body that stands on one foot while the other leg swings.
 
     Parameters
     ----------

@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-The whole gait cycle: single and double support of both machines, and ground forces.
+Simulation of a gait cycle of exoskeleton and wearer, with ground forces on their feet.
 
 Joint motion is prescribed by a walkable gait, and the lean of the trunks is constant. The hips
 move under the forces of weight, springs, and the ground at both heels and toes, equation (27).
@@ -55,7 +55,7 @@ _PLANE = np.array([0, 2])
 @dataclass(frozen=True, eq=False)
 class WalkingMachine:
     """
-    One machine of a walking pair over a cycle of N samples.
+    Motion, forces and torques of exoskeleton or wearer over a gait cycle of N samples.
 
     Attributes
     ----------
@@ -80,28 +80,28 @@ class WalkingMachine:
 
     @property
     def weight(self) -> float:
-        """Return the weight of the machine [N]."""
+        """Weight of the machine [N]."""
         mass = self.robot.rigid_parameters[::10].sum()
         return float(mass * np.linalg.norm(self.robot.gravity))
 
     @property
     def feet(self) -> FloatArray:
-        """Return the force on the right and on the left foot, shape (N, 2, 2) [N]."""
+        """Ground force on right and left foot, forward and up, shape (N, 2, 2) [N]."""
         return np.asarray(self.ground.reshape(-1, 2, 2, 2).sum(axis=2))
 
     @property
     def trunk_moment(self) -> FloatArray:
-        """Return the external moment that keeps the lean of the trunk, shape (N,) [N m]."""
+        """External moment that holds the trunk at its lean, shape (N,) [N m]."""
         return np.asarray(self.tau[:, floating(self.robot)[2]])
 
     @property
     def support(self) -> npt.NDArray[np.int_]:
-        """Return the number of feet that bear weight, shape (N,)."""
+        """Number of feet on the ground, shape (N,)."""
         # smallest load of a supporting foot: 1 % of the weight
         return np.asarray(np.sum(self.feet[:, :, 1] > 0.01 * self.weight, axis=1))
 
     def feet_by_shares(self) -> FloatArray:
-        """Return the forces on right and left foot by (20) to (22), shape (N, 2, 2) [N]."""
+        """Return foot forces by equations (20) to (22) of the paper, shape (N, 2, 2) [N]."""
         robot, motion = self.robot, self.motion
         # centroids and m (c'' - g) of all bodies
         bodies = list(robot.model.inertias)[1:]
@@ -133,7 +133,7 @@ class WalkingMachine:
 @dataclass(frozen=True, eq=False)
 class GaitCycle:
     """
-    One cycle of a walking pair, between two planned right heel strikes of the wearer.
+    Simulated gait cycle of exoskeleton and wearer, between two right heel strikes.
 
     Attributes
     ----------
@@ -153,13 +153,13 @@ class GaitCycle:
 
     @property
     def motions(self) -> PairMotion:
-        """Return the motions of both machines."""
+        """Motions of exoskeleton and wearer."""
         return PairMotion(self.own.motion, self.other.motion)
 
     def torques(
         self, pair: TiedPair | None = None, ground: FloatArray | None = None
     ) -> FloatArray:
-        """Return the machine's torques with other springs, or other forces on its feet, (N, n)."""
+        """Return exoskeleton torques, (N, n), with other straps or other foot forces."""
         feet = self.own.ground if ground is None else ground
         forces = (feet, self.other.ground)
         return walking_torques(pair or self.pair, self.motions, forces).tau
@@ -167,7 +167,7 @@ class GaitCycle:
 
 def gait_cycle(pair: TiedPair, gait: Gait) -> GaitCycle:
     """
-    Simulate a walking pair until its motion is periodic, and return one cycle.
+    Simulate walking of exoskeleton and wearer until it is periodic, and return one cycle.
 
     Parameters
     ----------
@@ -227,7 +227,7 @@ def gait_cycle(pair: TiedPair, gait: Gait) -> GaitCycle:
 
 
 def _contact_motion(robot: Robot, motion: Motion) -> tuple[FloatArray, FloatArray]:
-    """Return positions and velocities of heels and toes, forward and up, each (N, 4, 2)."""
+    """Return positions and velocities, (N, 4, 2) each, of heels and toes, forward and up."""
     place, jacobian = points_motion(robot, *contacts(robot), motion.q)
     speed = np.einsum('ncxj,nj->ncx', jacobian, motion.dq)
     return place[..., _PLANE], speed[..., _PLANE]
@@ -237,7 +237,7 @@ def walking_torques(
     pair: TiedPair, motions: PairMotion, ground: Sequence[FloatArray]
 ) -> PairTorques:
     """
-    Return the joint torques of both machines with springs and the forces at their feet, (27).
+    Return joint torques of both machines under strap and ground forces, equation (27).
 
     Parameters
     ----------
@@ -261,7 +261,7 @@ def walking_torques(
 def _joint_motion(
     robot: Robot, plan: WalkableGait, t: FloatArray, phase: FloatArray, cycle: float
 ) -> Motion:
-    """Return the motion of the legs with fixed hips."""
+    """Return the planned motion of both legs relative to fixed hips."""
     parts = np.zeros((3, len(t), robot.n_joints))
     for order in range(3):
         for side, shift in zip(SIDES, (0.0, 0.5), strict=True):
@@ -275,7 +275,7 @@ def _walk(
     pair: TiedPair, legs: PairMotion, start: FloatArray, cycle: float
 ) -> tuple[FloatArray, FloatArray]:
     """
-    Integrate the hips of both machines (Runge-Kutta 4), with prescribed legs.
+    Integrate the hip motion of both machines over three gait cycles, with prescribed legs.
 
     States and rates of the last cycle have the shape (N, 2, 2, 2): position and velocity, of the
     machine and its wearer, forward and up.
@@ -319,7 +319,7 @@ def check_cycle(
     cycle: GaitCycle, joint: str, rate: float, tau: FloatArray | None = None
 ) -> GaitCheck:
     """
-    Simulate a cycle in which one joint of the machine is driven by its torque.
+    Simulate a gait cycle in which one joint of the exoskeleton is driven by its torque.
 
     The source does this check in another simulator and gives the errors of hip and knee. The hips
     are free, and the feet touch the ground.
@@ -346,7 +346,7 @@ def check_cycle(
 def driving_torque(
     cycle: GaitCycle, joint: str, rate: float, tau: FloatArray | None = None
 ) -> DrivingTorque:
-    """Return zero force on the hips and the interpolated torque of a joint, (3,) [N, N m]."""
+    """Return a function of time: zero force on the hips, and the torque of a joint; (3,)."""
     column = [cycle.pair.robot.index(joint)]
     own = (cycle.own.tau if tau is None else tau)[:, column]
     curve = splined(cycle.own.motion.t, own, rate)
@@ -355,7 +355,7 @@ def driving_torque(
 
 def ground_by_shares(cycle: GaitCycle) -> FloatArray:
     """
-    Return the forces by (20) to (22) on heels and toes of the machine, (N, 4, 2) [N].
+    Return forces by equations (20) to (22) on heels and toes, shape (N, 4, 2) [N].
 
     The equations do not give the centre of pressure, so that of the simulated ground is used.
 

@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Two machines tied by springs: joint torques, spring forces, and motions on one foot.
+Two machines connected by straps: strap forces, joint torques, and motions on one foot.
 
 A pair is any two robots with a common base frame. The shipped pair is a man with an exoskeleton,
 tied at both thighs and both shanks.
@@ -37,14 +37,14 @@ import numpy.typing as npt
 @dataclass(frozen=True)
 class TiedPair(TiedMachines):
     """
-    Two machines, such as an exoskeleton and its wearer, and the S springs between them.
+    Two machines, such as exoskeleton and wearer, and the S straps between them.
 
     Attributes
     ----------
     stiffness : ndarray, shape (S,)
-        k [N/m].
+        Stiffness of each strap [N/m].
     slack : ndarray, shape (S,)
-        Extension at which a spring starts to pull [m]; zero by default.
+        Extension at which a strap starts to pull [m]; zero by default.
 
     """
 
@@ -52,7 +52,7 @@ class TiedPair(TiedMachines):
     slack: FloatArray | None = None
 
     def __post_init__(self) -> None:
-        """Expand single numbers to all springs, and check the values."""
+        """Expand single numbers to all straps, and check the values."""
         size = (len(self.ties),)
         for name in ('stiffness', 'slack'):
             values = getattr(self, name)
@@ -60,40 +60,40 @@ class TiedPair(TiedMachines):
                 spread = np.broadcast_to(np.asarray(0.0 if values is None else values), size)
             except ValueError:
                 raise ModelError(
-                    f'{name} has shape {np.shape(values)}, but there are {size[0]} ties: '
+                    f'{name} has shape {np.shape(values)}, but there are {size[0]} straps: '
                     f'{", ".join(tie.name for tie in self.ties)}'
                 ) from None
             if np.any(spread < 0.0) or not np.all(np.isfinite(spread)):
-                raise ModelError(f'{name}: {spread} has to be finite and not negative')
+                raise ModelError(f'{name}: {spread} must be finite and not negative')
             object.__setattr__(self, name, read_only(np.array(spread, dtype=float)))
 
     @property
     def segments(self) -> tuple[str, ...]:
-        """Names of the ties."""
+        """Names of the straps."""
         return tuple(tie.name for tie in self.ties)
 
     def with_stiffness(self, stiffness: npt.ArrayLike) -> TiedPair:
-        """Return the pair with other springs, one number or one for each [N/m]."""
+        """Return the pair with another stiffness, for all straps or for each [N/m]."""
         return replace(self, stiffness=np.asarray(stiffness, dtype=float))
 
     def with_slack(self, slack: npt.ArrayLike) -> TiedPair:
-        """Return the pair with other slacks of the ties, one number or one for each [m]."""
+        """Return the pair with another slack, for all straps or for each [m]."""
         return replace(self, slack=np.asarray(slack, dtype=float))
 
     def geometry(self, motion: Motion, other_motion: Motion) -> TieGeometry:
-        """Return the geometry of the ties along the motions of both machines."""
+        """Return ends and Jacobians of the straps along the motions of both machines."""
         return tie_geometry(self.robot, motion.q, self.other, other_motion.q, self.ties)
 
     def forces(self, way: FloatArray) -> FloatArray:
         """
-        Return the spring forces on the machine for given extensions.
+        Return the strap forces on the first machine for given strap vectors.
 
         The forces on the other machine are opposite.
 
         Parameters
         ----------
         way : ndarray, shape (..., S, 3)
-            Vectors from the ends of the springs on the other machine to those on the machine [m].
+            Vectors from the strap ends on the second machine to those on the first [m].
 
         Returns
         -------
@@ -107,12 +107,12 @@ class TiedPair(TiedMachines):
 
 class PairMotion(NamedTuple):
     """
-    Motions of both machines on a common time base.
+    Motions of exoskeleton and wearer on a common time base.
 
     Attributes
     ----------
     own, other : Motion
-        Motion of the machine (exoskeleton) and of the other one (wearer).
+        Motion of the first machine (exoskeleton) and of the second (wearer).
 
     """
 
@@ -123,14 +123,14 @@ class PairMotion(NamedTuple):
 @dataclass(frozen=True)
 class PairTorques:
     """
-    Joint torques of a moving pair of machines, and the forces of its springs.
+    Joint torques of two connected machines, and the strap forces.
 
     Attributes
     ----------
     tau, other_tau : ndarray, shape (N, n) and (N, m)
-        Torques of the machine's joints and of the other one's [N m].
+        Joint torques of the first and of the second machine [N m].
     forces : ndarray, shape (N, S, 3)
-        Spring forces on the machine [N].
+        Strap forces on the first machine [N].
 
     """
 
@@ -141,7 +141,7 @@ class PairTorques:
 
 def pair_torques(pair: TiedPair, motion: Motion, other_motion: Motion) -> PairTorques:
     """
-    Compute the joint torques of both machines, springs included.
+    Return the joint torques of both machines and the strap forces along a motion.
 
     Parameters
     ----------
@@ -164,19 +164,19 @@ def leg_pair(
     stiffness: npt.ArrayLike | None = None, segments: Sequence[str] = SEGMENTS
 ) -> TiedPair:
     """
-    Return the shipped pair: exoskeleton_legs worn by human_legs.
+    Return the shipped exoskeleton and wearer, connected by straps.
 
     Parameters
     ----------
     stiffness : array_like, optional
         Stiffness of all springs or of each [N/m]; by default that of ``assumptions.yaml``.
     segments : sequence of str
-        Segments with a tie.
+        Leg segments with a strap.
 
     Raises
     ------
     ModelError
-        If there is no such segment.
+        If a segment does not exist.
 
     """
     exo, human = load_robot('exoskeleton_legs'), load_robot('human_legs')
@@ -184,16 +184,17 @@ def leg_pair(
 
 
 def assumed_stiffness(stiffness: npt.ArrayLike | None) -> FloatArray:
-    """Return a stiffness of springs [N/m]; by default that of ``assumptions.yaml``."""
+    """Return the given strap stiffness, or that of ``assumptions.yaml`` [N/m]."""
     assumed = read_assumptions()['interaction_stiffness'].value
     return np.asarray(assumed if stiffness is None else stiffness, dtype=float)
 
 
 def walking(pair: TiedPair, gait: Gait, t: FloatArray) -> PairMotion:
     """
-    Return the motion of the walking pair: the wearer follows the gait, the machine nearly so.
+    Return the motion of exoskeleton and wearer in single support.
 
-    At t = 0 single support begins.
+    The wearer follows the gait, and the exoskeleton follows the wearer with a small error. Single
+    support begins at t = 0.
 
     Parameters
     ----------
@@ -217,7 +218,7 @@ def walking(pair: TiedPair, gait: Gait, t: FloatArray) -> PairMotion:
 
 def stepping(pair: TiedPair, gait: Gait, t: FloatArray, period: float | None = None) -> PairMotion:
     """
-    Return the motion of the pair during repeated steps through single support and back.
+    Return a periodic motion of exoskeleton and wearer through single support and back.
 
     Parameters
     ----------
@@ -248,7 +249,7 @@ def following(
     pair: TiedPair, t: FloatArray, moving: Callable[[tuple[str, ...], FloatArray], Motion]
 ) -> PairMotion:
     """
-    Return the motions of wearer and machine; the machine follows with delay and errors.
+    Return the motions of wearer and exoskeleton, which follows with delay and errors.
 
     Parameters
     ----------
@@ -283,7 +284,7 @@ EXERCISES = {
 
 def exercise(pair: TiedPair, name: str, t: FloatArray, gait: Gait | None = None) -> PairMotion:
     """
-    Return the motion of the shipped pair during an exercise on one foot.
+    Return the motion of exoskeleton and wearer during an exercise on one foot.
 
     Parameters
     ----------
@@ -303,7 +304,7 @@ def exercise(pair: TiedPair, name: str, t: FloatArray, gait: Gait | None = None)
     (middle, reach), w = np.radians(angles), 2.0 * np.pi / period
 
     def moving(joints: tuple[str, ...], time: FloatArray) -> Motion:
-        """Return a motion of hips and knees along sines, with a flat foot and an upright trunk."""
+        """Return sinusoidal motion of hips and knees; foot flat and trunk upright."""
         cosine, sine = (np.outer(f(w * time), reach) for f in (np.cos, np.sin))
         parts = [
             np.column_stack([knee - hip, knee, hip, far_hip, far_knee, np.zeros_like(time)])

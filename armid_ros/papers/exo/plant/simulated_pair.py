@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The sensors of a pair that steps repeatedly through single support and back."""
+"""Simulated sensor readings of exoskeleton and wearer in periodic motion."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _BLOCK = 50
 
 class PairSample(NamedTuple):
     """
-    One sample of the sensor readings of both machines.
+    Sensor readings of exoskeleton and wearer at one instant.
 
     Attributes
     ----------
@@ -40,7 +40,7 @@ class PairSample(NamedTuple):
 
 class SimulatedPair:
     """
-    A pair that follows a gait, and the noise of its sensors.
+    Simulator of exoskeleton and wearer along a gait, with sensor noise.
 
     Parameters
     ----------
@@ -75,17 +75,17 @@ class SimulatedPair:
         self.reset()
 
     def reset(self) -> None:
-        """Return both machines to the initial state."""
+        """Return exoskeleton and wearer to the initial state."""
         self._steps = 0
         self._block: tuple[PairMotion, FloatArray] | None = None
 
     @property
     def t(self) -> float:
-        """Time since the beginning [s]."""
+        """Time since the initial state [s]."""
         return self._steps / self._rate
 
     def advance(self) -> PairSample:
-        """Simulate one sample, and return the sensor readings."""
+        """Advance by one sample, and return the sensor readings."""
         k = self._steps % _BLOCK
         self._steps += 1
         if k == 0 or self._block is None:

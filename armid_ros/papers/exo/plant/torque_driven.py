@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Hybrid dynamics of a tied pair: some joints follow torques, all others a prescribed motion.
+Simulation in which some joints follow torques and all others a prescribed motion.
 
 The source checks its torques in this way: one joint is driven by its torque, and all others are
 prescribed. If all joints are driven by torques alone, the pair is an inverted pendulum and falls.
@@ -29,7 +29,7 @@ Rate = Callable[[int, FloatArray], FloatArray]
 
 def splined(t: FloatArray, tau: FloatArray, rate: float) -> DrivingTorque:
     """
-    Sample torques at a rate and interpolate by cubic splines.
+    Return torques as a function of time: sampled at a rate, joined by cubic splines.
 
     Parameters
     ----------
@@ -49,12 +49,12 @@ def splined(t: FloatArray, tau: FloatArray, rate: float) -> DrivingTorque:
 
 def runge_kutta(rate: Rate, k: int, h: float, x: FloatArray) -> tuple[FloatArray, FloatArray]:
     """
-    Advance a state by one Runge-Kutta step of order 4, from sample k over k + 1 to k + 2.
+    Advance a state by one Runge-Kutta step of order 4, from sample k to sample k + 2.
 
     Parameters
     ----------
     rate : callable
-        Rate of the state at a sample.
+        Function that returns the time derivative of the state at a sample.
     k : int
         First sample.
     h : float
@@ -65,7 +65,7 @@ def runge_kutta(rate: Rate, k: int, h: float, x: FloatArray) -> tuple[FloatArray
     Returns
     -------
     slope, after : ndarray, shape (s,)
-        Rate at sample k, and state at k + 2.
+        Time derivative at sample k, and state at sample k + 2.
 
     """
     a = rate(k, x)
@@ -85,7 +85,7 @@ def drive_by_torque(
     on_ground: bool = False,
 ) -> Motion:
     """
-    Integrate the driven joints of the machine; all other joints follow the prescribed motion.
+    Integrate the torque-driven joints of the exoskeleton along a prescribed motion.
 
     Parameters
     ----------
@@ -114,8 +114,8 @@ def drive_by_torque(
     """
     if len(motion) % 2 == 0:
         raise TrajectoryError(
-            f'there are {len(motion)} samples, but integration in steps of two samples needs an '
-            'odd number'
+            f'the motion has {len(motion)} samples; integration steps span two samples, so the '
+            'number must be odd'
         )
     columns = [pair.robot.index(joint) for joint in driven]
     rate = _forward_dynamics(pair, PairMotion(motion, other_motion), columns, torque, on_ground)
@@ -141,7 +141,7 @@ def _forward_dynamics(
     torque: DrivingTorque,
     on_ground: bool,
 ) -> Rate:
-    """Return a function for velocities and accelerations of the driven joints, shape (2 d,)."""
+    """Return the time derivative of the driven joints as a function of sample and state."""
     robot, own, tied = pair.robot, motions.own, len(pair.ties)
     ends = [(tie.joint, np.array(tie.point)) for tie in pair.ties]
     if on_ground:
@@ -183,7 +183,7 @@ def _forward_dynamics(
 @dataclass(frozen=True)
 class GaitCheck:
     """
-    Motion of one torque-driven joint, compared with the prescribed motion.
+    Motion of one torque-driven joint, and its error against the prescribed motion.
 
     Attributes
     ----------

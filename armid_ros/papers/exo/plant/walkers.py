@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Walking leg pair: floating hips, ground contact, and gaits without sliding feet.
+Bodies with floating hips, ground contact, and gaits whose feet do not slide.
 
 The root of the description becomes the trunk instead of a foot, so each foot can be on the
 ground. Two slides and a hinge connect ground and trunk; hip, knee and ankle of each leg follow.
@@ -43,7 +43,7 @@ HEEL_DOWN, TOE_DOWN = (0.0, 0.42), (0.12, 0.62)
 @dataclass(frozen=True)
 class LegLength:
     """
-    Lengths of a leg [m].
+    Lengths of the segments of a leg [m].
 
     Attributes
     ----------
@@ -60,7 +60,7 @@ class LegLength:
 @dataclass(frozen=True)
 class WalkableGait:
     """
-    Curves of one leg, and the motion of the hips.
+    Gait whose feet do not slide, with the motion of the hips.
 
     Attributes
     ----------
@@ -86,7 +86,7 @@ def foot_points(
     angles: FloatArray, hips: FloatArray, lean: float, leg: LegLength
 ) -> tuple[FloatArray, FloatArray]:
     """
-    Return heel and toe of a leg, both of shape (N, 2) [m].
+    Return the positions of heel and toe of a leg, each of shape (N, 2) [m].
 
     Parameters
     ----------
@@ -116,7 +116,7 @@ def walkable(
     lean: float | None = None,
 ) -> WalkableGait:
     """
-    Find the nearest gait without sliding feet.
+    Return the gait nearest to a desired gait whose feet neither slide nor sink.
 
     Parameters
     ----------
@@ -181,7 +181,7 @@ def walkable(
 
 
 def _downward(angle: FloatArray) -> FloatArray:
-    """Return downward unit vectors, rotated forward by angles, shape (N, 2)."""
+    """Return unit vectors that point down, rotated forward by angles, shape (N, 2)."""
     return np.column_stack([np.sin(angle), -np.cos(angle)])
 
 
@@ -191,7 +191,7 @@ def _inside(phase: FloatArray, ends: tuple[float, float]) -> np.typing.NDArray[n
 
 def ground_force(height: FloatArray, rising: FloatArray, sliding: FloatArray) -> FloatArray:
     """
-    Return the force of the ground on points.
+    Return the contact force of the ground on points of a foot.
 
     Parameters
     ----------
@@ -225,7 +225,7 @@ SEGMENTS = tuple(f'{side}_{link}' for side in SIDES for link in ('shank', 'thigh
 
 def walker(robot: Robot) -> Robot:
     """
-    Convert a body on one foot to a body with a floating trunk.
+    Convert a robot that stands on a fixed foot to a robot with a floating trunk.
 
     Parameters
     ----------
@@ -263,7 +263,7 @@ def walker(robot: Robot) -> Robot:
 
 
 def leg_length(robot: Robot) -> LegLength:
-    """Return the lengths of the legs of a shipped body, on one foot or free to walk."""
+    """Return the segment lengths of a shipped exoskeleton or wearer."""
     assumed = read_assumptions()['segment_length'].value
     prefix = robot.joints[0].split('_')[0]
     side = 'right' if f'{prefix}_right_knee' in robot.joints else 'swing'
@@ -276,7 +276,7 @@ def leg_length(robot: Robot) -> LegLength:
 
 def walking_pair(stiffness: npt.ArrayLike | None = None) -> TiedPair:
     """
-    Return the shipped pair with springs at both shanks and thighs, free to walk.
+    Return the shipped exoskeleton and wearer with floating trunks and four straps.
 
     Parameters
     ----------
@@ -293,19 +293,19 @@ def walking_pair(stiffness: npt.ArrayLike | None = None) -> TiedPair:
 
 
 def columns(robot: Robot, side: str) -> list[int]:
-    """Return the indices of hip, knee and ankle of a leg."""
+    """Return the joint indices of hip, knee and ankle of a leg."""
     prefix = robot.joints[0].split('_')[0]
     return [robot.index(f'{prefix}_{side}_{joint}') for joint in _LEG]
 
 
 def floating(robot: Robot) -> list[int]:
-    """Return the indices of the trunk's coordinates: forward, up and lean."""
+    """Return the joint indices of the floating trunk: forward, up and lean."""
     prefix = robot.joints[0].split('_')[0]
     return [robot.index(f'{prefix}_{name}') for name in FLOATING]
 
 
 def contacts(robot: Robot) -> tuple[list[str], FloatArray]:
-    """Return joints and points of right heel, right toe, left heel and left toe, (4, 3) [m]."""
+    """Return joints and contact points, (4, 3) [m], of right and left heel and toe."""
     prefix = robot.joints[0].split('_')[0]
     ankles = [f'{prefix}_{side}_ankle' for side in SIDES for _ in range(2)]
     return ankles, np.tile([[0.0, 0.0, 0.0], [leg_length(robot).foot, 0.0, 0.0]], (2, 1))
@@ -314,7 +314,7 @@ def contacts(robot: Robot) -> tuple[list[str], FloatArray]:
 def _joint_urdf(
     joint: str, parent: str, child: str, axis: str, body: pin.Inertia | None, up: float = 0.0
 ) -> str:
-    """Return the URDF of a joint and its link; a joint to a link without a body is a slide."""
+    """Return the URDF text of a joint and its link; prismatic if the link has no body."""
     kind, far, inside = 'prismatic', '1000', ''
     if body is not None:
         kind, far = 'revolute', '3.2'

@@ -1,3 +1,3 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Report on a tied pair of machines."""
+"""Report on an exoskeleton and its wearer."""

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The report of a machine and its wearer: stiffness of the ties, forces, assumptions."""
+"""Page on exoskeleton and wearer: stiffness and forces of the straps, and assumptions."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def exo_report(
     provenance: Provenance,
 ) -> str:
     """
-    Return report.html of a tied pair.
+    Return the HTML page on exoskeleton, wearer and straps.
 
     Parameters
     ----------
@@ -72,16 +72,17 @@ def exo_report(
         assumptions_section(),
         Origin(provenance),
     ]
-    title = 'Springs between an exoskeleton and its wearer'
-    return Page(title, f'{len(pair.ties)} springs · {len(abscissa)} samples', sections).html()
+    title = 'Straps between an exoskeleton and its wearer'
+    return Page(title, f'{len(pair.ties)} straps · {len(abscissa)} samples', sections).html()
 
 
 def verdict(found: Sequence[Interaction], walked: SimulatedWalk | None) -> VerdictSection:
-    """Return the verdict: stiffness of the straps, interval, and joint errors over a walk."""
+    """Return the verdict box: strap stiffness with interval, and joint errors of a gait cycle."""
     overall = found[0]
     k, reach = overall.stiffness[0], HALF_WIDTH * overall.std[0]
     sentences = [
-        f'The stiffness of the straps between exoskeleton and wearer is {k:.0f} ± {reach:.0f} N/m.'
+        f'Stiffness of the straps between exoskeleton and wearer: {k:.0f} ± {reach:.0f} N/m '
+        '(95 %).'
     ]
     weak = [
         name.replace('_', ' ')
@@ -91,9 +92,13 @@ def verdict(found: Sequence[Interaction], walked: SimulatedWalk | None) -> Verdi
     ]
     if walked is not None:
         each = ', '.join(f'{one.right.joint} {one.right.most:.2g}°' for one in walked.driven)
-        sentences.append(f'Largest position error of a driven joint over a walking cycle: {each}.')
+        sentences.append(
+            f'Largest error of a joint that its torque drives, over a gait cycle: {each}.'
+        )
     beware = (
-        [f'{", ".join(weak)}: the extension is too small for an accuracy of 10 %.'] if weak else []
+        [f'{", ".join(weak)}: the strap extension is too small for an accuracy of 10 %.']
+        if weak
+        else []
     )
     if k - reach <= 0.0:
         return VerdictSection('no interaction', 'fair', ['No interaction was identified.'], beware)
@@ -109,8 +114,8 @@ _ROLES: tuple[Role, ...] = ('residual', 'predicted', 'before', 'measured')
 def _stiffness_section(
     found: Sequence[Interaction], walked: SimulatedWalk | None
 ) -> ContentSection:
-    """Return a section with the stiffness of the ties and its intervals."""
-    heads = ['Spring', 'Stiffness [N/m]', '± 95 %', 'Bias of plain least squares']
+    """Return the section with stiffness and 95 % interval of each strap."""
+    heads = ['Strap', 'Stiffness [N/m]', '± 95 %', 'Bias of ordinary least squares']
     rows = [
         [
             segment.replace('_', ' '),
@@ -126,16 +131,16 @@ def _stiffness_section(
         ('Noise of the torques, as filtered', f'{_range(found[0].torque_noise)} N m'),
     ]
     text = (
-        'Springs are extended by millimetres, the small difference of measured angles. Noise in '
-        'the angles biases plain least squares, and more data do not reduce this bias. The noise '
-        'is estimated from the recording, and the bias is corrected.'
+        'Straps extend by millimetres, computed from small differences of measured angles. Angle '
+        'noise biases ordinary least squares, however long the recording. The noise is estimated '
+        'from the recording, and the bias is corrected.'
     )
     table = DataTable([*heads, 'Simulated with'] if walked else heads, rows)
     return ContentSection('Stiffness', [table, FactList(noise), Paragraph(text, 'hint')])
 
 
 def _range(values: FloatArray) -> str:
-    """Write the least and the largest value in two digits, or one value if both are equal."""
+    """Format smallest and largest value, or one value if both are equal in two digits."""
     ends = dict.fromkeys(f'{end:.2g}' for end in (values.min(), values.max()))
     return ' to '.join(ends)
 
@@ -143,7 +148,7 @@ def _range(values: FloatArray) -> str:
 def forces_section(
     pair: TiedPair, motions: PairMotion, abscissa: FloatArray, name: str
 ) -> ContentSection:
-    """Return a section with the spring forces, and their contributions to the torques."""
+    """Return the section with strap forces, and joint torques with and without straps."""
     torques = pair_torques(pair, *motions)
     alone = pair_torques(pair.with_stiffness(0.0), *motions)
     size = np.linalg.norm(torques.forces, axis=2)
@@ -156,24 +161,26 @@ def forces_section(
     panels = []
     for k, joint in enumerate(pair.robot.joints):
         both = [
-            Series('alone', alone.tau[:, k], 'measured'),
-            Series('with springs', torques.tau[:, k], 'residual'),
+            Series('without straps', alone.tau[:, k], 'measured'),
+            Series('with straps', torques.tau[:, k], 'residual'),
         ]
         chart = Chart(abscissa, both, name, 'torque [N m]', height=180, link='torques')
         panels.append((joint, '', [chart]))
     return ContentSection(
         'Interaction',
         [
-            Paragraph('Force of each spring on the machine; the force on the wearer is opposite.'),
+            Paragraph(
+                'Force of each strap on the exoskeleton; the force on the wearer is opposite.'
+            ),
             Chart(abscissa, series, name, 'force [N]', height=260),
-            DataTable(['Segment', 'Mean [N]', 'Largest [N]'], rows),
-            Fold('Joint torques with and without springs', [Panels(panels)]),
+            DataTable(['Strap', 'Mean [N]', 'Largest [N]'], rows),
+            Fold('Joint torques of the exoskeleton with and without straps', [Panels(panels)]),
         ],
     )
 
 
 def assumptions_section() -> ContentSection:
-    """Return a section with the assumptions: name, value with unit, reason."""
+    """Return the section with name, value, unit and reason of each assumed quantity."""
     rows = []
     for name, entry in read_assumptions().items():
         value = entry.value
@@ -184,6 +191,6 @@ def assumptions_section() -> ContentSection:
         else:
             text = f'{value:g}' if isinstance(value, float) else str(value)
         rows.append((name.replace('_', ' '), f'{text} {entry.unit}'.strip(), entry.reason))
-    caption = 'Values that the source does not give, and their assumed values.'
+    caption = 'Assumed values of quantities that the paper does not give.'
     table = DataTable(['Quantity', 'Value', 'Reason'], rows, words=(0, 1, 2))
     return ContentSection('Assumptions', [Paragraph(caption), table])

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Sections on a whole cycle of walking: both bodies, forces on the feet, torque-driven joints."""
+"""Sections on a simulated gait cycle: animation, foot forces and torque-driven joints."""
 
 from __future__ import annotations
 
@@ -26,20 +26,20 @@ _SCALE, _GROUND = 260.0, 385.0
 _ABSCISSA = 'gait cycle of the right leg'
 
 
-#: Relative error of the stiffness of springs that are too soft.
+#: Relative error of the stiffness of straps that are too soft.
 STIFFNESS_ERROR = 0.2
-#: Largest error of the position of a torque-driven joint in the source [deg].
+#: Largest position error of a torque-driven joint in the paper [deg].
 SOURCE_ERROR = {'exo_right_hip': 1.5, 'exo_right_knee': 2.5}
 
 
 class DrivenJoint(NamedTuple):
     """
-    A joint of the machine over a cycle, driven by its torque.
+    Results of driving one exoskeleton joint by its torque over a gait cycle.
 
     Attributes
     ----------
     right, softer : GaitCheck
-        With the right torque, and with the torque for springs that are too soft.
+        With the right torque, and with the torque for straps that are too soft.
     shared : GaitCheck
         With the torque for forces on the feet by (20) to (22).
 
@@ -52,12 +52,12 @@ class DrivenJoint(NamedTuple):
 
 class SimulatedWalk(NamedTuple):
     """
-    Cycle of a simulated pair, and the joints that are driven by torque over this cycle.
+    Simulated gait cycle of exoskeleton and wearer, and results of torque-driven joints.
 
     Attributes
     ----------
     stiffness : float
-        True stiffness of all springs [N/m].
+        True stiffness of all straps [N/m].
     cycle : GaitCycle
         A whole cycle of walking.
     driven : sequence of DrivenJoint
@@ -73,12 +73,12 @@ class SimulatedWalk(NamedTuple):
 @dataclass(frozen=True)
 class Walk(Section):
     """
-    Animation of both bodies over a cycle.
+    Section with an animation of exoskeleton and wearer over a gait cycle.
 
     Attributes
     ----------
     walked : SimulatedWalk
-        The cycle, and the joints driven by torque to choose from.
+        The gait cycle, and the torque-driven joints that the reader can choose.
 
     """
 
@@ -92,7 +92,7 @@ class Walk(Section):
 
     @property
     def choices(self) -> list[str]:
-        """Return what a reader can choose in the animation."""
+        """Labels of the motions that the reader can choose."""
         names = [one.right.joint.removeprefix('exo_') for one in self.walked.driven]
         return [
             'as prescribed',
@@ -104,13 +104,13 @@ class Walk(Section):
 
     @property
     def held(self) -> list[str]:
-        """Return the largest external moments on the trunks of machine and wearer [N m]."""
+        """Largest external moments on the trunks of exoskeleton and wearer [N m], as text."""
         cycle = self.walked.cycle
         return [f'{np.abs(one.trunk_moment).max():.0f}' for one in (cycle.own, cycle.other)]
 
     @property
     def data(self) -> Markup:
-        """Return the data of the animation script: a list of frames, each with lines."""
+        """Coordinates of all drawn lines in each frame, as JSON for the animation script."""
         _, cycle, driven = self.walked
         rows = np.linspace(0, len(cycle.phase) - 1, 73).astype(int)[:-1]
         wearer = cycle.motions.other.select(rows)
@@ -149,15 +149,17 @@ class Walk(Section):
 
 
 def feet_section(cycle: GaitCycle) -> ContentSection:
-    """Return a section with forces on the feet, from the simulation and from the source's rule."""
+    """Return the section with foot forces, simulated and by the equations of the paper."""
     text = (
-        "Forces of the ground on the feet, by the contact law of the source's Table 3 "
+        'Ground forces on the feet, by the contact model of Table 3 of the paper '
         '(100 N/mm^1.5, 1 N s/mm, friction 0.3). Vertical lines: changes between one and two feet '
-        'on the ground. In double support the source splits the trunk between the legs by the '
-        'distances of the thighs, equations (20) to (22).'
+        'on the ground. With two feet on the ground, the paper divides the trunk between the legs '
+        'by the distances of the thighs, equations (20) to (22).'
     )
-    off = 'source off by [N rms]'
-    heads = ('Machine', 'Weight [N]', 'Most on a foot [N]', 'On both feet', off)
+    heads = (
+        'Machine', 'Weight [N]', 'Largest foot force [N]', 'Time on both feet',
+        'Error of the paper [N rms]',
+    )  # fmt: skip
     panels, rows = [], []
     for machine in (cycle.own, cycle.other):
         feet, rule = machine.feet[..., 1], machine.feet_by_shares()[..., 1]
@@ -165,8 +167,8 @@ def feet_section(cycle: GaitCycle) -> ContentSection:
         series = [
             Series('right foot', feet[:, 0], 'residual'),
             Series('left foot', feet[:, 1], 'predicted'),
-            Series('right, source', np.where(two, rule[:, 0], np.nan), 'measured'),
-            Series('left, source', np.where(two, rule[:, 1], np.nan), 'before'),
+            Series('right, paper', np.where(two, rule[:, 0], np.nan), 'measured'),
+            Series('left, paper', np.where(two, rule[:, 1], np.nan), 'before'),
         ]
         marks = [(float(cycle.phase[k]), '', False) for k in np.flatnonzero(np.diff(two)) + 1]
         chart = Chart(
@@ -186,15 +188,14 @@ def feet_section(cycle: GaitCycle) -> ContentSection:
 
 
 def by_torque_section(walked: SimulatedWalk) -> ContentSection:
-    """Return a section with torque-driven joints over the cycle, and the source's results."""
+    """Return the section with errors of torque-driven joints, beside those of the paper."""
     rate = read_assumptions()['torque_rate'].value
     text = (
-        f'One joint follows its torque alone ({rate:g} samples per second, cubic splines) '
-        'through swing and stance; hips are free, all other joints move as prescribed. Largest '
-        'errors over the cycle:'
+        f'One joint follows its torque ({rate:g} samples per second, cubic splines). The hips are '
+        'free, and all other joints move as prescribed. Largest errors over the gait cycle:'
     )
-    soft = f'Springs {100.0 * STIFFNESS_ERROR:g} % too soft [°]'
-    heads = ('Joint', 'Source [°]', 'Here [°]', soft, 'Feet of the source [°]')
+    soft = f'Straps {100.0 * STIFFNESS_ERROR:g} % too soft [°]'
+    heads = ('Joint', 'Paper [°]', 'Here [°]', soft, 'Foot forces of the paper [°]')
     phase, rows, panels = walked.cycle.phase[::2], [], []
     for right, softer, shared in walked.driven:
         joint = right.joint
@@ -202,7 +203,7 @@ def by_torque_section(walked: SimulatedWalk) -> ContentSection:
         rows.append((joint, f'{SOURCE_ERROR[joint]:g}', *errors))
         both: tuple[tuple[str, GaitCheck, Role], ...] = (
             ('by its torque', right, 'residual'),
-            ('springs too soft', softer, 'predicted'),
+            ('straps too soft', softer, 'predicted'),
         )
         angles = [
             Series('prescribed', np.degrees(right.prescribed), 'measured'),
@@ -215,12 +216,12 @@ def by_torque_section(walked: SimulatedWalk) -> ContentSection:
         )  # fmt: skip
         panels.append((joint, '', [Chart(phase, angles, '', 'angle [°]', link=joint), error]))
     return ContentSection(
-        'Whole cycle by torque', [Paragraph(text), DataTable(heads, rows), Panels(panels)]
+        'Joints driven by their torque', [Paragraph(text), DataTable(heads, rows), Panels(panels)]
     )
 
 
 def _bodies(robot: Robot, motion: Motion, ahead: FloatArray) -> list[Any]:
-    """Return lines of trunk, right and left leg in every frame, in px."""
+    """Return the lines of trunk, right leg and left leg in each frame [px]."""
     leg = leg_length(robot)
     lean = robot.joints[floating(robot)[2]]
     joints, points = [lean, lean], [[0.0, 0.0, 0.55], [0.0, 0.0, 0.0]]
@@ -234,11 +235,12 @@ def _bodies(robot: Robot, motion: Motion, ahead: FloatArray) -> list[Any]:
 
 
 def _placed(points: FloatArray, ahead: FloatArray) -> FloatArray:
-    """Convert points forward and up [m] to px, relative to the wearer."""
+    """Convert points, forward and up [m], to the drawing [px], which follows the wearer."""
     shape = (-1,) + (1,) * (points.ndim - 2)
     x = 300.0 + _SCALE * (points[..., 0] - ahead.reshape(shape))
     return np.stack([x, _GROUND - _SCALE * points[..., 1]], axis=-1)
 
 
 def _whole(values: FloatArray) -> list[Any]:
+    """Return coordinates rounded to 0.1 px."""
     return list(np.round(values, 1).tolist())

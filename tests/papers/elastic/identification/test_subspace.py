@@ -73,5 +73,5 @@ def test_too_little_data_is_refused(clean) -> None:
 
 def test_an_input_that_does_nothing_is_refused(clean) -> None:
     dead = [Signals(e.u * [1.0, 0.0], e.y) for e in clean]
-    with pytest.raises(IdentificationError, match='always zero'):
+    with pytest.raises(IdentificationError, match='zero in all samples'):
         identify_subspace(dead, DT, 3, ('zero', 'first'))
