@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Drawings of an arm with gravity downwards: outlines of its collision bodies, far bodies first.
+Drawings of an arm as SVG: outlines of its collision bodies, with gravity downwards.
 
 A link without a body is drawn as bars from its joint to the next joints. The last bar ends
 beyond its centre of mass.
@@ -33,7 +33,7 @@ _MIN_SIZE = 1e-3
 
 
 def _view() -> FloatArray:
-    """Return right, up and towards the eye (3, 3), seen from the front right and above."""
+    """Return the axes of the drawing, (3, 3): right, up, and towards the viewer."""
     azimuth, elevation = np.radians(-55.0), np.radians(18.0)
     (sa, ca), (se, ce) = ((np.sin(x), np.cos(x)) for x in (azimuth, elevation))
     return np.array([[-sa, ca, 0.0], [-ca * se, -sa * se, ce], [ca * ce, sa * ce, se]])
@@ -45,12 +45,12 @@ _VIEW = _view()
 @dataclass(frozen=True)
 class ArmDrawing(Templated):
     """
-    A drawing of one pose or of several side by side.
+    SVG elements of an arm in one pose, or in several poses side by side.
 
     Attributes
     ----------
     width, height : float
-        [px].
+        Size of the drawing [px].
     bodies : tuple of (str, str)
         Outline of each body as coordinates of SVG, far ones first, and its colour.
     dots : tuple of (float, float, str, str)
@@ -85,7 +85,7 @@ def draw_poses(
     collision: CollisionModel, poses: FloatArray, captions: Sequence[str], path: FloatArray
 ) -> ArmDrawing:
     """
-    Draw an arm and the obstacles around it in several poses.
+    Draw an arm and its obstacles in several poses, with the path of the last body.
 
     Parameters
     ----------
@@ -96,7 +96,7 @@ def draw_poses(
     captions : sequence of str, length K
         Text below each pose.
     path : ndarray, shape (N, n)
-        Poses between which the last body moves.
+        Poses along the path of the last body [rad or m].
 
     """
     robot, solids = collision.robot, _solids(collision)
@@ -184,7 +184,7 @@ def draw_arm(
 
 @dataclass(frozen=True)
 class _Solid:
-    """A body: all points within a radius of given points, in the frame of a joint of the model."""
+    """A body to draw: all points within a radius of given points in the frame of a joint."""
 
     joint: int
     of_arm: bool
@@ -192,7 +192,7 @@ class _Solid:
     radius: float
 
     def seen(self, frame: pin.SE3) -> tuple[FloatArray, float]:
-        """Return the outline of the body in the drawing plane, (K, 2) [m], and its depth."""
+        """Return the outline of the body in the drawing plane, (K, 2) [m], and its depth [m]."""
         points = self.points @ frame.rotation.T + frame.translation
         turn = np.linspace(0.0, 2.0 * np.pi, _CIRCLE_CORNERS, endpoint=False)
         ring = max(self.radius, 1e-4) * np.column_stack([np.cos(turn), np.sin(turn)])
@@ -224,7 +224,7 @@ def _solids(collision: CollisionModel) -> list[_Solid]:
 
 
 def _frames(model: pin.Model, q: FloatArray) -> list[pin.SE3]:
-    """Return the positions of the joints of a model in a pose, with gravity downwards."""
+    """Return the frames of all joints in a pose, rotated so that gravity points down."""
     data, upright = model.createData(), pin.SE3.Identity()
     pin.forwardKinematics(model, data, np.asarray(q, dtype=float))
     if np.any(model.gravity.linear):
@@ -234,19 +234,19 @@ def _frames(model: pin.Model, q: FloatArray) -> list[pin.SE3]:
 
 
 def _flat(points: FloatArray) -> FloatArray:
-    """Project points onto the right and up axes of the view, (..., 3) to (..., 2) [m]."""
+    """Project points, (..., 3), onto the drawing plane, (..., 2) [m]."""
     return np.asarray(points @ _VIEW[:2].T)
 
 
 @dataclass(frozen=True)
 class _Strip:
-    """Equal frames side by side, one for each pose, around all bodies in all poses."""
+    """Equal picture frames side by side, one for each pose, which contain all bodies."""
 
     solids: Sequence[_Solid]
     frames: Sequence[list[pin.SE3]]
     left: float  # [m]
     top: float  # [m]
-    pitch: float  # width of a frame [px]
+    pitch: float  # width of a picture frame [px]
     height: float  # [px]
     scale: float  # [px/m]
 
@@ -258,7 +258,7 @@ class _Strip:
         room: tuple[float, float],
         *others: FloatArray,
     ) -> _Strip:
-        """Return frames, each at most as large as a room [px]; `others` are in them as well."""
+        """Return picture frames of at most a given size [px] around bodies and `others`."""
         hulls = [solid.seen(frame[solid.joint])[0] for frame in frames for solid in solids]
         points, margin = np.concatenate([*others, *hulls]), 0.03  # around a drawing [m]
         left, low = (points.min(axis=0) - margin).tolist()
@@ -268,13 +268,13 @@ class _Strip:
         return cls(solids, frames, left, high, width * scale, height * scale, scale)
 
     def place(self, points: FloatArray, pose: int) -> FloatArray:
-        """Convert points of the drawing plane, (..., 2) [m], to the frame of a pose [px]."""
+        """Convert points of the drawing plane, (..., 2) [m], to pixels of a pose."""
         right = pose * self.pitch + self.scale * (points[..., 0] - self.left)
         down = self.scale * (self.top - points[..., 1])
         return np.asarray(np.round(np.stack([right, down], axis=-1), 1))
 
     def bodies(self, colour: Callable[[_Solid], str]) -> tuple[tuple[str, str], ...]:
-        """Return outline and colour of each body, in each pose the farthest body first."""
+        """Return the outline and colour of each body, in each pose the farthest body first."""
         found = []
         for pose, frame in enumerate(self.frames):
             seen = [(solid, *solid.seen(frame[solid.joint])) for solid in self.solids]
@@ -286,5 +286,5 @@ class _Strip:
 
 
 def svg_points(points: FloatArray) -> str:
-    """Return points, shape (K, 2) [px], as coordinates of SVG."""
+    """Format points, shape (K, 2) [px], as an SVG list of points."""
     return ' '.join(f'{x:.1f},{y:.1f}' for x, y in points)

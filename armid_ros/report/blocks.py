@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Elements of pages: blocks, and the sections that every page has."""
+"""Building blocks of pages: paragraph, table, list, bar chart, fold, verdict box."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from markupsafe import Markup
 @dataclass(frozen=True)
 class ContentSection(Section):
     """
-    A section of a page.
+    Section of a page with a heading and a sequence of blocks.
 
     Attributes
     ----------
@@ -37,7 +37,7 @@ class ContentSection(Section):
 @dataclass(frozen=True)
 class Paragraph(Templated):
     """
-    Paragraph of a report.
+    Paragraph of a page.
 
     Attributes
     ----------
@@ -57,7 +57,7 @@ class Paragraph(Templated):
 @dataclass(frozen=True)
 class TableCell:
     """
-    A cell of a table.
+    Table cell with a style, small print below it, or a shaded background.
 
     Attributes
     ----------
@@ -81,14 +81,14 @@ class TableCell:
 @dataclass(frozen=True)
 class IntervalTrack:
     """
-    Cell of a table that draws an interval and a reference around zero.
+    Table cell that draws an interval and a reference value on an axis around zero.
 
     Attributes
     ----------
     value, reach : float
         Middle and half width of the interval.
     reference : float or None
-        Reference; None if it has no value.
+        Reference value; None without a reference.
 
     """
 
@@ -109,7 +109,7 @@ Cells = Sequence[str | TableCell | IntervalTrack]
 @dataclass(frozen=True)
 class DataTable(Templated):
     """
-    Table of a report.
+    Table of a page.
 
     Attributes
     ----------
@@ -118,7 +118,7 @@ class DataTable(Templated):
     rows : sequence of sequence of (str, TableCell or IntervalTrack)
         Cells.
     words : collection of int
-        Columns with text; the others have numbers.
+        Indices of the columns with text; all other columns have numbers.
     kind : str
         'tight', 'both' or 'parameters': layout on a small screen.
 
@@ -135,7 +135,7 @@ class DataTable(Templated):
 @dataclass(frozen=True)
 class FactList(Templated):
     """
-    List of names and their values.
+    List of facts: name and value in each line.
 
     Attributes
     ----------
@@ -152,12 +152,12 @@ class FactList(Templated):
 @dataclass(frozen=True)
 class BulletList(Templated):
     """
-    List of a report.
+    Bulleted or numbered list.
 
     Attributes
     ----------
     items : sequence of (str, str)
-        Text, and 'fine', 'warn', 'code' or ''.
+        Text, and 'fine' (tick), 'warn' (warning sign) or ''.
     numbered : bool
         Whether the items are numbered.
 
@@ -172,7 +172,7 @@ class BulletList(Templated):
 @dataclass(frozen=True)
 class Fold(Templated):
     """
-    Blocks that appear after a click on a line.
+    Line of text with blocks below it that the reader opens and closes.
 
     Attributes
     ----------
@@ -195,7 +195,7 @@ class Fold(Templated):
 @dataclass(frozen=True)
 class Panels(Templated):
     """
-    Adjacent blocks with headings.
+    Groups of blocks side by side, each with a heading.
 
     Attributes
     ----------
@@ -215,7 +215,7 @@ class Panels(Templated):
 @dataclass(frozen=True)
 class Legend(Templated):
     """
-    A legend of colours.
+    Legend: colours and their meaning.
 
     Attributes
     ----------
@@ -232,7 +232,7 @@ class Legend(Templated):
 @dataclass(frozen=True)
 class SmallMultiples(Templated):
     """
-    Small pictures of one kind; the width of the page determines their number in a row.
+    Grid of small pictures, as many in a row as the page is wide.
 
     Attributes
     ----------
@@ -249,7 +249,7 @@ class SmallMultiples(Templated):
 @dataclass(frozen=True)
 class Bar:
     """
-    One bar of a bar chart.
+    One bar of a bar chart, with its text.
 
     Attributes
     ----------
@@ -279,7 +279,7 @@ class BarChart(Templated):
     roles : sequence of (str, str)
         Legend: role and meaning.
     full : float
-        Value that fills the width; 0: that of the longest bar.
+        Value of a bar over the full width; 0: the largest value.
 
     """
 
@@ -290,20 +290,15 @@ class BarChart(Templated):
     full: float = 0.0
 
     def percent(self, bar: Bar) -> float:
-        """Return the length of a bar as a percentage of the width."""
+        """Return the length of a bar as a percentage of the full width."""
         longest = self.full or max(other.value for _, bars in self.rows for other in bars)
         return round(100.0 * bar.value / longest, 2) if longest > 0.0 else 0.0
-
-    @property
-    def legend(self) -> Legend:
-        """Return the legend of the colours."""
-        return Legend(self.roles)
 
 
 @dataclass(frozen=True)
 class VerdictSection(Section):
     """
-    The verdict box of a page.
+    Verdict box at the top of a page: badge, findings, next step, bars and limitations.
 
     Attributes
     ----------
@@ -337,14 +332,14 @@ class VerdictSection(Section):
 
 
 def next_steps(steps: Sequence[str]) -> list[ContentSection]:
-    """Return a section of next steps, most useful first; none for the one of the verdict."""
+    """Return a section with all next steps; [] if there is only that of the verdict box."""
     bullets = BulletList([(step, '') for step in steps], True)
     return [ContentSection('What to do next', [bullets])] if steps[1:] else []
 
 
 @dataclass(frozen=True)
 class Origin(Section):
-    """Files with their hashes, versions, settings, seed."""
+    """Section with the provenance: command, files and their hashes, versions, seed."""
 
     title: ClassVar[str] = 'Provenance'
     template: ClassVar[str] = 'origin.html'

@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Data and roles of the interactive charts of a page; assets/report.js draws them.
+Data of the interactive charts of a page, which assets/report.js draws.
 
 A series has a role, not a colour: the style sheet has a colour for each role, one for light, one
 for dark and one for paper.
@@ -30,14 +30,14 @@ Kind = Literal['line', 'trend', 'points', 'sticks', 'band']
 @dataclass(frozen=True)
 class Series:
     """
-    One curve, cloud or band.
+    Curve, point cloud or band of a chart.
 
     Attributes
     ----------
     label : str
         Name in the legend.
     y : ndarray, shape (N,)
-        Values; NaN where there is none.
+        Ordinates; a curve breaks at NaN.
     role : str
         Role of the series, which gives the colour.
     kind : str
@@ -58,7 +58,7 @@ class Series:
 @dataclass(frozen=True)
 class Chart(Templated):
     """
-    Curves over a common axis that a reader can zoom into.
+    Chart of curves over a common abscissa, with zoom.
 
     Attributes
     ----------
@@ -103,7 +103,7 @@ class Chart(Templated):
     def over_time(
         cls, t: FloatArray, series: Sequence[Series], ylabel: str, **others: Any
     ) -> Chart:
-        """Return curves over time [s], without samples that make no visible difference."""
+        """Return a chart over time [s], without samples that make no visible difference."""
         kept = thinned(*(one.y for one in series))
         drawn = [
             replace(one, y=one.y[kept], upper=None if one.upper is None else one.upper[kept])
@@ -113,12 +113,12 @@ class Chart(Templated):
 
     @property
     def label(self) -> str:
-        """Return the description of the chart, for screen readers."""
+        """Description of the chart for screen readers."""
         return f'{self.ylabel} over {self.xlabel}' if self.xlabel else self.ylabel
 
     @property
     def json(self) -> Markup:
-        """Return the data that assets/report.js draws."""
+        """Data of the chart as JSON for assets/report.js."""
         data = {
             'x': rounded(self.x),
             'xlabel': self.xlabel,
@@ -146,7 +146,7 @@ class Chart(Templated):
 
 def thinned(*series: npt.ArrayLike, most: int = 3000) -> npt.NDArray[np.intp]:
     """
-    Reduce the number of samples without a visible change of the curve.
+    Return the indices of samples that suffice to draw curves without a visible change.
 
     Parameters
     ----------
@@ -182,19 +182,19 @@ def thinned(*series: npt.ArrayLike, most: int = 3000) -> npt.NDArray[np.intp]:
 
 
 def joined(parts: Sequence[FloatArray]) -> FloatArray:
-    """Return stretches one after the other with a NaN between them, where curves break."""
+    """Concatenate stretches with a NaN between them, at which a curve breaks."""
     pieces = [part for stretch in parts for part in (stretch, [np.nan])]
     return read_only(np.concatenate(pieces[:-1]))
 
 
 def joined_time(parts: Sequence[FloatArray]) -> FloatArray:
-    """Return the times of ``joined`` values; at a break, the time of the previous sample."""
+    """Concatenate the times of stretches, to match the values of `joined`."""
     pieces = [part for stretch in parts for part in (stretch, stretch[-1:])]
     return read_only(np.concatenate(pieces[:-1]))
 
 
 def rounded(values: npt.ArrayLike) -> list[float | None]:
-    """Return values rounded to the resolution of a screen, None for NaN."""
+    """Return values rounded to a tenth of a pixel, None for NaN."""
     array = np.asarray(values, dtype=float)
     finite = array[np.isfinite(array)]
     span = float(np.ptp(finite)) if len(finite) else 0.0
@@ -205,7 +205,7 @@ def rounded(values: npt.ArrayLike) -> list[float | None]:
 
 
 def script_json(data: dict[str, Any]) -> Markup:
-    """Return JSON that is safe within HTML."""
+    """Return data as JSON text that is safe in a script element of HTML."""
     text = json.dumps(data, allow_nan=False, separators=(',', ':'))
     for character in '<>&\u2028\u2029':
         text = text.replace(character, f'\\u{ord(character):04x}')
@@ -214,7 +214,7 @@ def script_json(data: dict[str, Any]) -> Markup:
 
 def image_data(colour: FloatArray, strength: FloatArray) -> str:
     """
-    Return a PNG image as a data URL.
+    Return an image as the data URL of a PNG file.
 
     Parameters
     ----------

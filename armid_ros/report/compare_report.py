@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The report of a comparison."""
+"""Page of a comparison of two identifications, and its sentences."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ _WHY = {
 
 def compare_report(comparison: Comparison, origin: ResultOrigin) -> str:
     """
-    Return the page of a comparison, one HTML file that loads nothing.
+    Return the HTML page of a comparison.
 
     Parameters
     ----------
@@ -75,7 +75,7 @@ def compare_report(comparison: Comparison, origin: ResultOrigin) -> str:
 
 
 def verdict(comparison: Comparison) -> tuple[str, str]:
-    """Return the verdict in one to three words, and its colour: good, fair or bad."""
+    """Return the verdict on the comparison as words for the badge, and its colour."""
     if comparison.unusable:
         return 'unusable', 'bad'
     if comparison.anything:
@@ -86,14 +86,14 @@ def verdict(comparison: Comparison) -> tuple[str, str]:
 
 
 def next_step(comparison: Comparison) -> str:
-    """Return the next step, which a command follows."""
+    """Return the next step after a comparison."""
     if comparison.anything or comparison.unusable:
         return 'If you expected this, use the later model. If not, diagnose the later recordings.'
     return 'Identify from all recordings together, for smaller intervals.'
 
 
 def change_rows(comparison: Comparison) -> list[tuple[str, ...]]:
-    """Return a row for each changed parameter, with the columns of `HEADS`."""
+    """Return a table row for each changed parameter, with the columns of `HEADS`."""
     rows: list[tuple[str, ...]] = []
     for change in comparison.changed:
         before, _ = estimate_text(change.before, change.before_std)
@@ -107,19 +107,21 @@ def change_rows(comparison: Comparison) -> list[tuple[str, ...]]:
 
 
 def change_sentences(comparison: Comparison) -> tuple[str, ...]:
-    """Return sentences on the changes, the headline first, the details last."""
+    """Return sentences on what changed, the most important finding first."""
     lines = []
     for side in comparison.unusable:
         assert side.fit is not None
         reason = side.fit.reason[:1].lower() + side.fit.reason[1:].rstrip('.')
-        lines.append(f'{side.source} is unusable: {reason}. Find what it lacks by armid diagnose.')
+        lines.append(
+            f'{side.source} is unusable: {reason}. Find the missing effect with armid diagnose.'
+        )
     if comparison.factors:
         named = ', '.join(f'{joint} {factor:.3g}' for joint, factor in comparison.factors.items())
         lines.append(
             f'Inertia and friction of {comparison.after.source} are those of '
-            f'{comparison.before.source} times one factor per joint ({named}). Torques of one of '
-            'the two are in another unit, or are currents, as drivers change with their version. '
-            'Convert them with --current-gain, and identify again.'
+            f'{comparison.before.source} times one factor per joint ({named}): one of the two has '
+            'efforts in another unit, such as currents. Convert them with --current-gain, and '
+            'identify again.'
         )
         return tuple(lines)
     if comparison.load is not None:
@@ -157,24 +159,24 @@ def change_sentences(comparison: Comparison) -> tuple[str, ...]:
 
 
 def _count_sentence(comparison: Comparison) -> str:
-    """Return a sentence on the number of changed parameters."""
+    """Return a sentence on how many of the compared parameters changed."""
     changed, others = comparison.changed, len(comparison.not_compared)
     count = counted(len(comparison.changes), 'parameter') + ' that both have' * bool(others)
     also = f'; {others} more {"was" if others == 1 else "were"} not compared' if others else ''
     joints = ', '.join(dict.fromkeys(c.parameter.joint for c in changed if c.parameter.joint))
     where = f', at {joints}' if joints else ''
     if comparison.load is not None and all(c.parameter.rigid for c in changed):
-        return f'These {len(changed)} of {count} follow from it{where}{also}.'
+        return f'The load explains the {len(changed)} changed of {count}{where}{also}.'
     if changed or comparison.changed_together:
-        return f'{len(changed)} of {count} changed beyond uncertainty{where}{also}.'
+        return f'{len(changed)} of {count} changed significantly{where}{also}.'
     but = ', but the residuals did' if comparison.changed_residuals else ''
     if comparison.unusable:
-        but = ', but an unusable model is no evidence'
-    return f'None of {count} changed beyond its uncertainty{but}{also}.'
+        but = ', but one model is unusable'
+    return f'None of {count} changed significantly{but}{also}.'
 
 
 def _residuals(comparison: Comparison) -> Iterator[str]:
-    """Yield a sentence for each residual that differs, and the possible reason."""
+    """Yield a sentence for each joint whose residual differs, then the possible reason."""
     for change in comparison.changed_residuals:
         errors = change.before_error, change.after_error
         ranks = ('second', 'first') if change.ratio > 1.0 else ('first', 'second')
@@ -190,11 +192,11 @@ def _residuals(comparison: Comparison) -> Iterator[str]:
         if any(one.why == 'effect' for one in comparison.not_compared):
             yield 'The models have different effects, which may be the reason.'
         else:
-            yield 'No parameter of either model explains that.'
+            yield 'No parameter of the two models explains this difference.'
 
 
 def _load(comparison: Comparison, load: LoadChange) -> tuple[str, str]:
-    """Return sentences on a load that explains the changes of the inertial parameters."""
+    """Return sentences on mass and place of a load that explains all inertial changes."""
     joints = {
         (
             int(c.parameter.name.split(' ')[0].lstrip('Imxyz')) if c.parameter.rigid else 0
@@ -212,16 +214,16 @@ def _load(comparison: Comparison, load: LoadChange) -> tuple[str, str]:
         where = f'Its centre is at ({centre}) m in the frame of its joint. '
     rivals = ''
     if load.rivals:
-        rivals = f'; it may as well be on {" or ".join(named[1:])}'
+        rivals = f', or equally well {" or ".join(named[1:])}'
     mass = with_interval(abs(load.mass), load.mass_std, 'kg')
     return (
         f'A load of {mass} {verb} {named[0]}{rivals}.',
-        f'{where}It explains every change of the inertial parameters.',
+        f'{where}The load explains all changes of the inertial parameters.',
     )
 
 
 def _not_compared(comparison: Comparison) -> tuple[str, ...]:
-    """Return a sentence for each reason why parameters of a side are not compared."""
+    """Return a sentence for each reason why parameters of one model are not compared."""
     lines = []
     sides = ('first', 'second', comparison.only_before), ('second', 'first', comparison.only_after)
     for side, other, found in sides:
@@ -238,13 +240,14 @@ def _not_compared(comparison: Comparison) -> tuple[str, ...]:
 
 
 def _beware(comparison: Comparison) -> tuple[str, ...]:
+    """Return the limitations of a comparison."""
     lines = []
     for given in (comparison.before, comparison.after):
         if given.fit is None:
-            lines.append(f'{given.source} has no fit error.')
+            lines.append(f'{given.source} does not contain the torque error of the fit.')
     fits = comparison.before.fit, comparison.after.fit
     if all(fits) and not comparison.residuals:
-        lines.append('Residuals are not compared: those of the files are not by joint.')
+        lines.append('Residuals are not compared: the files do not contain them joint by joint.')
     known = comparison.before.kinematics and comparison.after.kinematics  # one robot, then
     if not known and comparison.before.robot != comparison.after.robot:
         lines.append(
@@ -255,7 +258,7 @@ def _beware(comparison: Comparison) -> tuple[str, ...]:
 
 
 def changes_section(comparison: Comparison) -> ContentSection:
-    """Return every parameter of two identifications side by side."""
+    """Return the section with all parameters of both identifications side by side."""
     changes = comparison.changes
 
     def cells(k: int) -> Cells:
@@ -278,8 +281,8 @@ def changes_section(comparison: Comparison) -> ContentSection:
         'Side by side',
         [
             Paragraph(
-                'Significant changes are in bold (5 % family-wise false-alarm rate). Each bar has '
-                'its own axis with zero in the middle.'
+                'Significant changes are in bold (5 % family-wise false-alarm rate). Each row has '
+                'its own scale, with zero in the middle.'
             ),
             Legend([('after', 'second, with its 95 % interval'), ('tick', 'first')]),
             *parameter_folds(

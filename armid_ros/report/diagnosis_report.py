@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The report of a diagnosis: first the summary, then the evidence, then the data."""
+"""Page of a diagnosis: verdict, curves, causes, evidence, data quality."""
 
 from __future__ import annotations
 
@@ -57,13 +57,13 @@ _TONES = {'consistent': 'good', 'named': 'fair', 'ambiguous': 'fair', 'partial':
 
 
 def tone_of(diagnosis: Diagnosis) -> str:
-    """Return the colour of a verdict; green only without doubt and if all joints were checked."""
+    """Return the colour of a verdict: good only if certain and if all joints were checked."""
     tone = _TONES.get(diagnosis.verdict, 'bad')
     return 'fair' if tone == 'good' and (diagnosis.not_checked or diagnosis.doubt) else tone
 
 
 def cause_sentences(diagnosis: Diagnosis) -> list[str]:
-    """Return sentences on the shares of the causes, and on minor effects."""
+    """Return sentences on the share that each cause explains, and on minor effects."""
     shares = [
         f'{names_and_places(group)}: {percent(group[0].share)} of the difference'
         f'{share_interval_in_words(group[0])}{", together" * (len(group) > 1)}'
@@ -78,7 +78,7 @@ def cause_sentences(diagnosis: Diagnosis) -> list[str]:
     return [*shares, *minor]
 
 
-#: Uses of recordings, and the words for some of them.
+#: Use of a recording, its noun, and the phrase for a number of such recordings.
 _ROLES = (
     ('training', 'recording', '{}'),
     ('held-out', 'recording', '{} not used for the fit'),
@@ -99,7 +99,7 @@ def diagnosis_report(
     origin: ResultOrigin = DEFAULT_ORIGIN,
 ) -> str:
     """
-    Return report.html of a diagnosis, one HTML file that loads nothing.
+    Return the HTML page of a diagnosis.
 
     Parameters
     ----------
@@ -163,7 +163,7 @@ def diagnosis_report(
 
 
 def _at_fault(diagnosis: Diagnosis, read: Mapping[str, Sequence[Recording]]) -> list[str]:
-    """Return the recordings with the fault of BAD DATA, or all; [] for other verdicts."""
+    """Return the recordings that a BAD DATA verdict blames, or all; [] for other verdicts."""
     if diagnosis.verdict != 'bad_data':
         return []
     sources = [one.source for several in read.values() for one in several if one.source]
@@ -173,6 +173,7 @@ def _at_fault(diagnosis: Diagnosis, read: Mapping[str, Sequence[Recording]]) -> 
 
 
 def _verdict(diagnosis: Diagnosis, worse: Sequence[str], step: str) -> VerdictSection:
+    """Return the verdict box: causes, next step, and bars of shares or errors."""
     notes = [sentence(note) for note in diagnosis.notes]
     if worse:
         notes.append(
@@ -191,7 +192,7 @@ def _verdict(diagnosis: Diagnosis, worse: Sequence[str], step: str) -> VerdictSe
 @dataclass(frozen=True)
 class Story(Section):
     """
-    Summary of a diagnosis: questions that a reader has, with answers.
+    Section with a drawing of the arm and facts on the causes and the patched model.
 
     Attributes
     ----------
@@ -210,7 +211,7 @@ class Story(Section):
 
     @property
     def drawing(self) -> ArmDrawing:
-        """Draw the arm in a recorded pose, with the joints of the causes coloured."""
+        """Drawing of the arm in a recorded pose, with the joints of the causes coloured."""
         data, robot = self.diagnosis.data, self.diagnosis.arm.robot
         causes = self.diagnosis.findings
         largest = [place.joint for place in self.diagnosis.where[:1]]
@@ -227,7 +228,7 @@ class Story(Section):
 
     @property
     def rows(self) -> list[tuple[str, list[str]]]:
-        """Questions that a reader has, and their answers."""
+        """Facts by name: times of the causes, model, meaning of effects, unexplained torque."""
         diagnosis, patched = self.diagnosis, not self.diagnosis.harmful
         meaning = {effect.name: effect.summary for effect in diagnosis.arm.effects}
         names = list(dict.fromkeys(one.name for one in diagnosis.findings if patched))
@@ -259,14 +260,14 @@ class Story(Section):
 
 def overlay_section(diagnosis: Diagnosis, gap: Gap) -> ContentSection:
     """
-    Return measured and modelled torque, in the joint and recording where the gap was largest.
+    Return the section with measured and modelled torque of the joint with the largest error.
 
     Parameters
     ----------
     diagnosis : Diagnosis
-        The diagnosis, with the seconds in which the causes act.
+        The diagnosis, with the time spans of the causes.
     gap : Gap
-        The curves.
+        Torques, measured and modelled.
 
     """
     robot, patched = diagnosis.arm.robot, bool(diagnosis.findings)
@@ -294,7 +295,9 @@ def overlay_section(diagnosis: Diagnosis, gap: Gap) -> ContentSection:
     return ContentSection(
         'Measured and modelled',
         [
-            Paragraph(f'Joint {robot.joints[j]} in recording {shown.source}: the largest error.'),
+            Paragraph(
+                f'Joint with the largest error: {robot.joints[j]}, in recording {shown.source}.'
+            ),
             Chart.over_time(
                 t,
                 [Series('measured', measured, 'measured'), *models(before, after)],
@@ -315,8 +318,8 @@ def overlay_section(diagnosis: Diagnosis, gap: Gap) -> ContentSection:
                 symmetric=True,
             ),
             Paragraph(
-                f'The broad line is the measured torque{dashes}. {ZOOM} Where the joint turns '
-                'round, friction is undetermined and no error counts.',
+                f'The broad line is the measured torque{dashes}. {ZOOM} Errors do not count where '
+                'the joint reverses, because friction is undetermined there.',
                 'hint',
             ),
         ],
@@ -324,7 +327,7 @@ def overlay_section(diagnosis: Diagnosis, gap: Gap) -> ContentSection:
 
 
 def _of_recording(gap: Gap, shown: Overlay, joint: int) -> tuple[FloatArray, ...]:
-    """Return time, measured torque and both models for all stretches of a recording."""
+    """Return time, measured torque and torques of both models of a recording."""
     here = shown.source, shown.trajectory.fold
     own = [one for one in gap.overlays if (one.source, one.trajectory.fold) == here]
     curves = zip(*((one.measured, one.before, one.after) for one in own), strict=True)
@@ -334,7 +337,7 @@ def _of_recording(gap: Gap, shown: Overlay, joint: int) -> tuple[FloatArray, ...
 
 def whole_overlays(diagnosis: Diagnosis, recordings: Sequence[Recording]) -> Gap | None:
     """
-    Return the gap with curves of whole recordings if a cause acts only for some time.
+    Return the gap, with curves of complete recordings if a cause acts only for some time.
 
     Parameters
     ----------

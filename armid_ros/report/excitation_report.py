@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The report of a designed excitation: fitness to run, and predicted precision."""
+"""Page of a designed excitation: limits, clearance, and expected accuracy."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ def excitation_report(
     origin: ResultOrigin,
 ) -> str:
     """
-    Return report.html of a design, one HTML file that loads nothing.
+    Return the HTML page of a designed excitation.
 
     Parameters
     ----------
@@ -141,7 +141,7 @@ def _verdict(
     notes: Sequence[str],
     step: str,
 ) -> VerdictSection:
-    """Return the verdict: number of identifiable parameters, least accurate one, clearance."""
+    """Return the verdict box: violated limits, clearance, and identifiable parameters."""
     settings, links, joints = design.settings, robot.links, design.limits.joints
     unseen = [
         full_label(name, links)
@@ -188,7 +188,7 @@ def _verdict(
 
 
 def identifiable(design: Design, links: Sequence[str]) -> list[str]:
-    """Return sentences on the number of identifiable parameters and on their precision."""
+    """Return sentences on how many parameters are identifiable, and how accurately."""
     information = design.information
     std, names = information.std, information.parameters
     seen = int(np.sum(np.isfinite(std)))
@@ -198,15 +198,15 @@ def identifiable(design: Design, links: Sequence[str]) -> list[str]:
     size = np.abs(design.described)
     sure, known = int(np.sum(std <= 0.1 * size)), int(np.sum(size > 0.0))
     small = '; the others hardly change the torque' * (sure < known)
-    word = 'good'
+    grade = 'good'
     if information.condition >= GOOD_CONDITION:
-        word = 'fair' if information.condition < WEAK_CONDITION else 'weak'
-        word += f'; below {GOOD_CONDITION:g} is good'
+        grade = 'fair' if information.condition < WEAK_CONDITION else 'weak'
+        grade += f'; below {GOOD_CONDITION:g} is good'
     return [
         f'All {len(names)} parameters can be identified (condition number '
-        f'{plain(information.condition)}: {word}).',
-        f'{sure} of {known} described parameters will be known to 10 %{small}. The least accurate '
-        f'will be {full_label(names[worst], links)}: ± {digits(float(std[worst]))} '
+        f'{plain(information.condition)}: {grade}).',
+        f'{sure} of {known} described parameters will be known to 10 %{small}. Least accurate: '
+        f'{full_label(names[worst], links)}: ± {digits(float(std[worst]))} '
         f'{pretty(names[worst].unit)}.',
     ]
 
@@ -219,6 +219,7 @@ def _input_section(
     whole: Run,
     start_reason: str,
 ) -> ContentSection:
+    """Return the section with robot, settings of the design, and obstacles."""
     settings, run = design.settings, design.excitation
     criterion = f'{settings.criterion}: {CRITERIA[settings.criterion]}'
     focus = f'; focus on {", ".join(settings.focus)}' if settings.focus else ''
@@ -258,7 +259,7 @@ def _input_section(
 def _motion_section(
     limits: Limits, motion: Motion, shares: Mapping[str, FloatArray]
 ) -> ContentSection:
-    """Return the section on paths, rates and torques of the joints, with the limits in force."""
+    """Return the section with position, velocity, acceleration and torque beside limits."""
     assert motion.tau is not None
     quantities = (
         ('position', motion.q, limits.lower, limits.upper),
@@ -288,9 +289,9 @@ def _motion_section(
         'Motion and limits',
         [
             Paragraph(
-                'Largest share of each limit of the robot that the excitation uses. For positions '
-                'it is measured from the middle of the range. Approach and return may use the '
-                'whole range.'
+                'Largest share of each limit of the robot that the excitation uses. Positions are '
+                'measured from the middle of the range. Approach and return may use the full '
+                'range.'
             ),
             DataTable(('Joint', *shares), rows, kind='tight'),
             Paragraph(f'Horizontal lines are the limits of the design. {ZOOM}', 'hint'),
@@ -302,7 +303,7 @@ def _motion_section(
 def _clearance_section(
     t: FloatArray, curves: Mapping[str, FloatArray], margin: float, notes: Sequence[str]
 ) -> ContentSection:
-    """Return the section on the distances of bodies, from each other and from obstacles."""
+    """Return the section with the distances of links from each other and from obstacles."""
     roles: tuple[Role, ...] = ('residual', 'before')
     blocks: list[Templated] = [
         Chart(
@@ -327,7 +328,7 @@ def _clearance_section(
 
 
 def _accuracy_section(design: Design, links: Sequence[str] = ()) -> ContentSection:
-    """Return the predicted uncertainty of every parameter, best known first."""
+    """Return the section with the expected standard deviation of each parameter."""
     information, described = design.information, design.described
     size = information.std / information.scale
 
@@ -345,8 +346,8 @@ def _accuracy_section(design: Design, links: Sequence[str] = ()) -> ContentSecti
         'Expected accuracy',
         [
             Paragraph(
-                'Predicted standard deviation of each parameter after the run, for the stated '
-                'torque noise and a correct model; the smallest torque uncertainty first.'
+                'Expected standard deviation of each parameter for the stated torque noise and a '
+                'correct model; the smallest torque uncertainty first.'
             ),
             *parameter_folds(
                 information.parameters,

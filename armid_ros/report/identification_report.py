@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The report of an identification."""
+"""Page of an identification: verdict, torques, parameters, data quality."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def identification_report(
     origin: ResultOrigin = DEFAULT_ORIGIN,
 ) -> str:
     """
-    Return report.html of an identification, one HTML file that loads nothing.
+    Return the HTML page of an identification.
 
     Parameters
     ----------
@@ -131,7 +131,7 @@ def parameter_sections(
     name: str = 'description',
 ) -> list[Section]:
     """
-    Return sections on the parameters, and on physically consistent links if there are any.
+    Return the section with all parameters, and with physically consistent links if fitted.
 
     Parameters
     ----------
@@ -153,7 +153,7 @@ def parameter_sections(
 
 
 def _contradictions(result: Identification, description: ArmModel) -> list[str]:
-    """Return a sentence on rigid-body parameters that contradict the URDF, or none."""
+    """Return a sentence on how many rigid-body parameters differ from the URDF, or []."""
     counts = not_as_described(result, description)
     joints = [joint for joint, (differ, _) in counts.items() if differ]
     differ, count = (sum(numbers) for numbers in zip(*counts.values(), strict=True))
@@ -164,6 +164,7 @@ def _contradictions(result: Identification, description: ArmModel) -> list[str]:
 
 
 def _input_section(result: Identification, robot: str) -> ContentSection:
+    """Return the section with robot, method, filter and excitation."""
     used = result.used
     kept = used.rate_hz / used.decimation
     facts = [
@@ -184,7 +185,7 @@ def _input_section(result: Identification, robot: str) -> ContentSection:
 
 
 def _noise_section(robot: Robot, check: NoiseCheck) -> ContentSection:
-    """Return the test for errors in variables, and the bias that a simulation finds."""
+    """Return the section on encoder noise: its size, a test, and the parameter bias."""
     noise = ', '.join(
         f'{joint} {digits(1e3 * value)} m{unit}'
         for joint, value, unit in zip(
@@ -209,7 +210,7 @@ def _noise_section(robot: Robot, check: NoiseCheck) -> ContentSection:
 def _physical_section(
     certificate: PhysicalCertificate, exports: Mapping[str, Sequence[str]]
 ) -> ContentSection:
-    """Return the section that shows whether the fitted links are physically consistent."""
+    """Return the section with mass, moments and pseudo-inertia of each fitted link."""
     quantifier = 'Every' if certificate.consistent else 'Not every'
     training, held_out = (
         100.0 * (ratio - 1.0) for ratio in (certificate.misfit_ratio, certificate.held_out_ratio)
@@ -264,7 +265,7 @@ def convergence_section(
     history: Sequence[tuple[float, Estimate]], truth: FloatArray
 ) -> ContentSection:
     """
-    Return online estimates over time with their 95 % intervals and the true values.
+    Return the section with online estimates over time beside the true values.
 
     Parameters
     ----------

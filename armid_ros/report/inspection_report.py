@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The pages of an inspection and of a check of a description, and its finding in words."""
+"""Pages of `armid inspect` (a recording) and `armid check` (a description)."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ _TONES = {
 
 def inspection_report(found: Inspection, origin: ResultOrigin = DEFAULT_ORIGIN) -> str:
     """
-    Return the page of an inspection with all curves, one HTML file that loads nothing.
+    Return the HTML page of an inspected recording, with all curves.
 
     Parameters
     ----------
@@ -88,13 +88,13 @@ def inspection_report(found: Inspection, origin: ResultOrigin = DEFAULT_ORIGIN) 
 
 
 def inspection_word(found: Inspection) -> str:
-    """Return the verdict on a recording: ready, doubtful or unfit."""
+    """Return the verdict on a recording: 'ready', 'doubtful' or 'unfit'."""
     weights = {remark.weight for remark in found.remarks}
     return 'unfit' if 'bad' in weights else 'doubtful' if 'doubt' in weights else 'ready'
 
 
 def check_word(remarks: Sequence[Remark], found: LinkCheck | None) -> str:
-    """Return the verdict on a description: clean, look or wrong."""
+    """Return the verdict on a description: 'clean', 'look' or 'wrong'."""
     weights = {remark.weight for remark in remarks}
     # with a smaller share explained, an effect may be missing instead
     if 'bad' in weights or (found is not None and found.wrong and found.explained >= 0.9):
@@ -103,7 +103,7 @@ def check_word(remarks: Sequence[Remark], found: LinkCheck | None) -> str:
 
 
 def headline(remarks: Sequence[Remark], found: LinkCheck | None) -> tuple[str, ...]:
-    """Return the finding in one sentence, then its numbers and further suspicious values."""
+    """Return sentences on a description: main finding, torque error, suspicious values."""
     suspicious = [pretty(sentence(one.text)) for one in remarks if one.weight != 'note']
     impossible = [one for one in remarks if one.weight == 'bad']
     values = suspicious or ['No impossible or suspicious value in the description.']
@@ -118,7 +118,7 @@ def headline(remarks: Sequence[Remark], found: LinkCheck | None) -> tuple[str, .
     elif found.agrees:
         first = 'The links of the URDF agree with the recording.'
     elif found.explained < 0.9:  # with a smaller share, links are not the cause
-        first = 'The URDF differs in more than three links, or --effects lacks one, as of rotors.'
+        first = 'More than three links of the URDF are wrong, or --effects lacks an effect.'
     else:
         known = [text for k in found.wrong if (text := _wrong_mass(found, k))]
         others = [found.joints[k] for k in found.wrong if not _wrong_mass(found, k)]
@@ -132,7 +132,7 @@ def headline(remarks: Sequence[Remark], found: LinkCheck | None) -> tuple[str, .
 
 
 def _wrong_mass(found: LinkCheck, k: int) -> str:
-    """Return the error of a link's mass as a phrase; '' if it is not significant."""
+    """Return a phrase on the mass error of a link; '' if it is not significant."""
     change, reach = found.measured_mass[k] - found.mass[k], HALF_WIDTH * found.mass_std[k]
     if not abs(change) > reach:
         return ''
@@ -142,7 +142,7 @@ def _wrong_mass(found: LinkCheck, k: int) -> str:
 
 
 def link_rows(found: LinkCheck) -> list[tuple[str, ...]]:
-    """Return a row for every link, with the columns of `HEADS`."""
+    """Return a table row for each link, with the columns of `HEADS`."""
     return [
         (
             f'{link} ({found.joints[k]})',
@@ -159,6 +159,7 @@ def link_rows(found: LinkCheck) -> list[tuple[str, ...]]:
 
 
 def _interval(values: FloatArray, std: FloatArray) -> str:
+    """Format values with their largest 95 % half-width; '-' for NaN."""
     if np.isnan(values).any():
         return '-'
     reach = float(HALF_WIDTH * std.max())
@@ -168,7 +169,7 @@ def _interval(values: FloatArray, std: FloatArray) -> str:
 def description_check_report(
     remarks: Sequence[Remark], links: LinkCheck | None, origin: ResultOrigin
 ) -> str:
-    """Return the page of a check, one HTML file that loads nothing."""
+    """Return the HTML page of a checked description."""
     first, *others = headline(remarks, links)
     grade, bars = check_word(remarks, links), None
     notes = [sentence(one.text) for one in remarks if one.weight == 'note']
@@ -183,9 +184,9 @@ def description_check_report(
     ]
     if links is not None:
         hint = (
-            'Centres are in the frame of the joint that moves the link. Intervals are 95 %. A '
-            'dash: as described, or not determined by this motion. Explains: share of the '
-            'difference between URDF and recording that this link explains if others are right.'
+            'Centres of mass are in the frame of the joint that moves the link. Intervals: 95 %. '
+            'A dash: as described, or not identifiable from this motion. Explains: share of the '
+            'torque error that this link explains if all other links are right.'
         )
         table = DataTable(HEADS, link_rows(links), kind='tight')
         sections.append(ContentSection('Links', [table, Paragraph(hint, 'hint')]))
@@ -196,7 +197,7 @@ def description_check_report(
 
 
 def recording_facts(found: Inspection) -> list[tuple[str, str]]:
-    """Return sampling, repetition and repairs of a recording."""
+    """Return name and value of facts: sampling, gaps, period and repairs of a recording."""
     sampling, recording, trial = found.sampling, found.recording, found.trial
     motion = 'does not repeat'
     if sampling.period is not None:
@@ -219,7 +220,7 @@ def recording_facts(found: Inspection) -> list[tuple[str, str]]:
 
 
 def _contents_section(found: Inspection) -> ContentSection:
-    """Return the topics of a bag, and how it is sampled."""
+    """Return the section with the topics and the sampling of a recording."""
     blocks: list[Templated] = [FactList(recording_facts(found))]
     if found.topics:
         rows = [
@@ -237,7 +238,7 @@ def _contents_section(found: Inspection) -> ContentSection:
 
 
 def _joints_section(found: Inspection) -> ContentSection:
-    """Return ranges, speeds and efforts."""
+    """Return the section with range, speed and effort of each joint."""
     hint = (
         'Speed: 99th percentile, from the positions. Step: smallest change of position between '
         'samples. Velocity ratio: recorded velocity over the derivative of the positions; 1 if '
@@ -248,12 +249,12 @@ def _joints_section(found: Inspection) -> ContentSection:
 
 
 def _curves_section(found: Inspection) -> ContentSection:
-    """Return all recorded curves over time."""
+    """Return the section with all recorded signals over time."""
     recording, robot = found.recording, found.robot
     blocks: list[Templated] = [
         Paragraph(
-            'Unfiltered signals. Long recordings are drawn by the extremes of short intervals. '
-            'Drag to zoom all curves.',
+            'Unfiltered signals. Of long recordings, the extremes of short intervals are drawn. '
+            'Drag across a plot to zoom all plots.',
             'hint',
         )
     ]
@@ -297,7 +298,7 @@ def _curves_section(found: Inspection) -> ContentSection:
 
 
 def joint_heads(found: Inspection) -> tuple[str, ...]:
-    """Return the heads of the table of joints, with units if all joints have the same unit."""
+    """Return the column heads of the table of joints, with the units if all are equal."""
     alike, unit = len(set(found.units)) == 1, found.units[0]
     length, speed, torque = (
         f' [{one}]' if alike else '' for one in (unit, f'{unit}/s', 'N' if unit == 'm' else 'N m')
@@ -316,7 +317,7 @@ def joint_heads(found: Inspection) -> tuple[str, ...]:
 
 
 def joint_rows(found: Inspection) -> list[tuple[str, ...]]:
-    """Return a row for each joint: name, range, speed, moving, step, velocity ratio, efforts."""
+    """Return a table row for each joint, with the columns of `joint_heads`."""
     alike = len(set(found.units)) == 1
     rows = []
     for joint, unit in zip(found.joints, found.units, strict=True):

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Judgement of an identification in words: findings, warnings and next steps."""
+"""Sentences on an identification: findings, limitations and next steps."""
 
 from __future__ import annotations
 
@@ -77,7 +77,7 @@ def judge(
 
 
 def findings_of(result: Identification, verification: Verification | None) -> Iterator[str]:
-    """Yield sentences on what was identified, and on the position error in simulation."""
+    """Yield sentences on the identified parameters, and on the position error in simulation."""
     robot = result.arm.robot
     effects = [name_in_words(effect.name) for effect in result.arm.effects]
     time = sum(float(fit.motion.t[-1] - fit.motion.t[0]) for fit in result.training)
@@ -102,7 +102,7 @@ def findings_of(result: Identification, verification: Verification | None) -> It
 def _of_errors(
     result: Identification, training: Score, held_out: Score | None, misfits: bool
 ) -> Iterator[Caution]:
-    """Yield sentences on the errors of training and held-out data."""
+    """Yield limitations and remedies from the torque errors of training and held-out data."""
     if misfits:
         yield (
             '',
@@ -110,7 +110,10 @@ def _of_errors(
             'the model lacks an effect.',
         )
     elif held_out is None:
-        yield '', 'Record another motion of armid excite, and test the model on it: --validate.'
+        yield (
+            '',
+            'Record another motion of armid excite, and test the model on it with --validate.',
+        )
     else:
         # the same residual is a larger share of a smaller torque
         stronger = np.linalg.norm(held_out.torque_rms) / np.linalg.norm(training.torque_rms)
@@ -136,7 +139,7 @@ def _of_errors(
 
 
 def residual_trends(joints: Sequence[str], fits: Sequence[Fit]) -> tuple[str, ...]:
-    """Return a sentence on joints whose residual depends on speed, position or load; or none."""
+    """Return a sentence on joints whose residual depends on speed, position or load; or ()."""
     depends: dict[str, list[str]] = {}
     errors = Score.of(fits).joint_relative_error_percent
     least = 100.0 * DiagnosisSettings.material
@@ -154,7 +157,7 @@ def residual_trends(joints: Sequence[str], fits: Sequence[Fit]) -> tuple[str, ..
 
 
 def _of_residuals(result: Identification, fits: Sequence[Fit]) -> Iterator[Caution]:
-    """Yield statements on residuals and excitation."""
+    """Yield limitations and remedies from residuals, intervals and condition number."""
     joints = result.arm.robot.joints
     for trend in residual_trends(joints, fits):
         yield trend, 'Find the missing effect with armid diagnose, and add it with --effects.'
@@ -186,7 +189,7 @@ def _of_residuals(result: Identification, fits: Sequence[Fit]) -> Iterator[Cauti
 
 
 def _of_verification(verification: Verification, misfits: bool) -> Iterator[Caution]:
-    """Yield statements on simulations and the test for encoder noise."""
+    """Yield limitations and remedies from simulations and the test for encoder noise."""
     for text in verification.left_out:
         yield sentence(text), ''
     worse = ', '.join(sorted({name for pair in verification.forward for name in pair.worse}))

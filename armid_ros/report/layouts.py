@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Layouts of plotters for one robot: its joints by name, its nodes in their namespace."""
+"""Layout files of PlotJuggler, Foxglove and RViz for the joints and topics of a robot."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _RESIDUAL = f'{_IDENTIFIER}/residual'
 
 
 def topic_prefix(namespace: str) -> str:
-    """Return the prefix of the topics of a namespace: '/' or '/left_arm/'."""
+    """Return the topic prefix of a namespace, such as '/' or '/left_arm/'."""
     return '/' + (namespace.strip('/') + '/' if namespace.strip('/') else '')
 
 
@@ -30,7 +30,7 @@ def plotter_layouts(
     robot: str, joints: Sequence[str], namespace: str = '', base: str = 'base_link'
 ) -> dict[str, str]:
     """
-    Return layouts of PlotJuggler, Foxglove and RViz by the names of their files.
+    Return the contents of layout files of PlotJuggler, Foxglove and RViz by file name.
 
     PlotJuggler and Foxglove show motion, torque, residual and convergence, Foxglove the arm and
     the diagnosis as well. RViz shows the model of the arm, which moves with the transforms of
@@ -83,8 +83,10 @@ def plotter_layouts(
 
 
 def _path(value: str, label: str) -> dict[str, Any]:
+    """Return the settings of one plotted signal in Foxglove."""
     return {'value': value, 'enabled': True, 'timestampMethod': 'headerStamp', 'label': label}
 
 
 def _paths(field: str, joints: Sequence[str], suffix: str = '') -> list[dict[str, Any]]:
+    """Return the settings of a plotted field of each joint in Foxglove."""
     return [_path(f'{field}[{k}]', f'{joint}{suffix}') for k, joint in enumerate(joints)]

@@ -28,12 +28,12 @@ TERMS = {
 
 
 def pretty(unit: str) -> str:
-    """Format a unit, or a sentence with units: 'kg m²' for 'kg m^2'."""
+    """Replace powers by superscripts: 'kg m²' for 'kg m^2'."""
     return unit.replace('^2', '²').replace('^3', '³')
 
 
 def digits(value: float, count: int = 2) -> str:
-    """Return a number with significant digits, zeros kept: '2.0', not '2'; 178, not 1.8e+02."""
+    """Format a number with significant digits: '2.0' and '0.031', but '178'."""
     if not abs(value) < _MAX_NUMBER:
         return DASH
     if 10.0**count <= abs(value) < 1e7:
@@ -42,19 +42,19 @@ def digits(value: float, count: int = 2) -> str:
 
 
 def plain(value: float, count: int = 3) -> str:
-    """Format a number without trailing zeros; exponent only below 1e-4 or from 1e7."""
+    """Format a number without trailing zeros; with an exponent below 1e-4 and from 1e7."""
     whole = 10.0**count - 0.5 <= abs(value) < 1e7
     return f'{value:.0f}' if whole else f'{value:.{count}g}'
 
 
 def sentence(text: str) -> str:
-    """Return a text with a capital letter and a full stop."""
+    """Return a text with a capital letter at the start and a full stop at the end."""
     text = text[:1].upper() + text[1:]
     return text if text.endswith('?') else f'{text.rstrip(".")}.'
 
 
 def with_interval(value: float, std: float, unit: str) -> str:
-    """Return a value with its 95 % interval and unit, an angle in degrees as well."""
+    """Format a value with 95 % interval and unit; angles also in degrees."""
     text = _plus_minus(value, std, f' {pretty(unit)}'.rstrip())
     if unit == 'rad' and abs(value) < _MAX_NUMBER:
         turn = 180.0 / math.pi
@@ -65,7 +65,7 @@ def with_interval(value: float, std: float, unit: str) -> str:
 def value_of(
     finding: Finding, parameter: ParameterName, value: float, std: float, had: float = 0.0
 ) -> str:
-    """Format a value with its 95 % interval, after the value that it had; or 'not determined'."""
+    """Format a parameter with 95 % interval, after its earlier value; or 'not determined'."""
     if words.vague(finding, parameter, value, std):
         return 'not determined'
     start = f'{measured(had, HALF_WIDTH * std)[0]} to ' if had else ''
@@ -73,6 +73,7 @@ def value_of(
 
 
 def _plus_minus(value: float, std: float, unit: str) -> str:
+    """Format a value with its 95 % interval: '2.00 ± 0.01 kg'."""
     if not abs(value) < _MAX_NUMBER:
         return DASH
     wide = HALF_WIDTH * std
@@ -83,14 +84,14 @@ def _plus_minus(value: float, std: float, unit: str) -> str:
 
 
 def percent(share: float) -> str:
-    """Format a share of the gap as a percentage with its significant digit: '96 %', '0.4 %'."""
+    """Format a share of the gap as a percentage: '96 %', '0.4 %'."""
     if not math.isfinite(share):
         return DASH
     return words.percent(share)
 
 
 def probability(p: float) -> str:
-    """Format a p value: one digit below 0.1, else two decimals; or '< 0.0001'."""
+    """Format a p value: '0.25', '0.03' or '< 0.0001'."""
     if p < 1e-4:
         return '< 0.0001'
     return f'{p:.1g}' if p < 0.1 else f'{p:.2f}'
@@ -102,7 +103,7 @@ def counted(number: int, what: str) -> str:
 
 
 def robot_label(source: str) -> str:
-    """Return the name of a robot for a heading: its own, or that of its file."""
+    """Return the name of a robot for a heading: shipped name or file name."""
     if source == '-':
         return 'description in the recording'
     path = source.split(' ')[0] if ':=' in source else source
@@ -111,7 +112,7 @@ def robot_label(source: str) -> str:
 
 def common_prefix(names: Sequence[str]) -> str:
     """
-    Return the common prefix of all joints and links if it is long, such as 'panda_'.
+    Return the common prefix of all joint and link names if it is long, such as 'panda_'.
 
     Parameters
     ----------
@@ -136,7 +137,7 @@ def common_prefix(names: Sequence[str]) -> str:
 
 
 def without_prefix(text: str, names: Sequence[str]) -> str:
-    """Remove the common prefix from the names in a label; names within paths stay."""
+    """Remove the common prefix from joint and link names in a label, but not from paths."""
     prefix = common_prefix(names)
     if not prefix:
         return text
@@ -145,7 +146,7 @@ def without_prefix(text: str, names: Sequence[str]) -> str:
 
 
 def explained(text: str) -> Markup:
-    """Return HTML in which the first use of each of the `TERMS` has a tooltip."""
+    """Return a text as HTML, with a tooltip at the first use of each of the `TERMS`."""
     html = str(escape(text))
     for term, meaning in TERMS.items():
         words = rf'(?<!>)\b({term.replace(" ", "[ -]")})\b'

@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-The page of a report: one file without external resources, with a sequence of sections.
+HTML page of a report: a single file without external resources.
 
 A section is a small frozen dataclass with a title and a template.
 
@@ -37,7 +37,7 @@ _LABELS = re.compile(
 
 class Templated:
     """
-    A block of a page with a template; the template refers to the block as `block`.
+    Block of a page that a Jinja template renders; the template sees it as `block`.
 
     Attributes
     ----------
@@ -52,13 +52,13 @@ class Templated:
     package: ClassVar[str] = 'armid_ros.report'
 
     def html(self) -> Markup:
-        """Return the page as HTML, with all text escaped."""
+        """Return the block as HTML, with all text escaped."""
         return render(self.template, {'block': self, 'section': self}, self.package)
 
 
 class Section(Templated):
     """
-    A section of a page; its template refers to it as `section`.
+    Section of a page that a Jinja template renders; the template sees it as `section`.
 
     Attributes
     ----------
@@ -71,23 +71,23 @@ class Section(Templated):
 
     @property
     def anchor(self) -> str:
-        """Name of the section within the page, for links."""
+        """Identifier of the section for links within the page."""
         return re.sub('[^a-z0-9]+', '-', self.title.lower()).strip('-')
 
 
 @dataclass(frozen=True)
 class Page:
     """
-    Page of a report.
+    Page of a report: heading, subtitle and sections.
 
     Attributes
     ----------
     title : str
         Heading.
     subtitle : str
-        Robot, data, day; in a line.
+        Line below the heading: robot and recordings.
     sections : sequence of Section
-        Parts in order; the first is the verdict.
+        Sections in order, the verdict first.
     charts : bool
         Whether the page has interactive charts.
     names : sequence of str
@@ -102,7 +102,7 @@ class Page:
     names: Sequence[str] = ()
 
     def html(self) -> str:
-        """Return the whole file, scripts and styles included."""
+        """Return the page as one HTML file that contains scripts and styles."""
         assets = {
             'generator': Markup(GENERATOR),
             'chart_library': asset('uPlot.iife.min.js'),
@@ -121,12 +121,13 @@ class Page:
 
 
 def render(template: str, values: Mapping[str, Any], package: str = 'armid_ros.report') -> Markup:
-    """Return a template of the templates/ of a package with values filled in and escaped."""
+    """Fill values into a template of a package, with all text escaped."""
     return Markup(_environment(package).get_template(template).render(values))
 
 
 @cache
 def _environment(package: str) -> Environment:
+    """Return the Jinja environment for the templates of a package."""
     environment = Environment(
         loader=PackageLoader(package),
         autoescape=True,
@@ -140,5 +141,5 @@ def _environment(package: str) -> Environment:
 
 
 def asset(name: str) -> Markup:
-    """Return a file of assets/, which is part of this package and trusted."""
+    """Return the text of a file in assets/, to insert without escaping."""
     return Markup((files('armid_ros.report') / 'assets' / name).read_text(encoding='utf-8'))

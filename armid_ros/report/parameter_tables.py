@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Tables and labels of parameters."""
+"""Labels of parameters, and tables of parameters by link and by effect."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ _FRICTION = {'viscous': 'viscous_coefficient', 'Coulomb': 'coulomb_torque'}
 
 def full_label(name: ParameterName, links: Sequence[str] = ()) -> str:
     """
-    Return the full label of a parameter with its link or joint.
+    Return the label of a parameter in words, with its link or joint.
 
     Parameters
     ----------
@@ -59,14 +59,14 @@ def full_label(name: ParameterName, links: Sequence[str] = ()) -> str:
 
 
 def _words_and_link(name: ParameterName, links: Sequence[str]) -> tuple[str, str]:
-    """Return the label of the first parameter of a group, and its link if known."""
+    """Return the first parameter of a linear combination in words, and its link or ''."""
     symbol, number = _SYMBOL.findall(name.name)[0]
     known = 0 < int(number) <= len(links)
     return symbol_in_words(symbol), links[int(number) - 1] if known else ''
 
 
 def grouping(name: ParameterName, links: Sequence[str] = ()) -> str:
-    """Return the linear combination that a base parameter is; empty for a single parameter."""
+    """Return the linear combination of a base parameter; '' for a single parameter."""
     if ' ' not in name.name:
         return ''
 
@@ -98,22 +98,22 @@ def parameter_folds(
     order: Callable[[int], float] = float,
 ) -> list[Fold]:
     """
-    Return a folded table for each link and for each kind of effect.
+    Return a foldable table of parameters for each link and for each kind of effect.
 
     Parameters
     ----------
     names : tuple of ParameterName
         The parameters.
     heads : sequence of str
-        Of the columns after those that name the parameter.
+        Heads of the columns after those that name the parameter.
     cells : callable
-        Returns the cells of these columns for the position of a parameter.
+        Function that returns the cells of these columns for the index of a parameter.
     links : sequence of str
         Names of the links, in the order of their numbers.
     changed : sequence of bool, optional
         Whether each parameter changed; then tables without change are closed.
     order : callable
-        Returns the sorting key of a row for the position of a parameter.
+        Function that returns the sorting key of a row for the index of a parameter.
 
     """
     tables: dict[str, list[int]] = {}
@@ -153,7 +153,7 @@ def parameter_folds(
 
 
 def estimate_text(value: float, std: float) -> tuple[str, str]:
-    """Format a value, or 'includes 0', and the half-width of its 95 % interval."""
+    """Format a value and its 95 % half-width; 'includes 0' for an insignificant value."""
     number, reach = measured(value, HALF_WIDTH * std)
     return (number if not std or abs(value) > HALF_WIDTH * std else 'includes 0'), reach
 
@@ -166,7 +166,7 @@ def parameter_section(
     reference: str = 'description',
 ) -> ContentSection:
     """
-    Return every parameter with its described value.
+    Return the section with the estimates of all parameters beside the reference values.
 
     Parameters
     ----------
@@ -205,8 +205,8 @@ def parameter_section(
         Paragraph(
             f'The {reference} has values of {sum(known)} of these '
             f'{counted(len(names), "parameter")}; {count} of them {"is" if count == 1 else "are"} '
-            'outside the 95 % interval of the estimate (in bold). Each bar has its own axis with '
-            'zero in the middle.'
+            'outside the 95 % interval of the estimate (in bold). Each row has its own scale, '
+            'with zero in the middle.'
         ),
         Legend([('after', 'estimate with its 95 % interval'), ('tick', reference)]),
         *parameter_folds(names, ('Estimate', '± 95 %', 'Relative', reference, ''), cells, links),
@@ -226,7 +226,7 @@ def joint_columns(
     result: Identification, description: ArmModel, held_out: Sequence[Fit]
 ) -> dict[str, list[str]]:
     """
-    Return the columns of a table with a row for each joint, by their heads.
+    Return error, friction and deviations from the URDF of each joint, as table columns.
 
     Parameters
     ----------
@@ -261,7 +261,7 @@ def joint_columns(
 
 def not_as_described(result: Identification, description: ArmModel) -> dict[str, tuple[int, int]]:
     """
-    Return how many rigid-body parameters of each joint contradict the description.
+    Return how many rigid-body parameters of each joint differ from the description.
 
     Parameters
     ----------

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Provenance of results: files, versions, settings."""
+"""Provenance of a result: input files, software versions, settings and seed."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _PACKAGES = ('armid_ros', 'numpy', 'scipy', 'pin', 'clarabel', 'mcap')
 @dataclass(frozen=True)
 class Provenance:
     """
-    Data that are needed to reproduce the result.
+    Files, versions, settings and seed that reproduce a result.
 
     Attributes
     ----------
@@ -46,7 +46,7 @@ class Provenance:
 @dataclass(frozen=True)
 class ResultOrigin:
     """
-    Provenance of a result, as its files and its report state it.
+    Robot name, provenance and next command for the files and the page of a result.
 
     Attributes
     ----------
@@ -67,7 +67,7 @@ class ResultOrigin:
     step: str = ''
 
     def of(self, known: str) -> ResultOrigin:
-        """Return the origin with the robot's name in files filled in, if it has none."""
+        """Return the origin with a given robot name if it has none."""
         return replace(self, robot=self.robot or known, source=self.source or known)
 
 
@@ -76,7 +76,7 @@ DEFAULT_ORIGIN = ResultOrigin()
 
 
 def versions() -> dict[str, str]:
-    """Return the versions of the software that can change a result."""
+    """Return versions of Python, system and packages that can change a result."""
     known = {'Python': platform.python_version(), 'system': platform.platform(terse=True)}
     for package in _PACKAGES:
         try:

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Statistics of residuals, for charts and sentences."""
+"""Statistics of torque residuals: trends, autocorrelation, and their sections."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ MIN_TREND_SHARE = 0.15
 @dataclass(frozen=True)
 class Trend:
     """
-    Mean of a residual in bins of another quantity.
+    Mean residual in bins of another quantity, such as speed.
 
     Attributes
     ----------
@@ -47,7 +47,7 @@ class Trend:
 
     @staticmethod
     def of(x: FloatArray, residual: FloatArray, bins: int = 20) -> Trend:
-        """Average a residual, shape (N,), in bins of x, shape (N,)."""
+        """Return the mean of a residual, shape (N,), in bins of a quantity x, shape (N,)."""
         groups = np.array_split(np.argsort(x, kind='stable'), max(1, min(bins, len(x) // 25)))
         centre = np.array([x[group].mean() for group in groups])
         mean = np.array([residual[group].mean() for group in groups])
@@ -60,14 +60,14 @@ class Trend:
 @dataclass(frozen=True)
 class Whiteness:
     """
-    Autocorrelation of a residual.
+    Autocorrelation of the residual of a joint, with the 99 % band of white noise.
 
     Attributes
     ----------
     lag : ndarray, shape (L,)
         Lags from one sample on [s].
     correlation : ndarray, shape (L,)
-        Autocorrelation at each.
+        Autocorrelation at each lag.
     band : float
         Half width of the band in which 99 % of the lags of white noise lie.
 
@@ -79,12 +79,12 @@ class Whiteness:
 
     @property
     def outside(self) -> float:
-        """Share of the autocorrelations outside the band of white noise, for which it is 0.01."""
+        """Share of the lags outside the band; 0.01 for white noise."""
         return float(np.mean(np.abs(self.correlation) > self.band))
 
     @staticmethod
     def of(fits: Sequence[Fit], joint: int, lags: int = 40) -> Whiteness:
-        """Return the autocorrelation of a residual, within unbroken stretches."""
+        """Return the autocorrelation of a joint's residual within unbroken stretches."""
         longest = max(fits, key=lambda fit: len(fit.motion)).motion
         period = float(np.median(np.diff(longest.t)))
         products = np.zeros(max(2, min(lags + 1, len(longest) // 4)))
@@ -103,7 +103,7 @@ class Whiteness:
 
 def torque_reach(result: Identification, fits: Sequence[Fit]) -> FloatArray:
     """
-    Return the 95 % half-width of torque that uncertain parameters cause, shape (n,).
+    Return the 95 % half-width of the predicted torque due to the parameters, shape (n,).
 
     The half-widths are root mean squares over a motion [N m].
 
@@ -118,12 +118,12 @@ def torque_reach(result: Identification, fits: Sequence[Fit]) -> FloatArray:
 
 def residual_section(robot: Robot, fits: Sequence[Fit], role: str) -> ContentSection:
     """
-    Return the residual of each joint against its speed, its position and its load.
+    Return the section with each joint's residual against speed, position and load.
 
     Parameters
     ----------
     robot : Robot
-        Gives joints and units.
+        Joints and units.
     fits : sequence of Fit
         Fits of the held-out data; without such data, those of the training data.
     role : str
@@ -171,7 +171,7 @@ def residual_section(robot: Robot, fits: Sequence[Fit], role: str) -> ContentSec
 
 
 def _cloud(x: FloatArray, residual: FloatArray, xlabel: str, ylabel: str) -> Chart:
-    """Draw a residual against a variable of the same samples, with its mean in bins."""
+    """Return a chart of a residual against a variable, with its mean in bins."""
     trend = Trend.of(x, residual)
     # largest number of points of a cloud
     chosen = np.unique(np.linspace(0, max(len(x) - 1, 0), min(500, len(x))).astype(np.intp))
@@ -194,7 +194,7 @@ def _cloud(x: FloatArray, residual: FloatArray, xlabel: str, ylabel: str) -> Cha
 
 
 def whiteness_section(robot: Robot, fits: Sequence[Fit], role: str) -> ContentSection:
-    """Return the autocorrelation of the residuals with the band of white noise."""
+    """Return the section with the autocorrelation of each joint's residual."""
     panels = []
     for joint, name in enumerate(robot.joints):
         found = Whiteness.of(fits, joint)
@@ -219,7 +219,7 @@ def whiteness_section(robot: Robot, fits: Sequence[Fit], role: str) -> ContentSe
 def residual_by_variable(
     fits: Sequence[Fit], joint: int
 ) -> tuple[FloatArray, dict[str, FloatArray]]:
-    """Return a joint's residual, and its speed, position and load in the same samples, (N,)."""
+    """Return residual, and speed, position and load by name, of a joint; each (N,)."""
     used = np.concatenate([fit.informative[:, joint] for fit in fits])
     parts = {
         'speed': [fit.motion.dq for fit in fits],
@@ -231,7 +231,7 @@ def residual_by_variable(
 
 
 def explained_shares(fits: Sequence[Fit], joint: int) -> dict[str, float]:
-    """Return the shares of a joint's residual explained by speed, position and load."""
+    """Return the share of a joint's residual that speed, position and load explain."""
     residual, axes = residual_by_variable(fits, joint)
     # smallest number of samples for a trend
     if len(residual) < 20:

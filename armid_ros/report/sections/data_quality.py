@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Quality of the recordings."""
+"""Section on the quality of the recordings: rate, gaps, repairs, repeatability."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def data_quality_section(
     at_fault: Collection[str] = (),
 ) -> ContentSection:
     """
-    Return the section on rate, gaps and repairs of every recording.
+    Return the section with rate, gaps and repairs of each recording.
 
     Parameters
     ----------
@@ -40,7 +40,7 @@ def data_quality_section(
     robot : Robot, optional
         Joints and units; without a robot, repeatability is not shown.
     at_fault : collection of str
-        Names of recordings that the verdict calls faulty, however well they were read.
+        Names of recordings with faulty signals, by the verdict.
 
     """
     rows, notes = [], []
@@ -77,6 +77,7 @@ def data_quality_section(
 def _repeatability(
     read: Sequence[tuple[Recording, str, Sequence[Fit]]], robot: Robot
 ) -> list[Templated]:
+    """Return a foldable table of each periodic recording: noise and residual of each joint."""
     folds: list[Templated] = []
     for recording, _, fits in read:
         found = repeatability(fits) if fits else None
@@ -103,8 +104,8 @@ def _repeatability(
                 f'Repeatability: {source} repeats after {period:.2f} s',
                 [
                     Paragraph(
-                        'The difference between two periods is noise. The part of the residual '
-                        'that repeats is not noise; a better model could explain it.'
+                        'The difference between two periods is noise. The repeatable part of the '
+                        'residual is model error, which a better model could explain.'
                     ),
                     DataTable(('Joint', 'Not repeatable', 'Residual', 'Repeatable share'), rows),
                 ],
@@ -120,7 +121,7 @@ def _repeatability(
 
 def repeatability(fits: Sequence[Fit]) -> tuple[float, FloatArray, FloatArray] | None:
     """
-    Return the period of a motion, the part that does not repeat, and the residual.
+    Return the period of a motion, and noise and residual of each joint.
 
     Two periods are compared in the longest stretch of a recording; None if no motion repeats. The
     residuals are compared, each at the positions of its own period. Torque that depends only on
@@ -131,7 +132,7 @@ def repeatability(fits: Sequence[Fit]) -> tuple[float, FloatArray, FloatArray] |
     period : float
         [s].
     varying : ndarray, shape (n,)
-        Standard deviation of the part that does not repeat [N m].
+        Standard deviation of the part of the residual that does not repeat [N m].
     residual : ndarray, shape (n,)
         Root mean square of the residual of the same samples [N m].
 

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The short sections of a diagnosis: named effects, evidence, and other candidates."""
+"""Sections of a diagnosis: named effects, errors, candidates, detectable sizes."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ _DETECTABLE = (
 
 
 def share_bars(diagnosis: Diagnosis) -> BarChart:
-    """Return the share of the gap that each cause explains, and the rest."""
+    """Return bars of the share of the gap that each cause explains, and of the rest."""
     rows, taken = [], 0.0
     for group in by_cause(diagnosis.findings):
         one = group[0]
@@ -75,14 +75,14 @@ def named_rows(
     findings: Sequence[Finding], certain: bool = False
 ) -> list[tuple[str, str, str, str]]:
     """
-    Return effect, parameter, joint, and value with 95 % interval of the named effects.
+    Return a table row for each parameter of the named effects, with its 95 % interval.
 
     Parameters
     ----------
     findings : sequence of Finding
         The effects.
     certain : bool
-        Whether values whose interval includes zero are left out, if the effect has others.
+        Whether to leave out insignificant values if the effect has significant ones.
 
     """
     rows = []
@@ -114,7 +114,7 @@ def named_rows(
 
 
 def named_section(findings: Sequence[Finding]) -> ContentSection:
-    """Return the values of the named effects, with 95 % intervals."""
+    """Return the section with the parameters of the named effects."""
     heads = ('Effect', 'Parameter', 'Joint', 'Value, 95 %')
     return ContentSection(
         'Parameters', [DataTable(heads, named_rows(findings), (0, 1, 2), 'both')]
@@ -122,7 +122,7 @@ def named_section(findings: Sequence[Finding]) -> ContentSection:
 
 
 def evidence_section(diagnosis: Diagnosis) -> ContentSection:
-    """Return the residuals without the named effects, in the worst joints."""
+    """Return the section with residuals of the given model against motion, worst joints first."""
     folds = []
     whole = 'the explained part' if diagnosis.findings else 'the difference'
     for number, place in enumerate(diagnosis.where[:3]):
@@ -130,9 +130,8 @@ def evidence_section(diagnosis: Diagnosis) -> ContentSection:
         if place.axes and place.mean_share >= 0.005:
             blocks.append(
                 Paragraph(
-                    f'The mean of the residual, {digits(place.mean)} {place.unit} or '
-                    f'{percent(place.mean_share)} of its mean square, is subtracted; shares '
-                    'are of the rest.'
+                    f'The mean residual, {digits(place.mean)} {place.unit}, is subtracted; it is '
+                    f'{percent(place.mean_share)} of the mean square. Shares are of the rest.'
                 )
             )
         varies = max(1.0 - place.mean_share, 1e-9)
@@ -159,7 +158,7 @@ def evidence_section(diagnosis: Diagnosis) -> ContentSection:
 
 
 def minor_section(diagnosis: Diagnosis, patched: bool) -> ContentSection:
-    """Return the significant effects that are negligible, not confirmed, or added on request."""
+    """Return the section with significant effects that are negligible or not confirmed."""
     rows = [
         (
             name_in_words(one.name),
@@ -185,14 +184,14 @@ def minor_section(diagnosis: Diagnosis, patched: bool) -> ContentSection:
 
 
 def detectable_section(sizes: Sequence[Detectable]) -> ContentSection:
-    """Return the smallest detectable sizes of every effect, on the best and on the worst joint."""
+    """Return the section with the detectable size of each effect, by best and worst joint."""
     rows = [_detectable_row(name, sizes) for name in dict.fromkeys(one.name for one in sizes)]
     return ContentSection(
         'Smallest detectable effects',
         [
             Paragraph(
-                'An unnamed effect may exist if it is smaller than this. The limit is five '
-                'standard deviations of its value, at a torque above the misfit of the model.'
+                'Smaller effects may exist without being named. The limit is five standard '
+                'deviations of the value, at a torque above the misfit of the model.'
             ),
             Fold(
                 f'Sizes of {len(rows)} effects',
@@ -203,7 +202,7 @@ def detectable_section(sizes: Sequence[Detectable]) -> ContentSection:
 
 
 def isolability_section(isolability: Isolability) -> ContentSection:
-    """Return the detectable sizes of effects, and the effects that are not distinguishable."""
+    """Return the section on which effects a run makes detectable and distinguishable."""
     kinds, apart = isolability.of_kinds()
     near = (apart < DISTINCT) & ~np.eye(len(kinds), dtype=bool)
     names = [name_in_words(kind) for kind in kinds]
@@ -227,14 +226,15 @@ def isolability_section(isolability: Isolability) -> ContentSection:
         'Isolability',
         [
             Paragraph(
-                'Effects that this run makes detectable in a known arm at the assumed torque '
-                'noise. An effect is detectable at five standard deviations of its value. It is '
-                'not distinguishable from an effect that reproduces its torque to 10 % (rms).'
+                'Smallest sizes of effects that this run makes detectable: five standard '
+                'deviations of the value, for a known arm and the assumed torque noise. Two '
+                'effects are not distinguishable if one reproduces the torque of the other to '
+                '10 % (rms).'
             ),
             DataTable(heads, rows, tuple(range(len(heads)))),
             Paragraph(
-                'Similarity of two effects, by number: the darker, the more similar. "=" marks '
-                'an effect in a row that the effect in the column can reproduce.'
+                'Similarity of two effects, by number: the darker, the more similar. "=": the '
+                'effect of the column can reproduce that of the row.'
             ),
             DataTable(('Effect', *(str(k + 1) for k in range(len(kinds)))), similar),
         ],
@@ -242,7 +242,7 @@ def isolability_section(isolability: Isolability) -> ContentSection:
 
 
 def _detectable_row(name: str, sizes: Sequence[Detectable]) -> tuple[str, str, str, str]:
-    """Return the cells of one effect, for the columns `_DETECTABLE`."""
+    """Return the table cells of one effect, with the columns `_DETECTABLE`."""
 
     def place(one: Detectable) -> str:
         return ', '.join(one.joints) or 'the arm'
@@ -260,7 +260,7 @@ def _detectable_row(name: str, sizes: Sequence[Detectable]) -> tuple[str, str, s
 
 
 def candidates_section(diagnosis: Diagnosis) -> ContentSection:
-    """Return the part of the gap that each cause alone would explain, in ranking order."""
+    """Return the section with the share that each candidate alone explains, likeliest first."""
     explanation = diagnosis.explanation
     names = {finding.name for finding in diagnosis.findings}
     rows = [
@@ -289,10 +289,10 @@ def candidates_section(diagnosis: Diagnosis) -> ContentSection:
                 f'{counted(len(rows), "cause")} that {verb} compared, the likeliest first',
                 [
                     Paragraph(
-                        'Each cause alone, in its best shape. Share: part of the squared residual '
-                        'that it explains; similar causes explain the same part. Evidence: '
-                        'logarithm of how much likelier the data are with it than without. A '
-                        'value outside the possible range is no explanation.'
+                        'Each cause alone, with its best-fitting shape. Share: part of the '
+                        'squared residual that the cause explains; similar causes explain the '
+                        'same part. Evidence: logarithm of the Bayes factor. Visible: part of the '
+                        'torque of the cause that other parameters cannot reproduce.'
                     ),
                     DataTable(heads, rows, (0, 1)),
                 ],
@@ -302,7 +302,7 @@ def candidates_section(diagnosis: Diagnosis) -> ContentSection:
 
 
 def _candidate_value(diagnosis: Diagnosis, trial: Trial) -> str:
-    """Return the first value with its interval, 'includes 0' or 'not possible'."""
+    """Return the first value of a candidate with interval, 'includes 0' or 'not possible'."""
     arm, effect, kept = diagnosis.arm, trial.effect, list(trial.kept)
     if diagnosis.explanation is not None:
         arm = diagnosis.explanation.given
@@ -317,7 +317,7 @@ def _candidate_value(diagnosis: Diagnosis, trial: Trial) -> str:
 
 
 def gap_section(diagnosis: Diagnosis, gap: Gap) -> ContentSection:
-    """Return the errors of joints before and after the named effects, over their floors."""
+    """Return the section with the error of each joint before and after the named effects."""
     floor, harmful = diagnosis.baseline, bool(diagnosis.harmful)
     where = 'recordings not used for the fit' if gap.predicted else gap.data
     kept = ' The model in model.yaml does not have the named cause.' * harmful
@@ -326,7 +326,7 @@ def gap_section(diagnosis: Diagnosis, gap: Gap) -> ContentSection:
         [
             Paragraph(
                 f'Root mean square error of each joint on {where}, the worst joint first. '
-                f'Each bar is in units of the usual error of the joint, which is {floor}.{kept}'
+                f'Bars are in units of the usual error of the joint, which is {floor}.{kept}'
             ),
             gap_bars(diagnosis, gap),
         ],
@@ -334,7 +334,7 @@ def gap_section(diagnosis: Diagnosis, gap: Gap) -> ContentSection:
 
 
 def gap_bars(diagnosis: Diagnosis, gap: Gap) -> BarChart:
-    """Return bars of the error of each joint in units of its floor, the largest first."""
+    """Return bars of the error of each joint in units of its usual error, largest first."""
     robot = diagnosis.arm.robot
     roles: list[tuple[Role, str, FloatArray]] = [
         ('before', 'given model', gap.before),

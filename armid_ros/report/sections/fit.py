@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Measured against predicted torque, and against predicted motion."""
+"""Sections with measured and predicted torque, and with simulated motion."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ ZOOM = 'Drag across a plot, or pinch it, to zoom; double-click or double-tap to 
 
 
 def by_recording(fits: Sequence[Fit]) -> dict[str, list[Fit]]:
-    """Group fits by recording."""
+    """Return the fits of each recording by its name."""
     found: dict[str, list[Fit]] = {}
     for fit in fits:
         found.setdefault(fit.source, []).append(fit)
@@ -40,9 +40,10 @@ def by_recording(fits: Sequence[Fit]) -> dict[str, list[Fit]]:
 
 def error_bars(robot: Robot, training: Fits, validation: Fits, halves: Score) -> BarChart:
     """
-    Return the relative error of each joint, held-out and training, the worst joint first.
+    Return bars of the relative torque error of each joint, the worst joint first.
 
-    Without held-out recordings the errors between the halves of the data are shown.
+    Held-out and training errors are shown. Without held-out recordings, each half of the data is
+    predicted by the fit to the other half.
 
     """
 
@@ -69,7 +70,7 @@ def fit_section(
     robot: Robot, training: Fits, validation: Fits, reach: FloatArray
 ) -> ContentSection:
     """
-    Return how well a model predicts the torques, as curves.
+    Return the section with measured and predicted torque of each joint.
 
     Parameters
     ----------
@@ -129,16 +130,16 @@ def fit_section(
         blocks.append(Fold(f'{counted(len(errors), "recording")} one by one', [table]))
     blocks.append(
         Paragraph(
-            f'The parameters make the predicted torque uncertain by at most {certainty}, at '
-            f'{robot.joints[least]} (95 %, rms over the motion). A larger residual is noise, or '
-            'an effect that the model lacks.'
+            f'Parameter errors change the predicted torque by at most {certainty}, at '
+            f'{robot.joints[least]} (95 %, rms over the motion). Larger residuals come from noise '
+            'or from missing effects.'
         )
     )
     return ContentSection('Torque', blocks)
 
 
 def _fit_charts(fits: Sequence[Fit], joint: int, unit: str, link: str) -> tuple[Chart, Chart]:
-    """Draw the torque of one joint, measured and predicted, and the residual."""
+    """Return charts of measured and predicted torque, and of the residual, of one joint."""
     t = joined_time([fit.motion.t for fit in fits])
     measured = joined([fit.motion.tau[:, joint] for fit in fits if fit.motion.tau is not None])
     predicted = joined([fit.predicted[:, joint] for fit in fits])
@@ -172,7 +173,7 @@ def forward_section(
     labels: tuple[str, str] = ('description', 'identified'),
 ) -> ContentSection:
     """
-    Return the position errors of two models that the recorded torques drive.
+    Return the section with position errors of two models driven by the recorded torques.
 
     Parameters
     ----------
@@ -226,7 +227,7 @@ def forward_section(
 def _worst_joint(
     robot: Robot, pair: ForwardValidation, models: Sequence[tuple[Role, str, ForwardScore]]
 ) -> list[Templated]:
-    """Return the position error over time of the joint with the largest error."""
+    """Return a chart of the position error of the joint with the largest error."""
     farthest = max((score for *_, score in models), key=lambda one: one.position_error.max())
     worst, motion = int(farthest.position_error.argmax()), pair.after.motion
     curves = [1e3 * (score.simulated[:, worst] - motion.q[:, worst]) for *_, score in models]
