@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Watch the joint states of an arm: position, age and clock."""
+"""Supervise the joint states of an arm: position, age and time stamps."""
 
 from __future__ import annotations
 
@@ -26,14 +26,14 @@ _REST = 0.25
 
 class ArmWatch:
     """
-    Subscription to joint_states that checks position, age and stamps.
+    Subscription to joint_states that supervises positions, their age and their stamps.
 
     Attributes
     ----------
     monitor : PoseMonitor
-        Selects the positions that are accepted.
+        Accepts or rejects measured positions.
     stamps : StampDifference
-        Difference between stamps and the node's clock.
+        Difference between the stamps and the clock of the node.
 
     """
 
@@ -41,7 +41,7 @@ class ArmWatch:
         self, node: ArmidNode, robot: Robot, tolerance: float, on_state: Callable[[float], None]
     ) -> None:
         """
-        Subscribe.
+        Subscribe to joint_states.
 
         Parameters
         ----------
@@ -52,7 +52,7 @@ class ArmWatch:
         tolerance : float
             Largest distance beyond a position limit at which a position is accepted [rad or m].
         on_state : callable
-            Called after every message with its time of arrival, see `now` [s].
+            Called after every message with its time of arrival [s], see `now`.
 
         """
         self.monitor = PoseMonitor(robot, tolerance)
@@ -76,22 +76,22 @@ class ArmWatch:
 
     @property
     def effort(self) -> FloatArray:
-        """Return the efforts of the last message, shape (n,) [N m or N]; NaN if missing."""
+        """Return the efforts of the last joint state, shape (n,) [N m or N]; NaN if missing."""
         known = dict(zip(*self._efforts, strict=False))
         return np.array([known.get(joint, math.nan) for joint in self._joints])
 
     def now(self) -> float:
-        """Return the time of the steady or simulated clock, for the age of messages [s]."""
+        """Return the time of the steady or the simulated clock, for the age of messages [s]."""
         return self._age_clock(self._node.get_clock().now().nanoseconds)
 
     def catch_up(self) -> None:
-        """Process the joint states that arrived during a long callback."""
+        """Process the joint states that arrived during a long computation."""
         with self._states.handle:
             while (taken := self._states.handle.take_message(JointState, True)) is not None:
                 self._states.callback(taken[0])
 
     def staleness(self, timeout: float) -> str:
-        """Return a message on joints without a new position for a time [s]; empty if none."""
+        """Return a message on joints without a new position for `timeout` [s]; empty if none."""
         fault = self.monitor.pose.staleness(self.now(), timeout)
         topic = self._states.topic_name
         if (
@@ -100,11 +100,11 @@ class ArmWatch:
             or not self._node.count_publishers(topic)
         ):
             return fault
-        return f'{fault}; {topic} has a publisher of an incompatible quality of service'
+        return f'{fault}; the quality of service of the publisher of {topic} is incompatible'
 
     def fault_at_start(self, timeout: float, difference: float, simulated: bool) -> str:
         """
-        Return why the arm must not be started; empty if it may.
+        Return why the arm must not be started now; empty if it may be started.
 
         Parameters
         ----------
@@ -113,7 +113,7 @@ class ArmWatch:
         difference : float
             Largest permitted difference between stamps and the node's clock [s]; may be infinite.
         simulated : bool
-            Whether the arm is simulated, which decides the remedy in the text.
+            Whether the arm is simulated, which decides the remedy in the message.
 
         """
         topic = self._states.topic_name
@@ -146,7 +146,7 @@ class ArmWatch:
         )
 
     def _age_clock(self, clock_ns: int) -> float:
-        """Return `now`, given the time of the node's clock [ns]."""
+        """Return `now` for a time of the node's clock [ns]."""
         if not self._node.get_clock().ros_time_is_active:
             return float(self._steady.now().nanoseconds * 1e-9)
         return (clock_ns - self._stepped_ns) * 1e-9

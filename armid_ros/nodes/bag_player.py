@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Bag player node: publishes the messages of a bag, at a rate or in lock step with /clock."""
+"""Bag player node: publishes the messages of a bag, in real time or along /clock."""
 
 from __future__ import annotations
 
@@ -36,23 +36,18 @@ from trajectory_msgs.msg import JointTrajectory
 
 
 class _JumpGuard:
-    """Compares the first waypoint of a trajectory with the measured joint positions."""
+    """Guard against recorded trajectories that do not start at the measured arm position."""
 
     def __init__(self, node: Node, tolerance: float, timeout: float) -> None:
         self.tolerance, self.timeout = tolerance, timeout
-        self._latest: dict[tuple[str, ...], tuple[JointState, float]] = {}
+        self.latest: dict[tuple[str, ...], tuple[JointState, float]] = {}
         self._limits: dict[str, float] = {}
         self._states = node.create_subscription(
             JointState, 'joint_states', self._on_joint_states, 10
         )
 
-    @property
-    def has_state(self) -> bool:
-        """Return whether a joint state was received."""
-        return bool(self._latest)
-
     def describe(self, cdr: bytes) -> None:
-        """Read the velocity limits from a robot_description."""
+        """Read the velocity limits from a serialised robot_description."""
         try:
             robot = robot_from_urdf(deserialize_message(cdr, String).data)
         except ArmidError:
@@ -60,13 +55,13 @@ class _JumpGuard:
         self._limits = dict(zip(robot.joints, robot.velocity_limit.tolist(), strict=True))
 
     def objection(self, cdr: bytes) -> str:
-        """Return why a JointTrajectory must not be sent to the arm; empty if it may be sent."""
+        """Return why a serialised JointTrajectory must not be sent; empty if it may be sent."""
         try:
             reference = waypoints_of(deserialize_message(cdr, JointTrajectory))
         except ArmidError as error:
             return str(error)
         pose = MeasuredPose.unknown(reference.joints)
-        for message, seen in self._latest.values():
+        for message, seen in self.latest.values():
             known = dict(zip(message.name, message.position, strict=False))
             pose = pose.updated([known.get(j, np.nan) for j in pose.joints], 0, seen)
         lost = pose.staleness(time.monotonic(), self.timeout)
@@ -86,20 +81,20 @@ class _JumpGuard:
     def _on_joint_states(self, message: JointState) -> None:
         names = tuple(message.name)
         stamp = Time.from_msg(message.header.stamp).nanoseconds
-        before = self._latest.get(names)
+        before = self.latest.get(names)
         if before and stamp and stamp == Time.from_msg(before[0].header.stamp).nanoseconds:
             return
-        self._latest[names] = (message, time.monotonic())
+        self.latest[names] = (message, time.monotonic())
 
 
 class BagPlayerNode(ArmidNode):
     """
-    Publishes the messages of a bag, with unchanged serialisation.
+    Node that publishes the messages of a bag, byte by byte as recorded.
 
     A JointTrajectory is sent only if no joint of the arm on joint_states would jump.
 
     If the bag also has joint_states, its trajectories are sent only if no other node publishes
-    joint_states. With use_sim_time, the time since the first /clock message is the played time.
+    joint_states. With use_sim_time, the bag is played along the time of /clock.
 
     Attributes
     ----------
@@ -143,10 +138,10 @@ class BagPlayerNode(ArmidNode):
     )
 
     def __init__(self, **kwargs: Any) -> None:
-        """Open the bag of the parameter bag."""
+        """Open the bag that the parameter `bag` names."""
         super().__init__('bag_player', **kwargs)
         if not self.value('bag'):
-            raise RecordingError("parameter 'bag' is empty: name a bag with -p bag:=PATH")
+            raise RecordingError("the parameter 'bag' is empty: name a bag with -p bag:=PATH")
         self._bag = Bag(self.value('bag'))
         self._lock_step = bool(self.value('use_sim_time'))
         self.check({'clock_rate': self.value('clock_rate')})
@@ -162,42 +157,42 @@ class BagPlayerNode(ArmidNode):
         if self._trajectories:
             limits = self.value('start_tolerance'), self.value('state_timeout')
             self._guard = _JumpGuard(self, *limits)
-        self._messages = self._from_start()
+        self._messages = self._read_messages()
         self._next: RawMessage | None = None
-        self._take()
+        self._read_next()
         self._first = self._next.log_time_ns if self._next else 0
         self._position = self._clock_due = self._first
         self._anchor: int | None = None
         self._made = time.monotonic()
         self.published: Counter[str] = Counter()
         self._clock_publisher: Publisher | None = None
-        self._keep_clock()
+        self._set_clock_rate()
         pace = self.get_clock() if self._lock_step else Clock(clock_type=ClockType.STEADY_TIME)
         self._pace = pace
         self._timer = self.create_timer(0.001, self.play, clock=pace)
 
     @property
     def finished(self) -> bool:
-        """Return whether all messages have been played."""
+        """Whether all messages of the bag have been published."""
         return self._next is None
 
     @property
     def failure(self) -> str:
-        """Return why a trajectory was not sent; empty if none was rejected."""
+        """Return why a trajectory was not sent; empty if all trajectories were sent."""
         return self._refused
 
     @property
     def waiting(self) -> bool:
-        """Return whether the node waits for subscribers or for /clock."""
+        """Whether the node waits for subscribers or for /clock."""
         return self._anchor is None and not self.finished
 
     @property
     def position(self) -> float:
-        """Return the played bag time since the first message [s]."""
+        """Return the time of the bag since its first message [s]."""
         return (self._position - self._first) * 1e-9
 
     def play(self) -> None:
-        """Publish the messages that are due."""
+        """Publish the messages whose time has come."""
         now = self._pace.now().nanoseconds
         if self._anchor is None:
             if (self._lock_step and now == 0) or not self._ready():
@@ -212,9 +207,9 @@ class BagPlayerNode(ArmidNode):
             if self._next is None or self._next.log_time_ns > self._position:
                 break
             self._publish(self._next)
-            self._take()
+            self._read_next()
             if self._next is None and self.value('loop'):
-                self._messages = self._from_start()
+                self._messages = self._read_messages()
                 self._next = next(self._messages, None)
                 self._position = self._clock_due = self._first
         if self._clock_publisher is not None and self._clock_period:
@@ -226,7 +221,7 @@ class BagPlayerNode(ArmidNode):
             self._timer.cancel()
 
     def check(self, values: Mapping[str, Any]) -> None:
-        """Raise a RecordingError if the node would publish the /clock that it follows."""
+        """Raise a RecordingError if the node would both follow and publish /clock."""
         if self.value('use_sim_time') and values.get('clock_rate'):
             raise RecordingError(
                 'a node with use_sim_time follows /clock and cannot publish it: set use_sim_time '
@@ -234,21 +229,21 @@ class BagPlayerNode(ArmidNode):
             )
 
     def changed(self, names: frozenset[str]) -> None:
-        """Apply changed parameters for /clock and for the check of jumps."""
+        """Apply new values of the rate of /clock and of the limits for trajectories."""
         if 'clock_rate' in names:
-            self._keep_clock()
+            self._set_clock_rate()
         if self._guard is not None:
             self._guard.tolerance = self.value('start_tolerance')
             self._guard.timeout = self.value('state_timeout')
 
-    def _keep_clock(self) -> None:
+    def _set_clock_rate(self) -> None:
         rate = self.value('clock_rate')
         self._clock_period = int(1e9 / rate) if rate else 0
         if rate and self._clock_publisher is None:
             self._clock_publisher = self.create_publisher(ClockMessage, '/clock', 10)
 
     def condition(self) -> tuple[str, Mapping[str, object]]:
-        """Return the number of published messages and the bag time."""
+        """Return the missing subscribers, the number of published messages and the bag time."""
         values = {
             'messages': self.published.total(),
             'position': self.position,
@@ -256,7 +251,7 @@ class BagPlayerNode(ArmidNode):
         return ('waiting for subscribers' if self.waiting else ''), values
 
     def close(self) -> None:
-        """Close the bag, and wait until trajectories have arrived."""
+        """Close the bag, and wait until sent trajectories have arrived."""
         self._bag.close()
         if self._guard is not None and self.context.ok():
             for topic in self._trajectories:
@@ -267,8 +262,8 @@ class BagPlayerNode(ArmidNode):
         unknown = self._wanted - set(topics)
         if unknown:
             raise RecordingError(
-                f'{self._bag.path}: no topic {", ".join(sorted(unknown))}; '
-                f'there are {", ".join(sorted(topics))}'
+                f'{self._bag.path} has no topic {", ".join(sorted(unknown))}; '
+                f'its topics are {", ".join(sorted(topics))}'
             )
         publishers = {}
         for name, topic in topics.items():
@@ -279,18 +274,19 @@ class BagPlayerNode(ArmidNode):
                     message_class(topic.type_name), topic.name, offered(topic.qos)
                 )
             except RecordingError as error:
-                self.complaints.say('topic', f'{name} is not played: {error}')
+                self.complaints.add('topic', f'{name} is not played: {error}')
         if not publishers:
-            raise RecordingError(f'{self._bag.path}: the bag has no message to play')
+            raise RecordingError(f'{self._bag.path}: the bag has no topic that can be played')
         return publishers
 
-    def _from_start(self) -> Iterator[RawMessage]:
+    def _read_messages(self) -> Iterator[RawMessage]:
+        """Yield the messages of the played topics from the begin of the bag."""
         return (m for m in self._bag.messages() if m.topic in self._topics)
 
     def _ready(self) -> bool:
         everyone = all(p.get_subscription_count() for p in self._topics.values())
         if self._guard is not None and not self._has_states:
-            everyone = everyone and self._guard.has_state
+            everyone = everyone and bool(self._guard.latest)
         return everyone or time.monotonic() > self._made + self.value('subscriber_timeout')
 
     def _publish(self, message: RawMessage) -> None:
@@ -302,20 +298,20 @@ class BagPlayerNode(ArmidNode):
                 self._refused = guard.objection(message.cdr) or self._refused
             elif self.count_publishers(self._states) > 1:
                 self._refused = (
-                    f'trajectory: the bag has {self._states} of its own, and another node '
-                    'publishes them too: an arm that is not where the recorded one was'
+                    f'trajectory: another node publishes {self._states}, as this bag does: the '
+                    'arm may not be where the recorded arm was'
                 )
             if self._refused:
-                self.complaints.say('trajectory', self._refused)
+                self.complaints.add('trajectory', self._refused)
                 return
         self._topics[message.topic].publish(message.cdr)
         self.published[message.topic] += 1
 
-    def _take(self) -> None:
-        """Read the next message; at the end of the bag, log its damage."""
+    def _read_next(self) -> None:
+        """Read the next message; at the end of the bag, log whether the bag is damaged."""
         self._next = next(self._messages, None)
         if self._next is None and self._bag.damage:
-            self.complaints.say('damage', f'{self.value("bag")}: {self._bag.damage}')
+            self.complaints.add('damage', f'{self.value("bag")}: {self._bag.damage}')
 
 
 main = partial(run, BagPlayerNode)

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Base class of the nodes: parameters, log of rejected inputs, diagnostics once a second."""
+"""Base class of all nodes: parameters, log of rejected inputs, diagnostics once a second."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from functools import wraps
 from pathlib import Path
 from typing import Any, ClassVar
 
-from armid_ros.errors import ArmidError, OutputError
+from armid_ros.errors import ArmidError, meant, OutputError
 from armid_ros.nodes.complaints import Complaints, FATAL
-from armid_ros.nodes.parameters.table import declare, NodeParameter, unknown
+from armid_ros.nodes.parameters.table import declare, NodeParameter, overrides
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.clock import Clock, ClockType
@@ -22,7 +22,7 @@ from rclpy.subscription import Subscription
 from rclpy.timer import Timer
 from std_srvs.srv import Trigger
 
-#: Period of the checks for new publishers and for answers [s].
+#: Period of the checks for new publishers and for answers of services [s].
 LOOK_PERIOD = 0.1
 
 #: Parameters of every node.
@@ -52,7 +52,7 @@ def key_values(values: Mapping[str, object]) -> list[KeyValue]:
 
 class ArmidNode(Node):
     """
-    Node with parameters from a table that publishes its state on /diagnostics.
+    ROS node whose parameters come from a table, and whose state is published on /diagnostics.
 
     Exceptions in callbacks do not end the node: they are counted and logged. Errors of the
     operating system, such as a full disk, do end the node.
@@ -69,7 +69,7 @@ class ArmidNode(Node):
     table: ClassVar[tuple[NodeParameter, ...]]
 
     def __init__(self, name: str, **kwargs: Any) -> None:
-        """Make the node with keyword arguments of rclpy's Node, such as context or namespace."""
+        """Make the node; further arguments are those of rclpy's Node, such as namespace."""
         super().__init__(name, **kwargs)
         self.complaints = Complaints(self.get_logger())
         self._clock_missed = self._trouble_logged = False
@@ -79,10 +79,10 @@ class ArmidNode(Node):
         self._diagnostics = self.create_publisher(DiagnosticArray, '/diagnostics', 10)
         self.create_timer(1.0, self.publish_diagnostics)
         # time without /clock or expected messages until a log entry
-        self.look_every(5.0, self.look_for_trouble)
+        self.create_steady_timer(5.0, self.log_trouble)
 
     def parameters(self) -> Sequence[NodeParameter]:
-        """Return the parameters that the node has to declare."""
+        """Return the parameters that the node declares."""
         return (*self.table, *COMMON)
 
     def create_subscription(
@@ -90,59 +90,59 @@ class ArmidNode(Node):
     ) -> Subscription:
         """Subscribe as in rclpy; exceptions of the callback do not end the node."""
         return super().create_subscription(
-            msg_type, topic, self.surviving(callback, topic), *args, **more
+            msg_type, topic, self.guarded(callback, topic), *args, **more
         )
 
     def create_timer(
         self, timer_period_sec: float, callback: Callable[[], None], *args: Any, **more: Any
     ) -> Timer:
-        """Make a timer as in rclpy; exceptions of the callback do not end the node."""
-        guarded = self.surviving(callback, getattr(callback, '__name__', 'timer'))
-        return super().create_timer(timer_period_sec, guarded, *args, **more)
+        """Make a timer as in rclpy; exceptions of its callback do not end the node."""
+        safe = self.guarded(callback, getattr(callback, '__name__', 'timer'))
+        return super().create_timer(timer_period_sec, safe, *args, **more)
 
-    def surviving(self, callback: Callable[..., Any], what: str) -> Callable[..., Any]:
-        """Return a callback whose exceptions are logged as complaints about a source, a topic."""
+    def guarded(self, callback: Callable[..., Any], source: str) -> Callable[..., Any]:
+        """Return a callback whose exceptions are logged as faults of an input source."""
 
         @wraps(callback)
-        def survive(*args: Any) -> Any:
+        def call(*args: Any) -> Any:
             try:
                 return callback(*args)
             except FATAL:
                 raise
             except ArmidError as error:
-                self.complaints.say(what, f'{what}: {error}')
+                self.complaints.add(source, f'{source}: {error}')
             except Exception as error:
                 if not self.context.ok():  # ROS shuts down
                     raise
-                self.complaints.defect(what, error)
+                self.complaints.add_exception(source, error)
             return None
 
-        return survive
+        return call
 
-    def look_every(self, seconds: float, callback: Callable[[], None]) -> Timer:
-        """Call a function periodically in real time, independently of /clock."""
+    def create_steady_timer(self, seconds: float, callback: Callable[[], None]) -> Timer:
+        """Make a timer in real time, independent of /clock."""
         return self.create_timer(seconds, callback, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     @property
     def missing_clock(self) -> str:
-        """Return why simulated time is missing; empty if it is available or not used."""
+        """Return why the simulated time is not available; empty if it is, or is not used."""
         clock = self.get_clock()
         if not clock.ros_time_is_active:
             return ''
         topic = self.resolve_topic_name('/clock')
         if not self.count_publishers(topic):
             return (
-                f'simulated time, but nothing publishes {topic}: start what does, or set '
-                'use_sim_time:=false'
+                f'use_sim_time is true, but no node publishes {topic}: start the simulation, or '
+                'set use_sim_time:=false'
             )
         if not clock.now().nanoseconds:
-            return f'simulated time, but no time has come on {topic}: let the simulation run'
+            return f'use_sim_time is true, but {topic} has no time: run the simulation'
         return ''
 
-    def look_for_trouble(self) -> None:
-        """Log once the problem in the state of the node, or that simulated time is missing."""
+    def log_trouble(self) -> None:
+        """Log a new problem of the node once, or that simulated time is missing."""
         missing = self.missing_clock
-        if missing and not self._clock_missed:  # the topic of /diagnostics
+        if missing and not self._clock_missed:
             self.get_logger().warning(f'{missing}; until then the node waits')
         self._clock_missed = bool(missing)
         trouble = '' if missing else self.condition()[0]
@@ -151,24 +151,27 @@ class ArmidNode(Node):
         self._trouble_logged = bool(trouble)
 
     def warn_of_unknown(self) -> None:
-        """Log start parameters that the node does not have."""
-        text = unknown(self)
-        if text:
-            self.complaints.say('parameter', text)
+        """Log parameters that were given at the start and that the node does not have."""
+        known = self.get_parameters_by_prefix('')
+        given = [name for name in overrides(self) if not name.startswith('qos_overrides.')]
+        wrong = [name for name in given if name not in known]
+        if wrong:
+            named = [f"no parameter is named '{name}'{meant(name, known)}" for name in wrong]
+            self.complaints.add('parameter', f'{"; ".join(named)}; ignored, see --help')
 
     @property
     def finished(self) -> bool:
-        """Return whether the work of the node is done, so that the process may end."""
+        """Whether the work of the node is done, so that its process may end."""
         return False
 
     @property
     def failure(self) -> str:
-        """Return why the task of the node failed; the process then ends with code 2."""
+        """Return why the task of the node failed; the process then ends with exit code 2."""
         return ''
 
     @property
     def activity(self) -> str:
-        """Return the status message when there is no problem."""
+        """Return the diagnostics message for a node without a problem."""
         return 'running'
 
     @property
@@ -179,7 +182,7 @@ class ArmidNode(Node):
     @abstractmethod
     def condition(self) -> tuple[str, Mapping[str, object]]:
         """
-        Return the state of the node for diagnostics.
+        Return the present problem of the node, and values for /diagnostics.
 
         Returns
         -------
@@ -191,16 +194,16 @@ class ArmidNode(Node):
         """
 
     def level(self, troubled: bool) -> bytes:
-        """Return the level of the status; nodes with levels above a warning override it."""
+        """Return the diagnostics level, by default WARN for a node with a problem."""
         return DiagnosticStatus.WARN if troubled else DiagnosticStatus.OK
 
     def further_statuses(self) -> Sequence[DiagnosticStatus]:
-        """Return further statuses for /diagnostics."""
+        """Return further statuses of the node for /diagnostics."""
         return ()
 
     def check(self, values: Mapping[str, Any]) -> None:
         """
-        Raise an ArmidError if parameters cannot take new values at run time.
+        Raise an ArmidError if parameters must not be set to new values at run time.
 
         Parameters
         ----------
@@ -211,7 +214,7 @@ class ArmidNode(Node):
 
     def changed(self, names: frozenset[str]) -> None:
         """
-        Apply parameters that were set at run time.
+        Apply the new values of parameters that were set at run time.
 
         Parameters
         ----------
@@ -223,38 +226,38 @@ class ArmidNode(Node):
     def close(self) -> None:
         """Save results and stop motions when the node ends."""
 
-    def tell(self, text: str) -> str:
-        """Log a text unless the context is shut down, and return the text."""
+    def log(self, text: str) -> str:
+        """Log a text unless ROS is shut down, and return the text."""
         if self.context.ok():
             self.get_logger().info(text)
         return text
 
     def value(self, parameter: str) -> Any:
-        """Return the value of a parameter; empty names of a list are removed."""
+        """Return the value of a parameter; empty names are removed from a list."""
         value = self.get_parameter(parameter).value
         is_list = isinstance(value, list) and all(isinstance(one, str) for one in value)
         return tuple(filter(None, value)) if is_list else value
 
     def folder(self, parameter: str) -> Path:
-        """Return the folder that a parameter names, and create it if necessary."""
+        """Return the folder that a parameter names; it is created if it does not exist."""
         folder = Path(self.value(parameter)).expanduser()
         try:
             folder.mkdir(parents=True, exist_ok=True)
         except OSError as error:
-            text = f'{parameter}: {folder}: cannot be made: {error.strerror}'
+            text = f'{parameter}: the folder {folder} cannot be created: {error.strerror}'
             raise OutputError(text) from error
         return folder
 
     def offer(self, service: str, action: Callable[[], str]) -> None:
         """
-        Offer a std_srvs/Trigger service.
+        Offer a service of type std_srvs/Trigger that runs a function.
 
         Parameters
         ----------
         service : str
             Name of the service, such as '~/reset'.
         action : callable
-            Does the work and returns the answer; an ArmidError that it raises becomes the answer.
+            Does the work and returns the answer; the text of an ArmidError becomes the answer.
 
         """
 
@@ -267,7 +270,7 @@ class ArmidNode(Node):
             except FATAL:
                 raise
             except Exception as error:
-                self.complaints.defect(service, error)
+                self.complaints.add_exception(service, error)
                 response.message = self.complaints.latest
             return response
 
@@ -292,27 +295,25 @@ class ArmidNode(Node):
                 for p in parameter_list
             ]
         except ArmidError as error:
-            self.complaints.say('parameter', str(error))
+            self.complaints.add('parameter', str(error))
             return SetParametersResult(successful=False, reason=str(error))
-        changed = [p for p in given if not self._has(p)]
+        changed = [
+            p
+            for p in given
+            if not self.has_parameter(p.name)
+            or self.get_parameter(p.name).get_parameter_value() != p.get_parameter_value()
+        ]
         if not changed:
             return SetParametersResult(successful=True)
         result = super().set_parameters_atomically(changed)
         name = ', '.join(p.name for p in changed)
         if not result.successful:
             reason = result.reason.removeprefix(f"parameter '{name}': ")
-            self.complaints.say('parameter', f"parameter '{name}' refused: {reason}")
+            self.complaints.add('parameter', f"parameter '{name}' refused: {reason}")
         return result
 
-    def _has(self, parameter: Parameter) -> bool:
-        """Return whether a parameter of the node already has a value."""
-        if not self.has_parameter(parameter.name):
-            return False
-        present = self.get_parameter(parameter.name).get_parameter_value()
-        return bool(present == parameter.get_parameter_value())
-
     def publish_diagnostics(self) -> None:
-        """Publish the state of the node and its complaints."""
+        """Publish the state of the node and its rejected inputs on /diagnostics."""
         trouble, values = self.condition()
         status = DiagnosticStatus(
             name=f'{self.get_fully_qualified_name()[1:]}: state', hardware_id=self.hardware
@@ -325,7 +326,7 @@ class ArmidNode(Node):
         message = DiagnosticArray(status=[status, *self.further_statuses()])
         message.header.stamp = self.get_clock().now().to_msg()
         self._diagnostics.publish(message)
-        self.complaints.settle()
+        self.complaints.fresh = False
 
     def _validate(self, parameters: list[Parameter]) -> SetParametersResult:
         try:
@@ -338,4 +339,4 @@ class ArmidNode(Node):
         try:
             self.changed(frozenset(p.name for p in parameters))
         except ArmidError as error:
-            self.complaints.say('parameter', str(error))
+            self.complaints.add('parameter', str(error))

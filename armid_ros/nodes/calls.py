@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Call services of a running node from a process outside ROS."""
+"""Call services of a running excitation publisher from a program that is no ROS node."""
 
 from __future__ import annotations
 
@@ -17,23 +17,23 @@ from std_srvs.srv import Trigger
 
 def call_publisher(node: str, action: str, speed: float | None, timeout: float) -> str:
     """
-    Call a running excitation publisher.
+    Start, rehearse, stop or slow down the excitation of a running excitation_publisher.
 
     Parameters
     ----------
     node : str
-        Its name, with the namespace.
+        Name of the excitation publisher, with its namespace.
     action : str
         'start', 'rehearse', 'stop', or 'speed'.
     speed : float or None
-        For 'speed': the share of the planned speed.
+        Share of the planned speed, for the action 'speed'.
     timeout : float
-        Timeout of the answer [s].
+        Longest time to wait for the answer [s].
 
     Returns
     -------
     str
-        The answer.
+        Answer of the node.
 
     Raises
     ------
@@ -57,8 +57,8 @@ def call_publisher(node: str, action: str, speed: float | None, timeout: float) 
         end = time.monotonic() + timeout
         if not client.wait_for_service(timeout):
             raise TrajectoryError(
-                f'no node offers {service} after {timeout:g} s; is the excitation_publisher '
-                'running, in the same ROS_DOMAIN_ID? --node gives its name with the namespace'
+                f'no node offered the service {service} within {timeout:g} s; start the '
+                'excitation_publisher with the same ROS_DOMAIN_ID, or give its name with --node'
             )
         future = client.call_async(request)
         executor = SingleThreadedExecutor(context=context)
@@ -66,7 +66,8 @@ def call_publisher(node: str, action: str, speed: float | None, timeout: float) 
         executor.spin_until_future_complete(future, max(end - time.monotonic(), 0.1))
         if not future.done():
             raise TrajectoryError(
-                f'{name} did not answer {action} within {timeout:g} s; whether it acted is unknown'
+                f'{name} did not answer the call of {action} within {timeout:g} s; whether it '
+                'was executed is unknown'
             )
         answer = future.result()
     finally:
@@ -77,5 +78,5 @@ def call_publisher(node: str, action: str, speed: float | None, timeout: float) 
     else:
         done, message = answer.success, answer.message
     if not done:
-        raise TrajectoryError(f'{name}: {action}: {message}')
+        raise TrajectoryError(f'{name} refuses {action}: {message}')
     return str(message)

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Log each kind of unusable input once, and count every occurrence."""
+"""Count unusable inputs of a node, and log each message about them once."""
 
 from __future__ import annotations
 
@@ -16,23 +16,23 @@ FATAL = (OSError, MemoryError, RecordingEnded)
 
 class Complaints:
     """
-    Counts and log messages of the inputs that a node rejected, by kind.
+    Inputs that a node rejected: their number by kind, and the log messages.
 
     Attributes
     ----------
     counts : Counter of str
         Number of rejections of each kind.
     latest : str
-        Text of the last complaint; empty before the first one.
+        Message about the last rejected input; empty before the first one.
     fresh : bool
-        Whether an input was rejected since the last `settle`.
+        Whether an input was rejected since the last diagnostics.
     defects : int
         Number of rejections by unexpected exceptions.
 
     """
 
     def __init__(self, logger: RcutilsLogger) -> None:
-        """Log complaints with the logger of a node."""
+        """Log the messages with the logger of a node."""
         self._logger = logger
         self.counts: Counter[str] = Counter()
         self._logged: dict[str, set[str]] = {}
@@ -40,8 +40,8 @@ class Complaints:
         self.fresh = False
         self.defects = 0
 
-    def say(self, kind: str, text: str) -> None:
-        """Count a rejected input, and log the text unless it was logged before."""
+    def add(self, kind: str, text: str) -> None:
+        """Count a rejected input, and log the message unless it was logged before."""
         self.counts[kind] += 1
         self.latest = text
         self.fresh = True
@@ -51,15 +51,11 @@ class Complaints:
             self._logger.warning(text)
 
     def has_logged(self, text: str) -> bool:
-        """Return whether a text was logged."""
+        """Return whether a message about a rejected input was logged."""
         return any(text in logged for logged in self._logged.values())
 
-    def defect(self, kind: str, error: Exception) -> None:
-        """Count and log an input that caused an unexpected exception."""
+    def add_exception(self, kind: str, error: Exception) -> None:
+        """Count an input that caused an unexpected exception, and log the exception."""
         self.defects += 1
-        self.say(kind, f'{kind}: skipped, as it cannot be used ({type(error).__name__}: {error})')
+        self.add(kind, f'{kind}: skipped, as it cannot be used ({type(error).__name__}: {error})')
         self._logger.debug(''.join(traceback.format_exception(error)))
-
-    def settle(self) -> None:
-        """Begin a new reporting period, with `fresh` reset."""
-        self.fresh = False

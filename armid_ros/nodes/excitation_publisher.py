@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Excitation publisher node: sends an excitation to an arm, supervises and stops the arm."""
+"""Excitation publisher node: moves an arm along an excitation, supervises and stops it."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ from std_msgs.msg import String
 
 class ExcitationPublisherNode(ArmidNode):
     """
-    Sends an excitation to a real or simulated trajectory controller.
+    Node that moves a real or simulated arm along an excitation, and supervises the motion.
 
     The run is sent as a goal of the action follow_joint_trajectory if a controller offers the
     action, else as a message. The arm must be at rest at the start. It moves slowly from its
@@ -57,16 +57,16 @@ class ExcitationPublisherNode(ArmidNode):
         **kwargs: Any,
     ) -> None:
         """
-        Make the node.
+        Make the node; the arm does not move before the start of a run.
 
         Parameters
         ----------
         excitation : Excitation, optional
-            Excitation to run; by default described by the parameters.
+            Excitation to run; by default that of the parameters.
         planner : TransferPlanner, optional
-            Plans the path to the excitation; by default for the robot that the parameters name.
+            Plans the path to the excitation; by default for the robot of the parameters.
         **kwargs
-            Keyword arguments of rclpy's Node.
+            Further arguments of rclpy's Node.
 
         """
         super().__init__('excitation_publisher', **kwargs)
@@ -96,10 +96,10 @@ class ExcitationPublisherNode(ArmidNode):
         )
         for service in (self.start, self.rehearse, self.stop):
             self.offer(f'~/{service.__name__}', service)
-        self._timer = self.look_every(0.05, self.look)
+        self._timer = self.create_steady_timer(0.05, self.poll)
 
     def parameters(self) -> Sequence[NodeParameter]:
-        """Return the parameters; for a simulation some defaults differ."""
+        """Return the parameters of the node; some defaults are different for a simulation."""
         declare(self, (SIMULATION,))
         table = [p for p in super().parameters() if p is not SIMULATION]
         self._simulated = bool(self.value('simulation') or self.value('use_sim_time'))
@@ -111,27 +111,27 @@ class ExcitationPublisherNode(ArmidNode):
 
     @property
     def duration(self) -> float:
-        """Return the duration of the run with its approach [s]."""
+        """Return the duration of the approach and the excitation together [s]."""
         if self._gate is not None:
             return self._gate.run.duration
         return float(self.value('approach') + self._excitation.sampled_duration(self._rate))
 
     @property
     def readers(self) -> int:
-        """Return the number of subscriptions to joint_trajectory."""
+        """Return the number of subscribers to joint_trajectory."""
         return self._controller.readers
 
     @property
     def last_stamp_ns(self) -> int:
-        """Return the oldest stamp of the accepted joint positions [ns]."""
+        """Return the oldest stamp of the present joint positions [ns]."""
         return self._arm.monitor.last_stamp_ns
 
     @property
     def elapsed(self) -> float | None:
         """
-        Return the time since the start of the approach [s]; None without a run.
+        Return the time since the start of the present run [s]; None without a run.
 
-        A goal is under way until the controller reports its end.
+        A run begins with the approach. A goal is under way until the controller reports its end.
 
         """
         if self._gate is None:
@@ -140,9 +140,9 @@ class ExcitationPublisherNode(ArmidNode):
         on_the_way = elapsed < self._gate.run.duration or self._controller.under_way
         return elapsed if on_the_way else None
 
-    def look(self) -> None:
-        """Start the run when controller and joint states are there; stop it if either is lost."""
-        self._controller.look()
+    def poll(self) -> None:
+        """Start the run once controller and joint states are available; stop it if one is lost."""
+        self._controller.poll()
         now, patience = self._arm.now(), self.value('state_timeout')
         if self.elapsed is not None:
             # no joint states were processed while the path was planned
@@ -150,22 +150,30 @@ class ExcitationPublisherNode(ArmidNode):
             lost = lost or self._arm.monitor.contradiction(now)
             lost = lost or self._controller.trouble(patience)
             if lost:
-                self._give_up(lost)
+                self._abort(lost)
             return
         if self._gate is not None:
-            self._end_complete(self._gate)
-        self._watch_ending()
+            self._finish_run(self._gate)
+        self._supervise_ending()
         if self._rehearsal is not None:
-            self._end_rehearsal(self._rehearsal)
+            self._report_rehearsal(self._rehearsal)
         elif self._waiting:
-            self._look_for_partners()
+            missing = self._fault_at_start() or self._controller.missing
+            if not missing:
+                try:
+                    self.start()
+                except TrajectoryError as error:
+                    self._log_trouble(f'not started: {error}')
+            elif time.monotonic() > self._deadline:
+                self._waiting = False
+                self.get_logger().warning(f'{missing}; call ~/start when this is solved')
 
     def start(self) -> str:
-        """Plan the path from the measured position, and send the run."""
+        """Plan the path from the measured position, and start the run."""
         return self._start(self.value('speed_scaling'))
 
     def rehearse(self) -> str:
-        """Run the excitation slowly; afterwards the status reports tracking errors and torques."""
+        """Run the excitation slowly, and report tracking errors and torques afterwards."""
         speed = min(self.value('rehearsal_speed'), self.value('speed_scaling'))
         text = self._start(speed)
         assert self._gate is not None
@@ -173,12 +181,13 @@ class ExcitationPublisherNode(ArmidNode):
         return f'rehearsal at {100.0 * speed:.0f} % of the speed: {text}'
 
     def _start(self, speed: float) -> str:
+        """Plan a run at a share of the planned speed, and send it to the controller."""
         self._waiting = False
         if self.elapsed is not None:
             raise TrajectoryError('the excitation is under way; ~/stop ends it')
         fault, begin = self._fault_at_start(), self._arm.monitor.pose.q
         if fault:
-            raise TrajectoryError(f'{fault}; the arm is not started')
+            raise TrajectoryError(f'the arm is not started: {fault}')
         planned = plan_run(
             self._excitation.at_speed(speed, self._rate),
             self._planner,
@@ -199,7 +208,7 @@ class ExcitationPublisherNode(ArmidNode):
         # a controller covers 0.01 rad or m before the first waypoint, within `HANDOVER_TIME`
         fault = fault or tracking_fault(pose.joints, units, begin, pose.q, 0.01)
         if fault:
-            raise TrajectoryError(f'{fault}, during planning; the arm is not started')
+            raise TrajectoryError(f'the arm is not started: during planning, {fault}')
         now = self.get_clock().now()
         if not self.value('zero_stamp'):
             message.header.stamp = now.to_msg()
@@ -210,45 +219,45 @@ class ExcitationPublisherNode(ArmidNode):
         self._gate, self._ending, self._rehearsal = gate, None, None
         self._overloads, self._trouble, self._rehearsed = 0, '', ''
         self._runs, self._outcome = self._runs + 1, 'complete'  # unless the run is stopped
-        return self.tell(
-            f'a run of {planned.duration:g} s, {planned.approach.duration:.1f} s of it to get '
-            f'there, sent to {receiver}'
+        return self.log(
+            f'sent a run of {planned.duration:g} s, with {planned.approach.duration:.1f} s of '
+            f'approach, to {receiver}'
         )
 
     def _fault_at_start(self) -> str:
-        """Return why the joint states do not permit a start; empty if they do."""
+        """Return why the joint states do not permit a start; empty if they permit it."""
         patience = self.value('state_timeout')
         difference = patience if self.value('simulation') else 0.1 * self.value('stopping')
         difference = math.inf if self.value('zero_stamp') else difference
         return self._arm.fault_at_start(patience, difference, self._simulated)
 
     def stop(self) -> str:
-        """Stop the arm on its path."""
+        """Stop the arm on its path, or again if it still moves after a stop."""
         self._waiting = False
         if self._gate is not None:
             elapsed = self._arm.now() - self._begun
-            self._end_run('stopped by ~/stop')
-            return self.tell(f'stopped {elapsed:.2f} s after the start')
-        ending = self._released()
+            self._stop_run('stopped by ~/stop')
+            return self.log(f'stopped {elapsed:.2f} s after the start')
+        ending = self._current_ending()
         if ending is None:
             raise TrajectoryError('no excitation is running')
         if ending.last is None:
-            raise TrajectoryError(f'{ending.reason}; that client moves the arm, so stop it there')
+            raise TrajectoryError(f'{ending.reason}; stop the arm with the client that moves it')
         now, limits = self._arm.now(), map(self.value, ('tracking_tolerance', 'stopping'))
         motion = ending.stopped_again(self._arm.monitor, now, *limits)
         if motion is None:
-            return self.tell('the stop was sent before')
+            return self.log('the stop was sent before')
         self._ending = replace(ending, last=motion, sent=now)
-        self._controller.insist(write_trajectory(motion))
-        return self.tell('the arm was still on its path, and was stopped again')
+        self._controller.send_stop_again(write_trajectory(motion))
+        return self.log('the arm was still on its path, and was stopped again')
 
     @property
     def activity(self) -> str:
-        """Return 'running' during a run, else the result of the last run."""
+        """Return 'running' during a run, otherwise the result of the last run."""
         return 'running' if self.elapsed is not None else self._outcome
 
     def condition(self) -> tuple[str, Mapping[str, object]]:
-        """Return the state and progress of the run."""
+        """Return the problem and the progress of the present run."""
         elapsed = self.elapsed
         values = {
             'running': int(elapsed is not None),
@@ -266,7 +275,7 @@ class ExcitationPublisherNode(ArmidNode):
         return self._trouble or waiting or self._rehearsed, values
 
     def check(self, values: Mapping[str, Any]) -> None:
-        """Raise a TrajectoryError if a new excitation file cannot be used."""
+        """Raise a TrajectoryError if the new excitation file cannot be used now."""
         if 'file' not in values:
             return
         with reading("parameter 'file'", TrajectoryError):
@@ -275,7 +284,7 @@ class ExcitationPublisherNode(ArmidNode):
             self._loaded(values['file'])
 
     def changed(self, names: frozenset[str]) -> None:
-        """Load the excitation of a changed parameter file."""
+        """Load the excitation file after a change of the parameter `file`."""
         if 'file' in names:
             self._excitation = self._loaded(self.value('file'))
 
@@ -285,8 +294,8 @@ class ExcitationPublisherNode(ArmidNode):
         return checked(load_excitation(path), self._planner, path)
 
     def close(self) -> None:
-        """Stop the arm unless it is at rest, and wait until the message has arrived."""
-        ending = self._released()
+        """Stop the arm unless it is at rest, and wait until the stop has arrived."""
+        ending = self._current_ending()
         sent = self._gate is not None or (ending is not None and ending.last is not None)
         if sent and self.context.ok():
             self.stop()
@@ -298,8 +307,8 @@ class ExcitationPublisherNode(ArmidNode):
         self._controller.close()
         super().destroy_node()
 
-    def surviving(self, callback: Callable[..., Any], what: str) -> Callable[..., Any]:
-        """Return a callback that stops the arm after an unexpected exception."""
+    def guarded(self, callback: Callable[..., Any], source: str) -> Callable[..., Any]:
+        """Return a callback whose unexpected exceptions stop the arm, and are logged."""
 
         @wraps(callback)
         def stopping(*args: Any) -> Any:
@@ -309,17 +318,17 @@ class ExcitationPublisherNode(ArmidNode):
                 raise
             except Exception as error:
                 if self.context.ok() and getattr(self, '_gate', None) is not None:
-                    self._give_up(f'{what}: {type(error).__name__}: {error}')
+                    self._abort(f'{source}: {type(error).__name__}: {error}')
                 raise
 
-        return super().surviving(stopping, what)
+        return super().guarded(stopping, source)
 
     def _on_state(self, now: float) -> None:
-        """Compare the measured position and effort with the run."""
+        """Compare the measured positions and efforts with the run; stop the arm if they differ."""
         if 0.0 <= now - self._tracked < 0.005:  # often enough
             return
         self._tracked = now
-        self._watch_ending()
+        self._supervise_ending()
         elapsed = self.elapsed
         if elapsed is None or self._gate is None:
             return
@@ -339,26 +348,16 @@ class ExcitationPublisherNode(ArmidNode):
         overload = self._gate.overload(effort, self.value('effort_factor'))
         self._overloads = self._overloads + 1 if overload else 0
         if contradiction or fault or self._overloads >= 3:
-            self._give_up(contradiction or fault or overload, blocked=not contradiction)
+            self._abort(contradiction or fault or overload, blocked=not contradiction)
 
-    def _look_for_partners(self) -> None:
-        missing = self._fault_at_start() or self._controller.missing
-        if not missing:
-            try:
-                self.start()
-            except TrajectoryError as error:
-                self._say_trouble(f'not started: {error}')
-        elif time.monotonic() > self._deadline:
-            self._waiting = False
-            self.get_logger().warning(f'{missing}; call ~/start when this is solved')
-
-    def _give_up(self, reason: str, *, blocked: bool = False) -> None:
-        """Stop the arm on its path; a blocked arm is held at its position."""
+    def _abort(self, reason: str, *, blocked: bool = False) -> None:
+        """Stop the arm and log the reason; a blocked arm is held at its position."""
         elapsed = self._arm.now() - self._begun
-        self._end_run(reason, blocked)
-        self._say_trouble(f'stopped {elapsed:.2f} s after the start: {reason}')
+        self._stop_run(reason, blocked)
+        self._log_trouble(f'stopped {elapsed:.2f} s after the start: {reason}')
 
-    def _end_run(self, reason: str, blocked: bool = False) -> None:
+    def _stop_run(self, reason: str, blocked: bool = False) -> None:
+        """Send the motion that stops the arm on its path, or holds a blocked arm."""
         gate, now = self._gate, self._arm.now()
         self._gate = self._rehearsal = None
         self._outcome = 'stopped'
@@ -366,72 +365,72 @@ class ExcitationPublisherNode(ArmidNode):
         measured = self._arm.monitor.pose.q, self._arm.monitor.velocity()
         motion = gate.stop(now - self._begun, self.value('stopping'), *measured)
         self._ending = replace(self._ending, last=motion)
-        self._controller.bring_to_rest(write_trajectory(motion))
+        self._controller.send_stop(write_trajectory(motion))
 
-    def _released(self) -> Ending | None:
-        """Return the ended run; it has no motion to send if another client moves the arm."""
+    def _current_ending(self) -> Ending | None:
+        """Return the last ended run, without its stop motion if another client moves the arm."""
         ending = self._ending
         if ending is not None and self._controller.taken:
             self._ending = replace(ending, last=None) if ending.reason else None
         return self._ending
 
-    def _watch_ending(self) -> None:
-        """Check that the arm comes to rest; hold a blocked arm at its position."""
-        ending = self._released()
+    def _supervise_ending(self) -> None:
+        """Check that the arm comes to rest after a run; hold a blocked arm at its position."""
+        ending = self._current_ending()
         if ending is None:
             return
         limits = map(self.value, ('state_timeout', 'tracking_tolerance', 'stopping'))
         self._ending, motion, report = ending.updated(self._arm.monitor, self._arm.now(), *limits)
         if motion is not None:
-            self._controller.insist(write_trajectory(motion))
+            self._controller.send_stop_again(write_trajectory(motion))
         if report:
-            self._say_trouble(report)
+            self._log_trouble(report)
 
-    def _end_complete(self, gate: MotionGate) -> None:
+    def _finish_run(self, gate: MotionGate) -> None:
         self._gate, end = None, gate.run.at([gate.run.duration])
         self._ending = Ending(gate, self._begun, replace(end, t=np.zeros(1)), self._arm.now(), '')
-        self.tell(f'run complete: {gate.run.duration:.1f} s, approach included')
+        self.log(f'run complete: {gate.run.duration:.1f} s, approach included')
 
     def _on_goal_ended(self, reason: str) -> None:
-        """Handle the result of the controller; the reason is empty after a complete run."""
+        """Process the end of a goal of the controller; `reason` is empty after a complete run."""
         gate, elapsed = self._gate, self._arm.now() - self._begun
         if gate is None:  # the run was stopped before
             ending = self._ending
             if reason and ending is not None and ending.last is not None and not ending.warned:
-                self._say_trouble(
+                self._log_trouble(
                     f'the stop failed: {reason}; if the arm still moves, use the emergency stop'
                 )
             return
         if reason:
             self._gate, self._rehearsal, self._outcome = None, None, 'stopped'
             self._ending = Ending(gate, self._begun, None, self._arm.now(), reason)
-            self._say_trouble(f'stopped {elapsed:.2f} s after the start: {reason}')
+            self._log_trouble(f'stopped {elapsed:.2f} s after the start: {reason}')
         elif elapsed < gate.run.duration - self.value('state_timeout'):
-            self._give_up(f'the controller reported the end of a run of {gate.run.duration:.1f} s')
+            self._abort(f'the controller reported the end of a run of {gate.run.duration:.1f} s')
         else:
-            self._end_complete(gate)
+            self._finish_run(gate)
 
-    def _end_rehearsal(self, rehearsal: Rehearsal) -> None:
-        """Report the result of the rehearsal and the next step."""
+    def _report_rehearsal(self, rehearsal: Rehearsal) -> None:
+        """Log the tracking errors and torques of a rehearsal, and the next step."""
         self._rehearsal = None
         report, surprises = rehearsal.report()
         if surprises:
-            self._say_trouble(f'rehearsed: {report}; look into it before ~/start')
+            self._log_trouble(f'rehearsed: {report}; find the cause before ~/start')
         else:
             advice = f'~/start runs it at {100.0 * self.value("speed_scaling"):.0f} % of its speed'
-            self._rehearsed = self.tell(f'rehearsed: {report}; {advice}')
+            self._rehearsed = self.log(f'rehearsed: {report}; {advice}')
 
     def _on_experiment(self, message: String) -> None:
-        """Take an excitation from the topic experiment; only ~/start runs it."""
+        """Load the excitation of a message on experiment; only ~/start runs it."""
         if self.elapsed is not None or self._waiting:
             raise TrajectoryError(
                 'an excitation is under way or begins soon; the new excitation is ignored'
             )
         excitation = read_excitation(message.data, self._experiments.topic_name)
         self._excitation = checked(excitation, self._planner, self._experiments.topic_name)
-        self.tell(f'took an excitation of {self._excitation.duration:g} s; ~/start runs it')
+        self.log(f'received an excitation of {self._excitation.duration:g} s; ~/start runs it')
 
-    def _say_trouble(self, text: str) -> None:
+    def _log_trouble(self, text: str) -> None:
         self._trouble = text
         self.get_logger().error(text)
 

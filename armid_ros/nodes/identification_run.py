@@ -25,31 +25,31 @@ from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.task import Future
 from std_srvs.srv import Trigger
 
-#: Folder and document of the results of each command, their schema, and the reported keys.
+#: Result folder of each command, schema of its JSON file, and the reported keys of the file.
 _RESULTS = {
     'identify': ('identification', IDENTIFICATION, ('grade',)),
     'diagnose': ('diagnosis', DIAGNOSIS, ('verdict', 'summary')),
 }
-#: A program: its command and arguments.
+#: An armid command with its arguments.
 Program = tuple[str, ...]
-#: Name of the step, and a function that returns whether its condition is met.
+#: Name of a step, and a function that returns whether the next step may begin.
 Wait = tuple[str, Callable[[], Any]]
 
 
 def start_program(program: Program) -> subprocess.Popen[bytes]:
-    """Start an armid command in its own process."""
+    """Start an armid command in its own process, and return the process."""
     return subprocess.Popen([sys.executable, '-P', '-m', 'armid_ros.cli', *program])
 
 
 class IdentificationRunNode(ArmidNode):
     """
-    Runs a complete identification, from excitation to report, and ends.
+    Node that runs a complete identification, from the excitation to the reports, and ends.
 
     The node calls `recorder` and `excitation_publisher` for each run. After all runs it starts
     `armid identify` and `armid diagnose` on the recordings. The last of several runs is held out.
     An error is logged and ends the node with code 2; recordings and results so far are kept.
-    Inputs are checked before the arm moves. When it ends, the node stops the run and the
-    recording that it started.
+    Inputs are checked before the arm moves. At its end, the node stops the run and the recording
+    that it started.
 
     """
 
@@ -77,8 +77,8 @@ class IdentificationRunNode(ArmidNode):
         NodeParameter(
             'patience',
             300.0,
-            'How long to wait for the other nodes, of which one may have to design an excitation '
-            'first, and for a controller and joint states.',
+            'How long to wait for the other nodes, a controller and joint states; the publisher '
+            'may first have to design an excitation.',
             's',
             limits=(1.0, 3600.0),
         ),
@@ -86,7 +86,7 @@ class IdentificationRunNode(ArmidNode):
 
     def __init__(self, start: Callable[[Program], Any] = start_program, **kwargs: Any) -> None:
         """
-        Make the node; ``start`` starts a program, by default in its own process.
+        Make the node; ``start`` starts an armid command, by default in its own process.
 
         Raises
         ------
@@ -121,20 +121,20 @@ class IdentificationRunNode(ArmidNode):
         self.create_subscription(DiagnosticArray, '/diagnostics', self._on_diagnostics, 100)
         self._script = self._steps()
         self._wait: Wait = ('begins', lambda: True)
-        self.look_every(0.05, self.look)
+        self.create_steady_timer(0.05, self.poll)
 
     @property
     def finished(self) -> bool:
-        """Return whether all steps are done, or one has failed."""
+        """Whether all steps are done, or one step has failed."""
         return self._done
 
     @property
     def failure(self) -> str:
-        """Return the error of the failed step; empty if none failed."""
+        """Return the error of the failed step; empty if no step failed."""
         return self._failure
 
-    def look(self) -> None:
-        """Start the next step if the condition of the present step is met."""
+    def poll(self) -> None:
+        """Start the next step as soon as the present step is complete."""
         if self._done:
             return
         try:
@@ -151,14 +151,14 @@ class IdentificationRunNode(ArmidNode):
             self._stop_all()
 
     def condition(self) -> tuple[str, Mapping[str, object]]:
-        """Return the present step and the results so far."""
+        """Return the last error, the present step and the results so far."""
         return self._failure or self._refused, {
             'step': self._step,
             'results': '; '.join(self._results),
         }
 
     def close(self) -> None:
-        """Stop the run, the recording and the program that this node started."""
+        """Stop the run, the recording and the armid command that this node started."""
         self._stop_all()
         for future in self._stops:
             if self.executor is not None:  # the node to stop may have ended already
@@ -171,54 +171,57 @@ class IdentificationRunNode(ArmidNode):
                 self._program.kill()
 
     def _stop_all(self) -> None:
-        """Stop the run and then the recording that this node started."""
+        """Stop first the run and then the recording that this node started."""
         for node in sorted(self._begun):
             if self._callers[node, 'stop'].service_is_ready():
                 self._stops.append(self._call(node, 'stop'))
         self._begun = []
 
     def _steps(self) -> Iterator[Wait]:
-        """Yield the conditions of all steps in order."""
+        """Yield the name of each step, with the condition to wait for."""
         deadline = time.monotonic() + self.value('patience')
         yield (
             'waits for the other nodes',
             lambda: not self._missing() or time.monotonic() > deadline,
         )
         if self._missing():
-            raise ArmidError(f'{" and ".join(self._missing())} did not start in time')
+            raise ArmidError(
+                f'{" and ".join(self._missing())} did not start within patience, '
+                f'{self.value("patience"):g} s'
+            )
         if self.value('rehearse'):
-            yield from self._excited('rehearse')
+            yield from self._run_excitation('rehearse')
         bags = []
         for number in range(self.value('runs')):
-            answer = yield from self._called('recorder', 'start')
+            answer = yield from self._call_service('recorder', 'start')
             self._begun.append('recorder')
             bags.append(answer.removeprefix('recording into '))
-            yield from self._excited('start', f'run {number + 1} of {self.value("runs")}')
-            yield from self._called('recorder', 'stop')
+            yield from self._run_excitation('start', f'run {number + 1} of {self.value("runs")}')
+            yield from self._call_service('recorder', 'stop')
             self._begun.remove('recorder')
         folder = Path(self.value('save_to')).expanduser()
-        yield from self._ended('identify', folder, bags)
+        yield from self._run_command('identify', folder, bags)
         if self.value('diagnose'):
             model = ('--model', str(folder / 'identification' / 'model.yaml'))
-            yield from self._ended('diagnose', folder, bags, *model)
+            yield from self._run_command('diagnose', folder, bags, *model)
 
-    def _excited(self, service: str, what: str = 'rehearsal') -> Iterator[Wait]:
-        """Start a run, with retries until the timeout, and wait until it ends."""
+    def _run_excitation(self, service: str, name: str = 'rehearsal') -> Iterator[Wait]:
+        """Call a service of the publisher until it starts a run, and wait for its end."""
         before = int(self._state.get('runs', 0))
         deadline = time.monotonic() + self.value('patience')
         while True:
             future = self._call('publisher', service)
-            yield f'{what} is planned', future.done
+            yield f'{name} is planned', future.done
             answer = future.result()
-            self._refused = '' if answer.success else f'{what}: {answer.message}'
+            self._refused = '' if answer.success else f'{name}: {answer.message}'
             if answer.success:
                 break
-            self.complaints.say('start', self._refused)
+            self.complaints.add('start', self._refused)
             self.publish_diagnostics()
             if time.monotonic() > deadline:
                 raise TrajectoryError(self._refused)
             later = time.monotonic() + 1.0
-            yield f'{what} is planned', lambda later=later: time.monotonic() > later
+            yield f'{name} is planned', lambda later=later: time.monotonic() > later
 
         def over() -> bool:
             state = self._state
@@ -228,18 +231,18 @@ class IdentificationRunNode(ArmidNode):
             return rehearsed or service != 'rehearse'
 
         self._begun.append('publisher')
-        yield f'{what} is under way', over
+        yield f'{name} is under way', over
         self._begun.remove('publisher')
         if self._state['run'] != 'complete':
-            raise TrajectoryError(f'{what}: {self._state["message"]}')
+            raise TrajectoryError(f'{name}: {self._state["message"]}')
         if service == 'rehearse':
             report = self._state['message']
             self.get_logger().info(report)
-            if 'look into it' in report:
+            if 'find the cause' in report:
                 raise TrajectoryError(report)
 
-    def _called(self, node: str, service: str) -> Any:
-        """Call a service, and return its answer."""
+    def _call_service(self, node: str, service: str) -> Any:
+        """Call a service of another node, wait for its answer, and return the answer."""
         future = self._call(node, service)
         yield self._step, future.done
         answer = future.result()
@@ -247,8 +250,10 @@ class IdentificationRunNode(ArmidNode):
             raise RecordingError(f'{self._full[node]}: {answer.message}')
         return str(answer.message)
 
-    def _ended(self, command: str, folder: Path, bags: list[str], *more: str) -> Iterator[Wait]:
-        """Run an armid command on the bags, and wait for its end."""
+    def _run_command(
+        self, command: str, folder: Path, bags: list[str], *more: str
+    ) -> Iterator[Wait]:
+        """Run an armid command on the recordings, and wait for its end."""
         fitted, held_out = (bags[:-1], bags[-1:]) if len(bags) > 1 else (bags, [])
         validate = [part for bag in held_out for part in ('--validate', bag)]
         options = {name: self.value(name) for name in ('robot', 'gravity')}
@@ -275,7 +280,7 @@ class IdentificationRunNode(ArmidNode):
         self._results.append(f'{command}: {result or "done"} ({out / "report.html"})')
 
     def _missing(self) -> list[str]:
-        """Return the names of the nodes that are not available."""
+        """Return the names of the nodes whose services are not available."""
         return [
             name
             for node, name in self._full.items()

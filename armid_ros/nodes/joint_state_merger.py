@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Joint state merger node: merges positions and torques of several topics."""
+"""Joint state merger node: merges positions and torques of several topics into one."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ _EFFORTS = (
 
 class JointStateMergerNode(ArmidNode):
     """
-    Merges the messages of several senders into joint states of all joints.
+    Node that merges joint states and torques of several topics into one topic.
 
     Positions may come from several topics, each with some of the joints. Torques may come from a
     separate topic, as efforts or as currents that are multiplied by gains. All values are
@@ -76,7 +76,7 @@ class JointStateMergerNode(ArmidNode):
     )
 
     def __init__(self, **kwargs: Any) -> None:
-        """Make the node with keyword arguments of rclpy's Node."""
+        """Make the node; further arguments are those of rclpy's Node."""
         super().__init__('joint_state_merger', **kwargs)
         self.joints: tuple[str, ...] = ()
         self._published = 0
@@ -85,25 +85,25 @@ class JointStateMergerNode(ArmidNode):
         self._states = self.create_publisher(JointState, '~/joint_states', SAMPLES)
         self._topics = self.value('position_topics')
         if not self._topics:
-            raise ParameterError("parameter 'position_topics' names no topic")
+            raise ParameterError("the parameter 'position_topics' is empty: name a topic")
         own = not self.value('effort_topic')
         self._positions = [
             MatchedSubscription(self, JointState, topic, partial(self._on_positions, own))
             for topic in self._topics
         ]
         if self.value('joints'):
-            self._adopt(self.value('joints'))
+            self._set_joints(self.value('joints'))
         else:
             self.create_subscription(
                 String,
                 'robot_description',
-                lambda message: self._adopt(robot_from_urdf(message.data).joints),
+                lambda message: self._set_joints(robot_from_urdf(message.data).joints),
                 LATCHED,
             )
-        self.look_every(LOOK_PERIOD, self.look)
+        self.create_steady_timer(LOOK_PERIOD, self.poll)
 
-    def look(self) -> None:
-        """Subscribe to topics that have appeared."""
+    def poll(self) -> None:
+        """Subscribe to the topics that have publishers now."""
         for subscription in self._positions:
             subscription.match()
         topic = self.value('effort_topic')
@@ -115,14 +115,15 @@ class JointStateMergerNode(ArmidNode):
             if types:
                 if types[0] not in _EFFORTS:
                     raise RecordingError(
-                        f'{types[0]} holds no efforts; types with efforts: {", ".join(_EFFORTS)}'
+                        f'{full} has the type {types[0]}, which contains no torques; use one of '
+                        f'{", ".join(_EFFORTS)}'
                     )
                 self._efforts = MatchedSubscription(
                     self, message_class(types[0]), topic, self._on_efforts
                 )
 
     def condition(self) -> tuple[str, Mapping[str, object]]:
-        """Return the missing joints and the number of published messages."""
+        """Return the joints without positions or torques, and the number of published messages."""
         values: dict[str, object] = {'published': self._published}
         if not self.joints:
             return 'waiting for robot_description', values
@@ -139,14 +140,14 @@ class JointStateMergerNode(ArmidNode):
         ]
         return '; '.join(lacking) or 'the senders do not share their time', values
 
-    def _adopt(self, joints: Sequence[str]) -> None:
+    def _set_joints(self, joints: Sequence[str]) -> None:
         if tuple(joints) == self.joints:
             return
         others = self.value('effort_joints')
         if len(others) not in (0, len(joints)):
             raise ParameterError(
-                f"parameter 'effort_joints' has {len(others)} names, but there are {len(joints)} "
-                f'joints: {", ".join(joints)}'
+                f"the parameter 'effort_joints' has {len(others)} names, but there are "
+                f'{len(joints)} joints: {", ".join(joints)}'
             )
         self._gains = per_joint(self.value('gains'), joints, "parameter 'gains'")
         self.joints = tuple(joints)
@@ -154,7 +155,7 @@ class JointStateMergerNode(ArmidNode):
         self._merger = JointMerger(2 * len(joints))  # first positions, then torques
 
     def _on_positions(self, with_effort: bool, message: JointState) -> None:
-        stamp = self._stamp(message.header.stamp)
+        stamp = self._stamp_ns(message.header.stamp)
         if not self.joints:
             return
         self._lag_ns = self.get_clock().now().nanoseconds - stamp
@@ -170,15 +171,15 @@ class JointStateMergerNode(ArmidNode):
         }
         some = tuple(k for k, joint in enumerate(self.joints) if joint in rows)
         if some:
-            self._take(some, stamp, np.array([rows[self.joints[k]] for k in some]).T)
+            self._merge(some, stamp, np.array([rows[self.joints[k]] for k in some]).T)
         if with_effort and message.effort:
             known = dict(zip(message.name, message.effort, strict=False))
-            self._take_efforts(stamp, known, self.joints)
+            self._merge_torques(stamp, known, self.joints)
 
     def _on_efforts(self, message: Any) -> None:
         header = getattr(message, 'header', None)
         now = self.get_clock().now().nanoseconds - self._lag_ns
-        stamp = now if header is None else self._stamp(header.stamp)
+        stamp = now if header is None else self._stamp_ns(header.stamp)
         if hasattr(message, 'interface_values'):
             interface, parts = self.value('effort_interface'), message.interface_values
             known = {
@@ -189,8 +190,8 @@ class JointStateMergerNode(ArmidNode):
             if not known:
                 there = sorted({name for part in parts for name in part.interface_names})
                 raise RecordingError(
-                    f"efforts: no joint has the interface '{interface}'; interfaces are "
-                    f'{", ".join(there)}'
+                    f"no joint of effort_topic has the interface '{interface}'; its interfaces "
+                    f'are {", ".join(there)}'
                 )
         else:
             names, values = self._effort_names, getattr(message, 'data', None)
@@ -198,24 +199,28 @@ class JointStateMergerNode(ArmidNode):
                 names, values = message.name, message.effort
             if len(values) != len(names):
                 raise RecordingError(
-                    f'efforts: {len(values)} values for {len(names)} names ({", ".join(names)})'
+                    f'a message of effort_topic has {len(values)} values for {len(names)} '
+                    f'joints: {", ".join(names)}'
                 )
             known = dict(zip(names, values, strict=True))
-        self._take_efforts(stamp, known, self._effort_names)
+        self._merge_torques(stamp, known, self._effort_names)
 
-    def _take_efforts(self, stamp: int, known: Mapping[str, float], called: Sequence[str]) -> None:
+    def _merge_torques(
+        self, stamp: int, known: Mapping[str, float], called: Sequence[str]
+    ) -> None:
+        """Merge torques or currents, whose joints have the names `called`."""
         n = len(self.joints)
         some = [k for k, name in enumerate(called) if math.isfinite(known.get(name, math.nan))]
         if not some:
             raise RecordingError(
-                f'the message has torques of {", ".join(known)}, but of none of '
+                f'a message has torques of {", ".join(known)}, but of none of the joints '
                 f'{", ".join(called)}'
             )
         torques = np.array([known[called[k]] for k in some]) * self._gains[some]
-        self._take(tuple(n + k for k in some), stamp, np.vstack([torques, torques]))
+        self._merge(tuple(n + k for k in some), stamp, np.vstack([torques, torques]))
 
-    def _take(self, some: tuple[int, ...], stamp: int, values: FloatArray) -> None:
-        """Add values of some joints, and publish the samples that are now complete."""
+    def _merge(self, some: tuple[int, ...], stamp: int, values: FloatArray) -> None:
+        """Merge values of some joints, and publish the samples that are complete now."""
         n = len(self.joints)
         # a float has too few digits for seconds since 1970
         self._epoch_ns = self._epoch_ns or stamp
@@ -228,8 +233,8 @@ class JointStateMergerNode(ArmidNode):
             self._states.publish(message)
             self._published += 1
 
-    def _stamp(self, stamp: Any) -> int:
-        """Return a stamp [ns]; the time of reception if the stamp is zero."""
+    def _stamp_ns(self, stamp: Any) -> int:
+        """Return the stamp of a message [ns]; the time of reception if the stamp is zero."""
         return stamp.sec * 10**9 + stamp.nanosec or self.get_clock().now().nanoseconds
 
 

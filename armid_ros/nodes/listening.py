@@ -40,7 +40,7 @@ ROBOT_PARAMETERS = (
 
 class ListeningNode(ArmidNode):
     """
-    Node that reads the joint states of a robot, given by parameters or robot_description.
+    Node that processes the joint states of one robot, from parameters or robot_description.
 
     Attributes
     ----------
@@ -51,9 +51,9 @@ class ListeningNode(ArmidNode):
     last_stamp_ns : int
         Stamp of the last joint state [ns].
     freshness : Freshness
-        Monitors whether joint states still arrive.
+        Time since the last joint state.
     stamps : StampDifference
-        Monitors the difference of stamps and clock.
+        Difference between stamps and clock.
     reader : JointStateReader
         Decodes joint states; set when the robot is known.
     joint_states : MatchedSubscription
@@ -65,7 +65,7 @@ class ListeningNode(ArmidNode):
     joint_states: MatchedSubscription
 
     def __init__(self, name: str, **kwargs: Any) -> None:
-        """Make the node with keyword arguments of rclpy's Node."""
+        """Make the node; further arguments are those of rclpy's Node."""
         super().__init__(name, **kwargs)
         self.robot: Robot | None = None
         self.received = self.last_stamp_ns = 0
@@ -76,44 +76,44 @@ class ListeningNode(ArmidNode):
 
     @abstractmethod
     def take_description(self, urdf: str) -> None:
-        """Handle a new robot_description."""
+        """Process a robot_description that has changed."""
 
     @abstractmethod
     def take_sample(self, sample: JointSample) -> None:
-        """Handle a joint state of all joints of the robot."""
+        """Process a joint state with all joints of the robot."""
 
     def adopt(self, robot: Robot) -> None:
-        """Start to read the joint states of a robot."""
+        """Process the joint states of a robot from now on."""
         self.robot = robot
         self.reader = JointStateReader(robot.joints, self.complaints, self.get_clock())
 
     def listen(self) -> None:
-        """Subscribe to joint_states, and to robot_description while the robot is not known."""
+        """Subscribe to joint_states, and to robot_description if the robot is not known."""
         if self.robot is None:
             self.create_subscription(String, 'robot_description', self._on_description, LATCHED)
         self.joint_states = MatchedSubscription(
             self, JointState, 'joint_states', self.take_joint_states, raw=True
         )
-        self.look_every(LOOK_PERIOD, self.look)
+        self.create_steady_timer(LOOK_PERIOD, self.poll)
 
     @property
     def hardware(self) -> str:
-        """Name of the robot."""
+        """Return the name of the robot, for diagnostics."""
         return '' if self.robot is None else str(self.robot.name)
 
     @property
     def awaited(self) -> str:
-        """Return the input that the node waits for; empty if all inputs have arrived."""
+        """Return a text on the input that the node waits for; empty if all have arrived."""
         if self.robot is None:
             return 'waiting for robot_description'
         return '' if self.received else 'no joint states so far'
 
     def level(self, troubled: bool) -> bytes:
-        """Return STALE if joint states have stopped."""
+        """Return the diagnostics level STALE if joint states have stopped."""
         return DiagnosticStatus.STALE if self.freshness.stopped else super().level(troubled)
 
     def stream_trouble(self) -> str:
-        """Return why joint states are missing, or results have wrong stamps; otherwise empty."""
+        """Return a text on missing joint states or wrong stamps; empty if there is no problem."""
         fresh = self.complaints.latest if self.complaints.fresh else ''
         if self.awaited:
             return self.awaited
@@ -123,31 +123,31 @@ class ListeningNode(ArmidNode):
 
     def report(self, reason: str, text: str = '') -> None:
         """
-        Report faulty joint states, with the publishers if two of them can cause the fault.
+        Count and log faulty joint states, with their publishers if these can be the cause.
 
         Parameters
         ----------
         reason : str
             A key of `DISTURBANCES`, or 'spike'.
         text : str
-            Text for a reason that is not a key.
+            Message for a reason that is not a key.
 
         """
         several = self.joint_states.several if reason in SENDER_CONFLICTS else ''
         parts = text or DISTURBANCES[reason], several
-        self.complaints.say(reason, '; '.join(filter(None, parts)))
+        self.complaints.add(reason, '; '.join(filter(None, parts)))
 
-    def look(self) -> None:
-        """Check the publishers, and publish diagnostics if joint states stop or resume."""
+    def poll(self) -> None:
+        """Match the publishers of joint states; report when joint states stop or resume."""
         self.joint_states.match()
         if self.freshness.stopped != self._stopped:
             self._stopped = self.freshness.stopped
             self.publish_diagnostics()
 
     def take_joint_states(self, data: bytes) -> None:
-        """Decode a serialised joint state, and handle its sample."""
+        """Decode a serialised joint state, and process it if it is valid."""
         self.received += 1
-        self.freshness.heard()
+        self.freshness.mark_received()
         self.last_stamp_ns = header_stamp(data)
         self.stamps.take(self.last_stamp_ns)
         if self.robot is not None:
@@ -156,7 +156,7 @@ class ListeningNode(ArmidNode):
                 self.take_sample(sample)
 
     def described_robot(self, description: str | None) -> Robot:
-        """Return the robot of a URDF; without a URDF, the robot that the parameters name."""
+        """Return the robot of a URDF text, or of the parameter robot if the text is None."""
         given = {'gravity': self.value('gravity'), 'joints': self.value('joints') or None}
         if description is None:
             return load_robot(self.value('robot'), **given)

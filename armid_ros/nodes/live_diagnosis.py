@@ -30,14 +30,14 @@ from armid_ros.simulation.plant import require_any_mass
 from diagnostic_msgs.msg import DiagnosticStatus
 from std_msgs.msg import String
 
-#: Diagnostics level of verdicts; WARN for all others.
+#: Diagnostics level of a verdict; WARN for all other verdicts.
 _LEVELS = {
     'consistent': DiagnosticStatus.OK,
     'bad_data': DiagnosticStatus.ERROR,
 }
 
 
-#: Parameters for the fields of LiveSettings; they can be set at run time.
+#: Parameters of the fields of LiveSettings, which can be set at run time.
 LIVE_SETTINGS = (
     setting(
         'window', 20.0, 'Longest diagnosed motion; a change empties it.', 's', limits=(4.0, 600.0)
@@ -64,7 +64,7 @@ LIVE_SETTINGS = (
 
 class LiveDiagnosisNode(ListeningNode):
     """
-    Diagnoses an arm while it moves.
+    Node that diagnoses an arm while it moves, and proposes a patched model.
 
     After enough new motion, a separate process diagnoses the arm, and the result is published on
     ~/diagnosis. If several diagnoses in a row agree, the patched model is published on ~/model,
@@ -109,16 +109,16 @@ class LiveDiagnosisNode(ListeningNode):
         self, live: LiveDiagnosis | None = None, helper: Assistant | None = None, **kwargs: Any
     ) -> None:
         """
-        Make the node.
+        Make the node, and publish the present model.
 
         Parameters
         ----------
         live : LiveDiagnosis, optional
-            Schedules the diagnoses; by default made from the parameters, once the robot is known.
+            Schedule of the diagnoses; by default from the parameters, once the robot is known.
         helper : Assistant, optional
             Computes the diagnoses; by default in a separate process.
         **kwargs
-            Keyword arguments of rclpy's Node.
+            Further arguments of rclpy's Node.
 
         """
         super().__init__('live_diagnosis', **kwargs)
@@ -139,15 +139,15 @@ class LiveDiagnosisNode(ListeningNode):
 
     @property
     def busy(self) -> bool:
-        """Return whether a diagnosis is under way."""
+        """Whether a diagnosis, a file or a motion is being computed."""
         return self._helper.busy
 
     def accept(self) -> str:
-        """Accept the proposed model."""
+        """Use the proposed model in later diagnoses."""
         return self._decide('accepted', self._require().accept)
 
     def reject(self) -> str:
-        """Reject the proposed effects, and do not propose them again."""
+        """Discard the proposed effects, and never propose them again."""
         return self._decide('rejected', self._require().reject)
 
     def _decide(self, decision: str, action: Callable[[], None]) -> str:
@@ -157,31 +157,31 @@ class LiveDiagnosisNode(ListeningNode):
         )
         action()
         self._publish_model()
-        return self.tell(f'{decision}: {named}')
+        return self.log(f'{decision}: {named}')
 
     def reset(self) -> str:
-        """Restart with the original model."""
+        """Restart the diagnosis with the original model."""
         self._require().reset()
         self._publish_model()
         return 'the diagnosis begins anew, with the original model'
 
     def save(self) -> str:
-        """Start to write the last diagnosis; its end is logged."""
-        self._require_diagnosis()
+        """Start to write the files of the last diagnosis; the end is logged."""
+        self._require(diagnosed=True)
         folder = self.folder('save_to')
         refuse_replacing(folder, FILES)
         self._helper.ask('save', folder)
         return f'writing {", ".join(FILES)} to {folder}'
 
     def next_run(self) -> str:
-        """Start to plan the motion that separates the candidates, for ~/experiment."""
-        self._require_diagnosis()
+        """Start to plan the motion that separates the candidates; it is sent to ~/experiment."""
+        self._require(diagnosed=True)
         self._helper.ask('plan', self.value('seed'))
-        return f'planning; the motion goes out on {self._runs.topic_name}'
+        return f'planning a motion; it will be published on {self._runs.topic_name}'
 
-    def look(self) -> None:
-        """Check the publishers of joint states, and handle results of the process."""
-        super().look()
+    def poll(self) -> None:
+        """Match the publishers of joint states, and process results of the diagnosis process."""
+        super().poll()
         self.take_answer()
 
     def take_sample(self, sample: JointSample) -> None:
@@ -189,32 +189,32 @@ class LiveDiagnosisNode(ListeningNode):
         live = self._require()
         learning = live.learning
         late, self._last = self._last - sample.t, sample.t
-        if late >= 0.0:  # a step back of more than 0.1 s is a jump of the clock
+        if late >= 0.0:  # a larger step back than 0.1 s is a jump of the clock
             self._disturbed.add('jump_back' if late > 0.1 else 'out_of_order')
         live.add(*sample)
         if learning and not live.learning:
-            self.tell('the misfit of the model is known; diagnoses begin')
+            self.log('the misfit of the model is known; diagnoses begin')
         if live.due and not self._helper.busy:
             self._helper.ask('diagnose', live.request())
 
     def take_answer(self) -> bool:
-        """Handle a result of the process; return whether there was one."""
+        """Process a result of the diagnosis process; return whether there was a result."""
         result = self._helper.poll()
         if result is None:
             return False
         if isinstance(result, Answer):
             self._take(result)
         elif isinstance(result, IdentificationError):
-            self.complaints.say('diagnosis', str(result))
+            self.complaints.add('diagnosis', str(result))
         else:  # result of saving or planning
             text, excitation = result
-            self.tell(text)
+            self.log(text)
             if excitation:
                 self._runs.publish(String(data=excitation))
         return True
 
     def condition(self) -> tuple[str, Mapping[str, object]]:
-        """Return the state of the diagnosis."""
+        """Return the problem of the diagnosis, and numbers of samples and diagnoses."""
         live = self.live
         if live is None:
             return self.awaited, {'received': self.received}
@@ -237,13 +237,13 @@ class LiveDiagnosisNode(ListeningNode):
         return trouble, values
 
     def further_statuses(self) -> Sequence[DiagnosticStatus]:
-        """Return the status of the last diagnosis."""
+        """Return the last diagnosis, with residuals and found effects, for /diagnostics."""
         if self.live is None:
             return ()
         name = f'{self.get_fully_qualified_name()[1:]}: diagnosis'
         answer = self.live.latest
         status = DiagnosticStatus(
-            name=name, hardware_id=self.hardware, message='nothing diagnosed so far'
+            name=name, hardware_id=self.hardware, message='no diagnosis so far'
         )
         status.level = DiagnosticStatus.OK
         if answer is None:
@@ -251,7 +251,7 @@ class LiveDiagnosisNode(ListeningNode):
         status.level = _LEVELS.get(answer.verdict, DiagnosticStatus.WARN)
         status.message = f'{answer.verdict.replace("_", " ")}: {answer.summary}'
         numbers = {'processor seconds': answer.seconds, 'window': answer.window.duration}
-        for joint, before, after, floor in _gaps(answer):
+        for joint, before, after, floor in _residuals(answer):
             numbers |= {
                 f'gap before {joint} [N m]': before,
                 f'gap after {joint} [N m]': after,
@@ -265,11 +265,11 @@ class LiveDiagnosisNode(ListeningNode):
         return (status,)
 
     def check(self, values: Mapping[str, Any]) -> None:
-        """Raise an IdentificationError if settings do not fit each other."""
+        """Raise an IdentificationError if new settings contradict each other."""
         self._settings(values)
 
     def changed(self, names: frozenset[str]) -> None:
-        """Apply changed settings."""
+        """Apply new settings of the diagnosis."""
         if self.live is not None and names & {entry.name for entry in LIVE_SETTINGS}:
             self.live.use(self._settings({}))
 
@@ -282,12 +282,12 @@ class LiveDiagnosisNode(ListeningNode):
         self._adopt(self._described(urdf))
 
     def _settings(self, values: Mapping[str, Any]) -> LiveSettings:
-        """Return the settings of the parameters, some of them with new values."""
+        """Return the settings that the parameters describe, with some new values."""
         names = (*(entry.name for entry in LIVE_SETTINGS), 'learning')
         return LiveSettings(**{name: values.get(name, self.value(name)) for name in names})
 
     def _described(self, description: str | None = None) -> LiveDiagnosis:
-        """Make the diagnosis that parameters describe, for their robot or for that of a URDF."""
+        """Return the schedule of diagnoses for a URDF text, or for the robot of the parameters."""
         robot = model = None
         if description is not None or self.value('robot'):
             robot = self.described_robot(description)
@@ -305,7 +305,7 @@ class LiveDiagnosisNode(ListeningNode):
         return LiveDiagnosis(arm, settings, baseline=bags, misfit=misfit, seed=seed)
 
     def _take(self, answer: Answer) -> None:
-        """Publish a diagnosis, and the model if it has changed."""
+        """Publish a diagnosis, and the proposed model if it has changed."""
         live = self._require()
         latest = live.latest
         changed = live.take(answer)
@@ -324,7 +324,7 @@ class LiveDiagnosisNode(ListeningNode):
             share=[float(finding.share) for finding in answer.findings],
             rivals=[','.join(finding.ambiguous_with) for finding in answer.findings],
         )
-        for joint, before, after, floor in _gaps(answer):
+        for joint, before, after, floor in _residuals(answer):
             message.gap_joint.append(joint)
             message.gap_before.append(before)
             message.gap_after.append(after)
@@ -344,10 +344,6 @@ class LiveDiagnosisNode(ListeningNode):
             self._logged = answer.named
             self.get_logger().warning(text) if answer.named else self.get_logger().info(text)
 
-    def _require_diagnosis(self) -> None:
-        if self._require().latest is None:
-            raise IdentificationError('nothing has been diagnosed so far')
-
     def _publish_model(self) -> None:
         model = self._require().model
         self._models.publish(String(data=model_text(model, source_of(model.robot))))
@@ -359,14 +355,17 @@ class LiveDiagnosisNode(ListeningNode):
         self._last = -math.inf
         self._publish_model()
 
-    def _require(self) -> LiveDiagnosis:
+    def _require(self, *, diagnosed: bool = False) -> LiveDiagnosis:
+        """Return the schedule; raise an error before a robot, or a diagnosis, is known."""
         if self.live is None:
-            raise IdentificationError('no robot is known: robot_description was not received')
+            raise IdentificationError('the robot is not known: no robot_description was received')
+        if diagnosed and self.live.latest is None:
+            raise IdentificationError('no diagnosis is complete so far')
         return self.live
 
 
-def _gaps(answer: Answer) -> list[tuple[str, float, float, float]]:
-    """Return the joints with their residuals before and after the patch, and floors [N m]."""
+def _residuals(answer: Answer) -> list[tuple[str, float, float, float]]:
+    """Return each joint with its residuals before and after the patch, and its floor [N m]."""
     gap = answer.gap
     if gap is None:
         return []

@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Run the nodes in one process over real topics, in lock step and without losses.
+Run the nodes in one process over ROS topics, in lock step and without lost messages.
 
 The clock advances when all nodes have received the messages of the previous step. The result
 therefore does not depend on the speed and load of the computer.
@@ -39,13 +39,13 @@ AnyNode = TypeVar('AnyNode', bound=ArmidNode)
 
 #: Timeout of a message [s]; discovery takes up to 3 s.
 MESSAGE_TIMEOUT = 20.0
-#: First time of the clock [ns]; zero would mean a missing stamp.
+#: Start of the simulated clock [ns]; zero would mean a missing stamp.
 EPOCH_NS = 1_000 * 10**9
 
 
 class Progress(NamedTuple):
     """
-    Progress of a run.
+    Progress of a run in lock step.
 
     Attributes
     ----------
@@ -75,7 +75,7 @@ def run_lockstep(
     on_progress: OnProgress | None = None,
 ) -> Progress:
     """
-    Excite and record a simulated arm, and optionally identify it online.
+    Excite and record a simulated arm over ROS topics, and optionally identify it online.
 
     The nodes are excitation_publisher, simulated_arm, recorder and, with an identifier,
     online_identifier. They communicate on this machine only.
@@ -83,11 +83,11 @@ def run_lockstep(
     Parameters
     ----------
     arm : SimulatedArm
-        The arm.
+        The simulated arm.
     excitation : Excitation
         Excitation to run.
     bag : Path
-        Directory to record to; it must not exist.
+        Directory of the recorded bag; it must not exist.
     identifier : OnlineIdentifier, optional
         Identifies the arm online; without it, a run takes half of the time.
     rate : float
@@ -125,7 +125,7 @@ def run_lockstep(
         topic = plant.resolve_topic_name('joint_states')
 
         def connected() -> bool:
-            recorder.look()
+            recorder.poll()
             plant.publish_clock()
             return (
                 not recorder.missing
@@ -159,7 +159,7 @@ def run_lockstep(
 
 
 def _stepped(step: Callable[[], int], duration: float, on_progress: OnProgress | None) -> Progress:
-    """Step until the end of a run; report the progress every second of simulated time."""
+    """Simulate until the end of a run, and report the progress every simulated second."""
     begun, due, t = time.monotonic(), 1.0, 0.0
     while t < duration:
         t = (step() - EPOCH_NS) * 1e-9
@@ -171,7 +171,7 @@ def _stepped(step: Callable[[], int], duration: float, on_progress: OnProgress |
 
 
 class Stage(ExitStack):
-    """Nodes in one process with their executor, in the domain of ROS_DOMAIN_ID."""
+    """ROS nodes in one process with their executor, which communicate on this machine only."""
 
     def __enter__(self) -> Stage:
         domain = os.environ.get('ROS_DOMAIN_ID')
@@ -182,6 +182,7 @@ class Stage(ExitStack):
         return self
 
     def add(self, make: type[AnyNode], *core: Any, **parameters: Any) -> AnyNode:
+        """Make a node with the given parameters, and add it to the executor."""
         parameters = {'use_sim_time': True, **parameters}
         node = make(
             *core,
@@ -199,18 +200,19 @@ class Stage(ExitStack):
         self._executor.remove_node(node)
         node.destroy_node()
 
-    def spin_until(self, done: Callable[[], object], what: str) -> None:
+    def spin_until(self, done: Callable[[], object], topic: str) -> None:
+        """Run callbacks until a condition holds; ArmidError after the timeout."""
         deadline = time.monotonic() + MESSAGE_TIMEOUT
         while not done():
             if time.monotonic() > deadline:  # after the timeout, done() is checked once more
                 raise ArmidError(
-                    f'{what}: no message for {MESSAGE_TIMEOUT:g} s; is UDP on the loopback '
+                    f'{topic}: no message for {MESSAGE_TIMEOUT:g} s; is UDP on the loopback '
                     'interface blocked?'
                 )
             self._executor.spin_once(timeout_sec=0.1)
 
 
 def matched(learner: OnlineIdentifierNode) -> bool:
-    """Subscribe to joint states that are published; return whether there is a publisher."""
+    """Match the publishers of joint states; return whether there is a publisher."""
     learner.joint_states.match()
     return learner.joint_states.publishers > 0

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Online identifier node: estimates parameters from joint states."""
+"""Online identifier node: estimates the parameters of an arm while it moves."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 import yaml
 
-#: Files of ~/save: the estimate, the model with the estimate, and its robot.
+#: Files of ~/save: the estimate, the model with the estimate, and the URDF of its robot.
 FILES = ('estimate.yaml', 'model.yaml', 'robot.urdf')
 #: Default folder of ~/save.
 _FOLDER = 'online_identification'
@@ -46,7 +46,7 @@ _FOLDER = 'online_identification'
 
 class OnlineIdentifierNode(ListeningNode):
     """
-    Estimates parameters from joint_states.
+    Node that estimates the parameters of an arm from joint_states while the arm moves.
 
     Attributes
     ----------
@@ -99,7 +99,7 @@ class OnlineIdentifierNode(ListeningNode):
     )
 
     def __init__(self, identifier: OnlineIdentifier | None = None, **kwargs: Any) -> None:
-        """Make the node; the identifier is by default made from the parameters."""
+        """Make the node; without an identifier, its parameters describe the identifier."""
         super().__init__('online_identifier', **kwargs)
         self.identifier: OnlineIdentifier | None = None
         self.update_times: deque[float] = deque(maxlen=2000)
@@ -121,17 +121,17 @@ class OnlineIdentifierNode(ListeningNode):
         self._timer = self.create_timer(period, self.publish_estimate)
 
     def reset(self) -> str:
-        """Delete the estimate and restart."""
+        """Delete the estimate, and restart the identification."""
         identifier = self._require()
         identifier.reset()
         self._adopt(identifier)
-        return 'the estimate begins anew'
+        return 'the estimate was deleted; the identification restarts'
 
     def save(self) -> str:
-        """Write the estimate, an arm model with it, and the robot of the model to files."""
+        """Write the estimate, the arm model with the estimate, and the URDF to files."""
         identifier = self._require()
         if not identifier.samples:
-            raise IdentificationError('no sample was used so far, so nothing was written')
+            raise IdentificationError('no sample was used so far, so no file was written')
         folder = Path(self.value('save_to') or _FOLDER).expanduser()
         refuse_replacing(folder, FILES)
         robot, estimate = identifier.arm.robot, identifier.estimate()
@@ -152,7 +152,7 @@ class OnlineIdentifierNode(ListeningNode):
             save_model(model, identifier.model(), urdf.name, estimate)
             write_file(estimated, yaml.safe_dump(document, sort_keys=False, width=99))
         except OSError as error:
-            raise ModelError(f'{folder}: cannot be written: {error.strerror}') from error
+            raise ModelError(f'the folder {folder} cannot be written: {error.strerror}') from error
         return f'wrote {", ".join(map(str, paths))}'
 
     def close(self) -> None:
@@ -165,7 +165,7 @@ class OnlineIdentifierNode(ListeningNode):
             print(text, file=sys.stderr)  # the logger is closed if a signal ends the node
 
     def publish_estimate(self) -> None:
-        """Publish the estimate if it has changed."""
+        """Publish the estimate if it contains new samples."""
         identifier = self.identifier
         if identifier is None or identifier.samples in (0, self._published):
             return
@@ -173,7 +173,7 @@ class OnlineIdentifierNode(ListeningNode):
         self._publish(self._estimates, identifier.estimate(), self._last_sample)
 
     def condition(self) -> tuple[str, Mapping[str, object]]:
-        """Return the state of the identification."""
+        """Return the problem of the identification, and numbers of samples and rejected states."""
         identifier = self.identifier
         if identifier is None:
             return self.awaited, {'received': self.received}
@@ -214,7 +214,7 @@ class OnlineIdentifierNode(ListeningNode):
         return trouble, values
 
     def further_statuses(self) -> Sequence[DiagnosticStatus]:
-        """Return the estimate with intervals, and the detected changes."""
+        """Return the estimate with confidence intervals, and the last change, for /diagnostics."""
         identifier, prefix = self.identifier, self.get_fully_qualified_name()[1:]
         if identifier is None:
             return ()
@@ -238,12 +238,12 @@ class OnlineIdentifierNode(ListeningNode):
         return learned, changed
 
     def check(self, values: Mapping[str, Any]) -> None:
-        """Raise an ArmidError if settings cannot change at run time."""
+        """Raise an ArmidError if new settings cannot be applied at run time."""
         if self.identifier is not None:
             self.identifier.check(self._settings(values))
 
     def changed(self, names: frozenset[str]) -> None:
-        """Apply changed settings."""
+        """Apply new settings and the new publishing rate."""
         if 'estimate_rate' in names:
             self._timer.timer_period_ns = round(1e9 / self.value('estimate_rate'))
             self._timer.reset()  # otherwise the old period has to pass first
@@ -251,20 +251,20 @@ class OnlineIdentifierNode(ListeningNode):
             self.identifier.use(self._settings({}))
 
     def _settings(self, values: Mapping[str, Any]) -> OnlineSettings:
-        """Return the settings of the identifier, with new values of changeable parameters."""
+        """Return the settings of the identifier with new values of changeable parameters."""
         identifier = self._require()
-        described = self._described_settings(identifier.arm, values)
+        described = self._online_settings(identifier.arm, values)
         can_change = {name: getattr(described, name) for name in OnlineIdentifier.CHANGEABLE}
         return replace(identifier.settings, **can_change)
 
     def _described(self, description: str | None = None) -> OnlineIdentifier:
-        """Make the identifier that parameters describe, for their robot or for that of a URDF."""
+        """Return the identifier for a URDF text, or for the robot of the parameters."""
         arm = ArmModel.of(self.described_robot(description), effects=self.value('effects'))
-        settings = self._described_settings(arm, {})
+        settings = self._online_settings(arm, {})
         return OnlineIdentifier(arm, settings, rng=np.random.default_rng(0))
 
-    def _described_settings(self, arm: ArmModel, values: Mapping[str, Any]) -> OnlineSettings:
-        """Return the settings of the parameters, some of them with new values."""
+    def _online_settings(self, arm: ArmModel, values: Mapping[str, Any]) -> OnlineSettings:
+        """Return the settings that the parameters describe, with some new values."""
 
         def value(name: str) -> Any:
             return values.get(name, self.value(name))
@@ -282,17 +282,17 @@ class OnlineIdentifierNode(ListeningNode):
         )
 
     def level(self, troubled: bool) -> bytes:
-        """Return STALE if joint states have stopped, ERROR if the identification failed."""
+        """Return the level STALE without joint states, and ERROR for unusable joint states."""
         failed = self.identifier is not None and bool(self.identifier.error)
         stopped = self.freshness.stopped
         return DiagnosticStatus.ERROR if failed and not stopped else super().level(troubled)
 
     def take_description(self, urdf: str) -> None:
-        """Identify the robot of robot_description."""
+        """Identify the robot of a new robot_description."""
         self._begin(self._described(urdf))
 
     def _on_model(self, message: String) -> None:
-        """Restart with the effects and values of a model, if its effects are different."""
+        """Restart with the effects of a received model if they are new."""
         # Effects from the parameters are kept, even if the model lacks them.
         before = self._require()
         arm = read_model(message.data, before.arm.robot, 'model')
@@ -340,6 +340,7 @@ class OnlineIdentifierNode(ListeningNode):
             publisher.publish(message)
 
     def _begin(self, identifier: OnlineIdentifier) -> None:
+        """Use an identifier, whose effects later models do not remove."""
         self._own_effects = identifier.arm.effects
         self._adopt(identifier)
 
@@ -364,8 +365,9 @@ class OnlineIdentifierNode(ListeningNode):
         self._counted = 0
 
     def _require(self) -> OnlineIdentifier:
+        """Return the identifier; raise an error while the robot is not known."""
         if self.identifier is None:
-            raise IdentificationError('no robot is known: robot_description was not received')
+            raise IdentificationError('the robot is not known: no robot_description was received')
         return self.identifier
 
 

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Quality of service of the nodes, and its match with other publishers."""
+"""Quality of service (QoS) of the nodes, and subscriptions that match their publishers."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ SAMPLES = QoSProfile(depth=DEPTH)
 
 def matching(publishers: Sequence[TopicEndpointInfo], depth: int) -> QoSProfile:
     """
-    Return the strictest profile that all publishers of a topic satisfy, as rosbag2 does.
+    Return the strictest QoS profile that all publishers of a topic satisfy, as rosbag2 does.
 
     The profile is reliable if all publishers are reliable, and transient local if all are
     transient local. Otherwise the weaker policy is used, which matches every publisher.
@@ -41,7 +41,7 @@ def matching(publishers: Sequence[TopicEndpointInfo], depth: int) -> QoSProfile:
 
 
 def recorded(publishers: Sequence[TopicEndpointInfo]) -> tuple[Qos, ...]:
-    """Return the QoS of the publishers of a topic in the format of a bag."""
+    """Return the QoS profiles of the publishers of a topic, in the format of a bag."""
     return tuple(
         VOLATILE._replace(
             reliability=QosReliability[publisher.qos_profile.reliability.name],
@@ -52,7 +52,7 @@ def recorded(publishers: Sequence[TopicEndpointInfo]) -> tuple[Qos, ...]:
 
 
 def offered(profiles: Sequence[Qos]) -> QoSProfile:
-    """Return the QoS for playing a recorded topic: the weakest of the recorded profiles."""
+    """Return the QoS for the playback of a topic: the weakest of the recorded profiles."""
     best_effort = any(p.reliability is QosReliability.BEST_EFFORT for p in profiles)
     latched = {p.durability for p in profiles} == {QosDurability.TRANSIENT_LOCAL}
     return _profile(DEPTH, not best_effort, latched)
@@ -68,7 +68,7 @@ def _profile(depth: int, reliable: bool, latched: bool) -> QoSProfile:
 
 class MatchedSubscription:
     """
-    Subscription that starts when its topic has a publisher, with the QoS of the publishers.
+    Subscription that starts when its topic has publishers, with their quality of service.
 
     A reliable subscription does not match a best-effort publisher. A best-effort subscription
     loses messages that a reliable publisher would send again. The QoS therefore depends on the
@@ -106,12 +106,12 @@ class MatchedSubscription:
 
     @property
     def publishers(self) -> int:
-        """Return the number of matched publishers."""
+        """Return the number of publishers that the subscription is connected to."""
         return int(self.subscription.get_publisher_count()) if self.subscription else 0
 
     @property
     def several(self) -> str:
-        """Return a message on several publishers of the topic; empty for one or none."""
+        """Return a text with the publishers of the topic if there are several; else empty."""
         found = self._node.get_publishers_info_by_topic(self.topic)
         if len(found) < 2:
             return ''
@@ -119,7 +119,7 @@ class MatchedSubscription:
         return f'{len(found)} nodes publish {self.topic}: {", ".join(sorted(nodes))}; stop one'
 
     def match(self) -> None:
-        """Check the publishers, and subscribe again if their QoS has changed."""
+        """Subscribe if the topic has publishers, and again if their QoS has changed."""
         publishers = self._node.get_publishers_info_by_topic(self.topic)
         if not publishers:
             return

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Recorder node: writes serialised messages of topics to a bag that survives a kill."""
+"""Recorder node: writes topics to a bag that stays readable if the process is killed."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from armid_ros.recording.message_types import header_stamp
 
 class RecorderNode(ArmidNode):
     """
-    Records topics into a rosbag2 MCAP directory.
+    Node that records topics, without decoding, into a rosbag2 directory with an MCAP file.
 
     Attributes
     ----------
@@ -65,7 +65,7 @@ class RecorderNode(ArmidNode):
     )
 
     def __init__(self, **kwargs: Any) -> None:
-        """Make the node, and start to record if the parameter record is true."""
+        """Make the node, and start to record if the parameter `record` is true."""
         super().__init__('recorder', **kwargs)
         self._wanted = self._topics_wanted()
         self._writer: BagWriter | None = None
@@ -79,27 +79,27 @@ class RecorderNode(ArmidNode):
         self.last_stamps: dict[str, int] = {}
         self.offer('~/start', self.start)
         self.offer('~/stop', self.stop)
-        self.look_every(LOOK_PERIOD, self.look)
-        self.look_every(0.1, self._flush)  # limits the loss after a kill
-        self.look_every(1.0, self.watch)
+        self.create_steady_timer(LOOK_PERIOD, self.poll)
+        self.create_steady_timer(0.1, self._flush)  # limits the loss after a kill
+        self.create_steady_timer(1.0, self.watch)
         if self.value('record'):
             self.start()
 
     @property
     def recording(self) -> bool:
-        """Return whether a bag is open."""
+        """Whether a bag is being recorded."""
         return self._writer is not None
 
     @property
     def missing(self) -> tuple[str, ...]:
-        """Return the topics to record that have no publisher."""
+        """Return the full names of the topics to record that have no publisher."""
         heard = {t for t, s in self._subscriptions_by_topic.items() if s.publishers}
         return tuple(sorted(self._wanted - heard))
 
     def start(self) -> str:
-        """Open a bag and record; RecordingError if one is open or cannot be created."""
+        """Start to record a new bag; RecordingError if a bag is open or cannot be created."""
         if self._writer is not None:
-            raise RecordingError(f'a recording into {self._writer.path} is under way already')
+            raise RecordingError(f'a recording into {self._writer.path} is already under way')
         name = self.value('bag') or f'armid_{datetime.now():%Y_%m_%d-%H_%M_%S}'
         # The path of the first bag must not exist; bags of later ~/start calls get a number.
         path = Path(name).expanduser()
@@ -114,13 +114,13 @@ class RecorderNode(ArmidNode):
         self.message_count = 0
         self._begun = time.monotonic()
         self.watch()
-        self.look()
-        return self.tell(f'recording into {self._writer.path}')
+        self.poll()
+        return self.log(f'recording into {self._writer.path}')
 
     def stop(self) -> str:
-        """Complete the bag, and return its path and number of messages."""
+        """Close the bag, and return its path and number of messages."""
         if self._writer is None:
-            raise RecordingError('nothing is being recorded')
+            raise RecordingError('no recording is under way')
         for subscription in self._subscriptions_by_topic.values():
             subscription.close()
         self._subscriptions_by_topic.clear()
@@ -129,12 +129,12 @@ class RecorderNode(ArmidNode):
         try:
             writer.close()
         except ArmidError as error:
-            self._give_up(str(error))
+            self._abort(str(error))
         self._writer = None
-        return self.tell(f'{writer.path}: {self.message_count} messages')
+        return self.log(f'{writer.path}: {self.message_count} messages')
 
-    def look(self) -> None:
-        """Subscribe to topics that have appeared, with the QoS of their publishers."""
+    def poll(self) -> None:
+        """Subscribe to topics with new publishers, with the QoS of these publishers."""
         if self._writer is None:
             return
         for topic in list(self._subscriptions_by_topic):
@@ -148,44 +148,43 @@ class RecorderNode(ArmidNode):
 
     def watch(self) -> None:
         """
-        Check that the bag exists and the disk has free space.
+        Check that the bag still exists and that the disk has free space.
 
         Raises
         ------
         RecordingError
-            If the bag was deleted or moved, or the disk is almost full. The bag is completed
-            before.
+            If the bag was deleted or moved, or the disk is almost full. The bag is closed before.
 
         """
         writer = self._writer
         if writer is None:
             return
         if not writer.in_place:
-            self._give_up(f'{writer.file}: was deleted or moved while it was written')
+            self._abort(f'{writer.file} was deleted or moved during the recording')
         try:
             free = shutil.disk_usage(writer.path).free
         except OSError as error:
-            self._give_up(f'{writer.path}: {error.strerror}')
+            self._abort(f'{writer.path}: {error.strerror}')
         least = self.value('min_free') * 1e6
         if free < least:
-            self._give_up(f'{writer.path}: {size_text(free)} are left on the disk')
+            self._abort(f'only {size_text(free)} are free on the disk of {writer.path}')
         rate = writer.size / max(time.monotonic() - self._begun, 1.0)  # [B/s]
         if free - least < 60.0 * rate:
             text = f'the disk of {writer.path} will be full in less than 60 s'
-            self.complaints.say('disk', text)
+            self.complaints.add('disk', text)
 
     def changed(self, names: frozenset[str]) -> None:
-        """Apply changed topics, bag name and chunk age."""
+        """Apply new topics, a new bag name and a new chunk age."""
         if 'topics' in names:
             self._wanted = self._topics_wanted()
-            self.look()
+            self.poll()
         if 'bag' in names:
             self._bags = 0
         if 'chunk_age' in names and self._writer is not None:
             self._writer.chunk_age = self.value('chunk_age')
 
     def condition(self) -> tuple[str, Mapping[str, object]]:
-        """Return the path of the bag, the number of messages, and problems with topics."""
+        """Return the topics that are not recorded, the path of the bag and the message count."""
         refused = sorted(filter(self._is_wanted, self._refused))
         absent = sorted(set(self.missing) - set(refused))
         trouble = '; '.join(
@@ -202,7 +201,7 @@ class RecorderNode(ArmidNode):
         return (trouble if self.recording else ''), values
 
     def close(self) -> None:
-        """Complete the bag."""
+        """Close the bag that is being recorded."""
         if self._writer is not None:
             self.stop()
 
@@ -210,6 +209,7 @@ class RecorderNode(ArmidNode):
         return {self.resolve_topic_name(name) for name in self.value('topics')}
 
     def _is_wanted(self, topic: str) -> bool:
+        """Return whether a topic is recorded; hidden topics are not, unless they are named."""
         return topic in self._wanted if self._wanted else '/_' not in topic
 
     def _record(self, writer: BagWriter, topic: str, types: Sequence[str]) -> None:
@@ -222,7 +222,7 @@ class RecorderNode(ArmidNode):
             message_type = message_class(types[0])
             writer.add_topic(topic, types[0], qos=recorded(publishers))
         except ArmidError as error:
-            self.complaints.say('topic', f'{topic} is not recorded: {error}')
+            self.complaints.add('topic', f'{topic} is not recorded: {error}')
             self._refused[topic] = types
             return
         self._refused.pop(topic, None)
@@ -242,7 +242,7 @@ class RecorderNode(ArmidNode):
             if len(self._held) < 1000:
                 self._held.append((topic, stamped, data))
             else:
-                self.complaints.say('message', 'messages are lost: /clock has not begun')
+                self.complaints.add('message', 'messages are lost: /clock has no time so far')
             return
         if self._held:
             self._write_held(writer, now)
@@ -261,7 +261,7 @@ class RecorderNode(ArmidNode):
         try:
             writer.write(topic, data, now, sent or now)
         except RecordingError as error:
-            self._give_up(str(error))
+            self._abort(str(error))
         self.message_count += 1
         self.last_stamps[topic] = sent
 
@@ -270,24 +270,24 @@ class RecorderNode(ArmidNode):
             try:
                 self._writer.flush()
             except RecordingError as error:
-                self._give_up(str(error))
+                self._abort(str(error))
 
-    def _give_up(self, reason: str) -> NoReturn:
-        """Complete the bag, and raise an error with the reason and the kept messages."""
+    def _abort(self, reason: str) -> NoReturn:
+        """Close the bag, and raise an error with the reason and the number of kept messages."""
         writer, self._writer = self._writer, None
         assert writer is not None
-        lacking = ''
+        index_error = ''
         try:
             writer.close()
         except ArmidError:
-            lacking = writer.save()
+            index_error = writer.save()
         count = sum(topic.count for topic in writer.topics)
         kept = f'{count} messages are in {writer.file}'
         if not os.path.lexists(writer.file):
             kept = f'its {count} messages are lost'
-        elif lacking:
-            kept += f', without its index ({lacking}): `armid recover` restores the index'
-        raise RecordingEnded(f'{reason}; recording ends: {kept}')
+        elif index_error:
+            kept += f', without an index ({index_error}): `armid recover` restores the index'
+        raise RecordingEnded(f'{reason}; the recording ends: {kept}')
 
 
 main = partial(run, RecorderNode)

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Simulated arm node: follows trajectories, and publishes joint states like a driver."""
+"""Simulated arm node: follows trajectories, and publishes joint states like a robot driver."""
 
 from __future__ import annotations
 
@@ -44,30 +44,37 @@ from sensor_msgs.msg import Imu, JointState
 from std_msgs.msg import String
 from trajectory_msgs.msg import JointTrajectory
 
-#: Longest trajectory [s]; all its steps are checked against the limits at its start.
+#: Longest accepted trajectory [s]; its waypoints are checked against the limits before its start.
 MAX_DURATION = 3600.0
 
 
-def _samples(node: Node, kind: type, topic: str) -> Publisher:
-    """Return a publisher of measurements; users can override its quality of service."""
+def _measurement_publisher(node: Node, kind: type, topic: str) -> Publisher:
+    """Return a publisher of measurements, whose quality of service users can override."""
     options = QoSOverridingOptions.with_default_policies()
     return node.create_publisher(kind, topic.lstrip('/'), SAMPLES, qos_overriding_options=options)
 
 
 class _ElasticTopics:
-    """Publishers of link/joint_states, reference/joint_states and one imu topic per link."""
+    """Publishers of an elastic arm: positions of links, references of drives, accelerometers."""
 
     def __init__(self, node: Node, arm: SimulatedArm) -> None:
-        self._link = _samples(node, JointState, LINK), JointState(name=list(arm.joints))
-        self._reference = _samples(node, JointState, REFERENCE), JointState(name=list(arm.joints))
+        self._link = (
+            _measurement_publisher(node, JointState, LINK),
+            JointState(name=list(arm.joints)),
+        )
+        self._reference = (
+            _measurement_publisher(node, JointState, REFERENCE),
+            JointState(name=list(arm.joints)),
+        )
         self._imus = []
         for link in arm.plant.robot.links:
             message = Imu()
             message.header.frame_id = link
             message.orientation_covariance[0] = message.angular_velocity_covariance[0] = -1.0
-            self._imus.append((_samples(node, Imu, imu_topic(link)), message))
+            self._imus.append((_measurement_publisher(node, Imu, imu_topic(link)), message))
 
     def publish(self, sample: LinkSample, stamp: TimeMessage) -> None:
+        """Publish the measurements of all links at one time."""
         for (publisher, message), q, dq in (
             (self._link, sample.q, sample.dq),
             (self._reference, sample.asked_q, sample.asked_dq),
@@ -87,7 +94,7 @@ class _ElasticTopics:
 
 class SimulatedArmNode(ArmidNode):
     """
-    Simulates an arm with topics for commands and measurements.
+    Node that simulates an arm, which follows trajectories and publishes joint states.
 
     In real time the stamps are those of the system clock. At another real_time_factor the node
     also publishes /clock. With use_sim_time the simulation follows /clock. A model on the topic
@@ -124,16 +131,16 @@ class SimulatedArmNode(ArmidNode):
         **kwargs: Any,
     ) -> None:
         """
-        Make the node.
+        Make the node, and publish the robot_description.
 
         Parameters
         ----------
         arm : SimulatedArm, optional
-            Simulated arm; by default made from the parameters.
+            Simulated arm; by default that of the parameters.
         start_ns : int, optional
             First stamp [ns]; by default the time of the node's clock.
         **kwargs
-            Keyword arguments of rclpy's Node.
+            Further arguments of rclpy's Node.
 
         """
         super().__init__('simulated_arm', **kwargs)
@@ -148,7 +155,7 @@ class SimulatedArmNode(ArmidNode):
         self._pending: tuple[int, Reference] | None = None
         self.real_time = RealTime(lambda: self._arm.t, self.step)
         self._skipped = 0.0
-        self._states = _samples(self, JointState, 'joint_states')
+        self._states = _measurement_publisher(self, JointState, 'joint_states')
         self._message = JointState(name=list(self._arm.joints))
         self._elastic_topics = None
         if self._arm.plant.springs is not None:
@@ -163,7 +170,7 @@ class SimulatedArmNode(ArmidNode):
         self.offer('~/reset', self.reset)
 
     def _described(self) -> SimulatedArm:
-        """Make the arm that the parameters describe."""
+        """Return the simulated arm that the parameters describe."""
         gravity, drives = self.value('gravity'), None
         if self.value('model'):
             arm = load_model(self.value('model'))
@@ -175,7 +182,7 @@ class SimulatedArmNode(ArmidNode):
         with reading("parameter 'start'", RobotError):
             start = numbers(self.value('start'))
             if start and len(start) != n:
-                raise RobotError(f'it has {len(start)} numbers, but there are {n} joints')
+                raise RobotError(f'{len(start)} numbers for {n} joints; give one number per joint')
         return make_simulated_arm(
             with_effects(arm, self.value('effects')),
             rng=np.random.default_rng(self.value('seed')),
@@ -188,11 +195,11 @@ class SimulatedArmNode(ArmidNode):
         )
 
     def _steps_at(self, rate: float) -> int:
-        """Return the number of plant steps between two samples."""
+        """Return the number of integration steps between two joint states at a rate [Hz]."""
         return whole_steps(1.0 / rate, self._arm.plant.dt, f'a rate of {rate:g} Hz')
 
     def _set_rates(self) -> None:
-        """Set the rates of the simulation and of /clock from the parameters."""
+        """Set the rates of joint_states, /clock and the simulation from the parameters."""
         rate = self.value('rate')
         self._stride = self._steps_at(rate)
         self._factor = 0.0 if self._follows else self.value('real_time_factor')
@@ -207,7 +214,7 @@ class SimulatedArmNode(ArmidNode):
             self._timer = self.create_timer(1.0 / rate, self.follow)
         elif self._factor:
             period = max(1.0 / (rate * self._factor), 0.0005)
-            self._timer = self.look_every(period, self.catch_up)
+            self._timer = self.create_steady_timer(period, self.catch_up)
 
     @property
     def stamp_ns(self) -> int:
@@ -216,33 +223,33 @@ class SimulatedArmNode(ArmidNode):
 
     @property
     def joint_state(self) -> JointState:
-        """Return the last published joint state."""
+        """Return the last published joint state message."""
         return self._message
 
     @property
     def moving(self) -> bool:
-        """Return whether a trajectory is under way or about to begin."""
+        """Whether the arm follows a trajectory, or will do so soon."""
         return self._pending is not None or self._arm.t < self._arm.ends_at
 
     @property
     def readers(self) -> int:
-        """Return the number of subscriptions to joint_states."""
+        """Return the number of subscribers to joint_states."""
         return int(self._states.get_subscription_count())
 
     @property
     def hardware(self) -> str:
-        """Name of the robot."""
+        """Return the name of the robot, for diagnostics."""
         return str(self._arm.plant.robot.name)
 
     def step(self) -> int:
-        """Simulate until the next sample, publish the sample, and return its stamp [ns]."""
+        """Simulate until the next joint state, publish it, and return its stamp [ns]."""
         if self._pending is not None and self._pending[0] <= self.stamp_ns:
             (start_ns, reference), self._pending = self._pending, None
             reference = reference.remaining((self.stamp_ns - start_ns) * 1e-9)
             try:
                 self._arm.set_trajectory(reference)
             except TrajectoryError as error:
-                self._refuse(error)
+                self._reject(error)
             else:
                 self.get_logger().info(f'follows a trajectory of {reference.duration:g} s')
         sample = self._arm.advance(self._stride)
@@ -261,22 +268,22 @@ class SimulatedArmNode(ArmidNode):
         return stamp_ns
 
     def publish_clock(self) -> None:
-        """Publish /clock if this node is its source."""
+        """Publish the simulated time on /clock, unless the node follows /clock."""
         if self._clock_publisher is not None:
             stamp = Time(nanoseconds=self.stamp_ns).to_msg()
             self._clock_publisher.publish(ClockMessage(clock=stamp))
 
     def follow(self) -> None:
-        """Simulate until the present time of /clock."""
+        """Simulate until the present time of /clock, which this node follows."""
         now = self.get_clock().now().nanoseconds
-        # after a larger step, the clock was set, and the arm does not catch up
+        # after a larger step, the clock was set, and the simulation does not catch up
         if self._origin_ns is None or not 0 <= now - self.stamp_ns <= 60 * 10**9:
             self._origin_ns = now - self._arm.steps * self._dt_ns
         while self.stamp_ns + self._stride * self._dt_ns <= now:
             self.step()
 
     def catch_up(self) -> None:
-        """Simulate until real time times the factor; skip time that cannot be caught up."""
+        """Simulate in step with real time; skip time that the computer cannot catch up."""
         self._skipped += self.real_time.catch_up(self._factor, self._stride * self._arm.plant.dt)
         # set the stamps to the system clock again, but not during a trajectory
         if self._skipped and self._clock_publisher is None and not self.moving:
@@ -284,13 +291,13 @@ class SimulatedArmNode(ArmidNode):
             self._skipped = 0.0
 
     def reset(self) -> str:
-        """Set the arm to its initial state; time continues."""
+        """Set the arm to its initial position, while the time continues."""
         self._arm.reset(self._arm.steps)
         self._pending = None
-        return f'{self.hardware} is where it began'
+        return f'{self.hardware} is at its initial position'
 
     def condition(self) -> tuple[str, Mapping[str, object]]:
-        """Return the state of the simulation."""
+        """Return the problem of the simulation, the simulated time and the skipped time."""
         trouble = ''
         if self._clock_publisher is None:  # with /clock, other nodes follow the simulated time
             trouble = self.real_time.trouble(
@@ -304,7 +311,7 @@ class SimulatedArmNode(ArmidNode):
         }
 
     def check(self, values: Mapping[str, Any]) -> None:
-        """Raise an ArmidError if effects, noise or rates do not fit the arm."""
+        """Raise an ArmidError if new effects, noise or rates are not possible for the arm."""
         with reading(f'parameter {", ".join(map(repr, values))}', ArmidError):
             sensors_of(lambda name: values.get(name, self.value(name)), self._arm.joints)
             self._steps_at(values.get('rate', self.value('rate')))
@@ -312,7 +319,7 @@ class SimulatedArmNode(ArmidNode):
                 self._arm.successor(self._with_effects(values['effects']))
 
     def changed(self, names: frozenset[str]) -> None:
-        """Apply changed effects, rates and sensors to the moving arm."""
+        """Apply new effects, rates and sensors to the moving arm."""
         if 'effects' in names:
             self._replace_model(self._with_effects(self.value('effects')))
         if names & {'rate', 'real_time_factor', 'clock_rate'}:
@@ -323,18 +330,17 @@ class SimulatedArmNode(ArmidNode):
         self._arm.sensors = replace(self._arm.sensors, **known)
 
     def _with_effects(self, texts: Sequence[str]) -> ArmModel:
-        """Return the arm of the parameters with other effects."""
+        """Return the arm model of the parameters with other effects."""
         if self._without_effects is None:
             raise ModelError(
-                "the node was given a finished arm from Python, so the parameter 'effects' cannot "
-                'change it'
+                "the parameter 'effects' cannot change an arm that was given to the node in Python"
             )
         return with_effects(self._without_effects, texts)
 
     def _replace_model(self, arm: ArmModel) -> None:
         self._arm.become(arm)
         named = ', '.join(effect.name for effect in arm.effects) or 'no effect'
-        self.get_logger().info(f'goes on with {named}')
+        self.get_logger().info(f'the simulation continues with {named}')
 
     def _on_model(self, message: String) -> None:
         self._replace_model(read_model(message.data, self._arm.plant.arm.robot, 'model'))
@@ -344,8 +350,8 @@ class SimulatedArmNode(ArmidNode):
             reference = waypoints_of(message).for_robot(self._arm.plant.robot)
             if reference.duration > MAX_DURATION:
                 raise TrajectoryError(
-                    f'trajectory: it lasts {reference.duration:.4g} s; the longest accepted one '
-                    f'lasts {MAX_DURATION:g} s'
+                    f'trajectory: it lasts {reference.duration:.4g} s, but may last at most '
+                    f'{MAX_DURATION:g} s'
                 )
             stamp = message.header.stamp
             start_ns = stamp.sec * 10**9 + stamp.nanosec or self.stamp_ns
@@ -357,13 +363,13 @@ class SimulatedArmNode(ArmidNode):
                     'neither'
                 )
         except TrajectoryError as error:
-            self._refuse(error)
+            self._reject(error)
             return
         self._pending = (start_ns, reference)
 
-    def _refuse(self, error: TrajectoryError) -> None:
-        follows = 'follows the previous one' if self.moving else 'does not move'
-        self.complaints.say('trajectory', f'{error}; it is rejected, and the arm {follows}')
+    def _reject(self, error: TrajectoryError) -> None:
+        follows = 'follows the previous trajectory' if self.moving else 'does not move'
+        self.complaints.add('trajectory', f'{error}; it is rejected, and the arm {follows}')
 
 
 main = partial(run, SimulatedArmNode)

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Send trajectories to a controller: as goals of its action if it offers one, else by topic."""
+"""Send trajectories to a controller: as goals of an action if it offers one, else by topic."""
 
 from __future__ import annotations
 
@@ -15,7 +15,6 @@ from action_msgs.msg import GoalStatus, GoalStatusArray
 from armid_ros.errors import TrajectoryError
 from armid_ros.motion import Motion
 from armid_ros.nodes.qos import LATCHED, STREAM
-from builtin_interfaces.msg import Duration as DurationMessage
 from rclpy.action import ActionClient
 from rclpy.action.client import ClientGoalHandle
 from rclpy.duration import Duration
@@ -24,11 +23,11 @@ from rclpy.task import Future
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 from unique_identifier_msgs.msg import UUID
 
-#: Tolerance that permits any joint position; zero means the default of the controller.
+#: Tolerance that permits any joint position; 0 means the default of the controller.
 NO_TOLERANCE = -1.0
 #: Timeout of the answer to a goal [s]; a controller first checks every waypoint.
 _ANSWER_TIMEOUT = 5.0
-#: Texts of the error codes of control_msgs/action/FollowJointTrajectory.
+#: Messages for the error codes of control_msgs/action/FollowJointTrajectory.
 _ERRORS = {
     -1: 'the goal is not valid',
     -2: 'the joints are not those of the controller',
@@ -39,7 +38,7 @@ _ERRORS = {
 
 
 def write_trajectory(motion: Motion) -> JointTrajectory:
-    """Convert a motion to a message with one point per sample, at its time from the start [s]."""
+    """Convert a motion to a JointTrajectory message with one waypoint per sample."""
     message = JointTrajectory(joint_names=list(motion.joints))
     for row, t in enumerate(motion.t):
         message.points.append(
@@ -47,20 +46,15 @@ def write_trajectory(motion: Motion) -> JointTrajectory:
                 positions=motion.q[row].tolist(),
                 velocities=motion.dq[row].tolist(),
                 accelerations=motion.ddq[row].tolist(),
-                time_from_start=_duration(float(t)),
+                time_from_start=Duration(nanoseconds=round(float(t) * 1e9)).to_msg(),
             )
         )
     return message
 
 
-def _duration(seconds: float) -> DurationMessage:
-    whole, nanoseconds = divmod(round(seconds * 1e9), 10**9)
-    return DurationMessage(sec=whole, nanosec=nanoseconds)
-
-
 @dataclass
 class _Goal:
-    """Goal that was sent, with the time of sending [s] and a flag for cancelling."""
+    """Goal that was sent to the controller: time of sending [s], and whether to cancel it."""
 
     sent: float
     handle: ClientGoalHandle | None = None
@@ -69,9 +63,9 @@ class _Goal:
 
 class TrajectoryController:
     """
-    Topic joint_trajectory and action follow_joint_trajectory of one controller.
+    Sender of trajectories to one controller, as goals of an action or as messages on a topic.
 
-    A run uses the same interface until its end.
+    All trajectories of a run use the same interface.
 
     Attributes
     ----------
@@ -94,9 +88,9 @@ class TrajectoryController:
         Parameters
         ----------
         node : ArmidNode
-            With the parameters `interface`, `action` and `zero_stamp`, and tolerances.
+            Node with the parameters `interface`, `action`, `zero_stamp` and the tolerances.
         on_end : callable
-            Called at the end of a goal with the reason of its failure; empty if it was reached.
+            Called at the end of a goal with the reason of its failure; empty after success.
 
         Raises
         ------
@@ -121,18 +115,18 @@ class TrajectoryController:
             self._make_client()
             if self.client is None:
                 raise TrajectoryError(
-                    "parameter 'interface' is action, but the package control_msgs is not "
+                    "the parameter 'interface' is action, but the package control_msgs is not "
                     'installed: apt install ros-jazzy-control-msgs, or use interface:=topic'
                 )
 
     @property
     def readers(self) -> int:
-        """Return the number of subscriptions to the topic."""
+        """Return the number of subscribers to the topic joint_trajectory."""
         return int(self._publisher.get_subscription_count())
 
     @property
     def missing(self) -> str:
-        """Return why no controller can receive a trajectory; empty if one can."""
+        """Return why no controller can receive a trajectory; empty if a controller can."""
         if self._ready:
             return ''
         if self._kind == 'action':
@@ -141,7 +135,7 @@ class TrajectoryController:
 
     @property
     def under_way(self) -> bool:
-        """Return whether a goal was sent that the controller has not ended."""
+        """Whether a goal was sent that the controller has not ended."""
         return self._by_action and self._goal is not None
 
     @property
@@ -149,14 +143,14 @@ class TrajectoryController:
         """Return the largest joint error that the controller reported [rad or m], or NaN."""
         return self._error if self.under_way else math.nan
 
-    def look(self) -> None:
-        """Make an action client when a controller offers the action."""
+    def poll(self) -> None:
+        """Make an action client as soon as a controller offers the action."""
         if self._possible and self.client is None and self._offered:
             self._make_client()
 
     def discover(self) -> None:
         """
-        Wait until a controller that offers the action accepts goals, for a second at most.
+        Wait at most a second until a controller that offers the action accepts goals.
 
         Raises
         ------
@@ -164,16 +158,16 @@ class TrajectoryController:
             If no controller can receive a trajectory.
 
         """
-        self.look()
+        self.poll()
         if self.client is not None and self._offered:
             deadline = time.monotonic() + 1.0  # the discovery of an action takes at most this long
             while not self._ready and time.monotonic() < deadline:
                 time.sleep(0.005)
         if self.missing:
-            raise TrajectoryError(f'{self.missing}; the arm is not started')
+            raise TrajectoryError(f'the arm is not started: {self.missing}')
 
     def begin(self, trajectory: JointTrajectory) -> str:
-        """Send the trajectory of a run after `discover`; return the name of its receiver."""
+        """Send the trajectory of a run after `discover`, and return the name of its receiver."""
         self._by_action = self._ready
         if self._by_action:
             names = ('tracking_tolerance', 'goal_tolerance', 'goal_time_tolerance')
@@ -182,34 +176,34 @@ class TrajectoryController:
         self._publisher.publish(trajectory)
         return f'{self.readers} subscribers'
 
-    def bring_to_rest(self, trajectory: JointTrajectory) -> None:
-        """Send the trajectory that stops a run, without tolerances."""
+    def send_stop(self, trajectory: JointTrajectory) -> None:
+        """Send the trajectory that stops a run, by the interface of the run."""
         if self._by_action:
             self._send_goal(trajectory, NO_TOLERANCE, NO_TOLERANCE)
         else:
             self._publisher.publish(trajectory)
 
-    def insist(self, trajectory: JointTrajectory) -> None:
-        """Send a trajectory to the controller of the present run by both action and topic."""
-        self.bring_to_rest(trajectory)
+    def send_stop_again(self, trajectory: JointTrajectory) -> None:
+        """Send a trajectory that stops a run by both action and topic."""
+        self.send_stop(trajectory)
         if self._by_action:
             self._publisher.publish(trajectory)
 
     def trouble(self, patience: float) -> str:
-        """Return a message if the controller is gone or silent for a time [s]; empty otherwise."""
+        """Return a text if the controller is gone or silent for `patience` [s]; else empty."""
         goal, now = self._goal, time.monotonic()
         if goal is None or not self._by_action:
             return ''
         if self._ready:
             self._seen = now
         if now - self._seen > patience:
-            return f'{self.action} is gone: its controller was stopped or restarted'
+            return f'the controller of {self.action} was stopped or restarted'
         if goal.handle is None and now - goal.sent > _ANSWER_TIMEOUT:
             return f'{self.action} did not answer the goal within {_ANSWER_TIMEOUT:g} s'
         return ''
 
     def settle(self, patience: float) -> None:
-        """Wait until sent messages have arrived and calls are answered, with a timeout [s]."""
+        """Wait at most `patience` [s] until sent messages have arrived and calls are answered."""
         if not self._by_action:
             self._publisher.wait_for_all_acked(Duration(seconds=patience))
             return
@@ -226,7 +220,7 @@ class TrajectoryController:
                 before.add_node(self._node)
 
     def close(self) -> None:
-        """Destroy the client of the action."""
+        """Destroy the action client."""
         if self.client is not None:
             self.client.destroy()
 
@@ -236,11 +230,11 @@ class TrajectoryController:
 
     @property
     def _ready(self) -> bool:
-        """Return whether a controller accepts goals."""
+        """Whether a controller accepts goals of the action."""
         return self.client is not None and bool(self.client.server_is_ready())
 
     def _make_client(self) -> None:
-        """Make the client of the action; no goal is sent."""
+        """Make the action client if control_msgs is installed; no goal is sent."""
         try:
             from control_msgs.action import FollowJointTrajectory
             from control_msgs.msg import JointTolerance
@@ -257,7 +251,7 @@ class TrajectoryController:
         self, trajectory: JointTrajectory, path: float, end: float, late: float = 0.0
     ) -> None:
         """
-        Send a goal that replaces the present one.
+        Send a goal that replaces the present goal.
 
         Controllers of ros2_control replace the old goal. It is also cancelled, because other
         controllers do not replace it.
@@ -281,7 +275,7 @@ class TrajectoryController:
         for joint in trajectory.joint_names:
             message.path_tolerance.append(self._tolerance(name=joint, position=path))
             message.goal_tolerance.append(self._tolerance(name=joint, position=end))
-        message.goal_time_tolerance = _duration(late)
+        message.goal_time_tolerance = Duration(nanoseconds=round(late * 1e9)).to_msg()
         identifier = uuid4().bytes
         self._known.add(identifier)
         future = self.client.send_goal_async(
@@ -289,15 +283,15 @@ class TrajectoryController:
             goal_uuid=UUID(uuid=list(identifier)),
             feedback_callback=self._guarded(lambda message: self._on_feedback(goal, message)),
         )
-        self._ask(future, lambda handle: self._on_answer(goal, handle))
+        self._await(future, lambda handle: self._on_answer(goal, handle))
         if before is not None:
             self._cancel(before)
 
     def _cancel(self, goal: _Goal) -> None:
-        """Cancel a goal at once, or when it is accepted."""
+        """Cancel a goal at once, or as soon as the controller accepts it."""
         goal.unwanted = True
         if goal.handle is not None:
-            self._ask(goal.handle.cancel_goal_async(), lambda _: None)
+            self._await(goal.handle.cancel_goal_async(), lambda _: None)
 
     def _on_answer(self, goal: _Goal, handle: ClientGoalHandle) -> None:
         if not handle.accepted:
@@ -323,7 +317,7 @@ class TrajectoryController:
             self._end(goal, f'{self.action} gave up the trajectory: {why}{detail}')
 
     def _on_status(self, message: GoalStatusArray) -> None:
-        """End the present goal if the controller has accepted a later one."""
+        """End the present goal if the controller has accepted a later goal of another client."""
         active = (GoalStatus.STATUS_ACCEPTED, GoalStatus.STATUS_EXECUTING)
         goals = {
             bytes(s.goal_info.goal_id.uuid) for s in message.status_list if s.status in active
@@ -337,7 +331,7 @@ class TrajectoryController:
             self._end(goal, self._replacement_message())
 
     def _replacement_message(self) -> str:
-        """Return a message that another client, named if known, has replaced the goal."""
+        """Return a text with the clients that may have replaced the goal."""
         node, service = self._node, f'{self.action}/_action/send_goal'
         found = []
         for name, space in node.get_node_names_and_namespaces():
@@ -359,7 +353,7 @@ class TrajectoryController:
             errors = [abs(error) for error in message.feedback.error.positions]
             self._error = max(errors, default=math.nan)
 
-    def _ask(self, future: Future, then: Callable[[Any], None]) -> None:
+    def _await(self, future: Future, then: Callable[[Any], None]) -> None:
         def done(future: Future) -> None:
             self._requests.remove(future)
             then(future.result())
@@ -368,5 +362,6 @@ class TrajectoryController:
         future.add_done_callback(self._guarded(done))
 
     def _guarded(self, callback: Callable[[Any], None]) -> Callable[[Any], None]:
-        guarded: Callable[[Any], None] = self._node.surviving(callback, self.action)
+        """Return a callback whose exceptions stop the arm and are logged."""
+        guarded: Callable[[Any], None] = self._node.guarded(callback, self.action)
         return guarded

@@ -110,7 +110,7 @@ def test_a_rehearsal_is_slow_and_reports_how_the_arm_followed(bench, arm, excita
     answer = bench.call('excitation_publisher/rehearse')
     assert answer.success and '50 %' in answer.message
     arm.run(100.4 + node.duration, step=0.2)
-    node.look()
+    node.poll()
     said = node.condition()[0]
     assert all(fact in said for fact in ('rehearsed', '~/start', '100 %'))
     assert any(joint in said for joint in ROBOT.joints)

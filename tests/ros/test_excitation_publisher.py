@@ -106,7 +106,7 @@ def test_without_a_clock_it_does_not_start(bench, excitation, service, published
         bench.stop_clock()
         bench.spin_until(lambda: not node.count_publishers('/clock'), 'the end of /clock')
         for _ in range(3):
-            node.look_for_trouble()
+            node.log_trouble()
         bench.spin_until(lambda: logged, 'the warning')
         bench.settle()
         assert sum('/clock' in entry.msg for entry in logged) == 1
@@ -199,7 +199,7 @@ def test_on_hardware_nothing_is_sent_until_it_is_asked_for(bench, excitation, mo
 
     report()
     for _ in range(3):
-        node.look()
+        node.poll()
     bench.settle()
     assert not heard
     for _ in range(5):
@@ -256,7 +256,7 @@ def test_that_a_run_is_complete_is_logged_once_and_in_the_status(bench, arm, exc
     assert bench.diagnose(node, diagnostics).message == 'running'
     arm.run(100.4 + length)
     for _ in range(3):
-        node.look()
+        node.poll()
     assert bench.diagnose(node, diagnostics).message == 'complete'
     (words,) = [text for text in said if 'complete' in text]
     assert f'{length:.1f} s' in words

@@ -71,8 +71,8 @@ def carry_on(bench, arm, node, run, fault=lambda: None):
         if run.finished:
             return
         node.publish_diagnostics()
-        node.look()
-        run.look()
+        node.poll()
+        run.poll()
         arm.run(arm.now + 0.2, step=0.2)
         if step == 15:
             fault()
@@ -132,7 +132,7 @@ def test_a_run_that_is_stopped_ends_it_with_the_reason(bench, arm, excitation, t
 def test_data_that_cannot_be_diagnosed_are_an_answer_and_other_failures_are_not(
     bench, arm, excitation, tmp_path, monkeypatch, verdict
 ):
-    monkeypatch.setattr(IdentificationRunNode, '_excited', lambda *_: iter(()))  # no motion
+    monkeypatch.setattr(IdentificationRunNode, '_run_excitation', lambda *_: iter(()))  # no motion
     programs = Programs(codes=(0, 2), verdict=verdict)
     node, run = everything(bench, arm, excitation, tmp_path, programs, runs=1)
     carry_on(bench, arm, node, run)
@@ -150,7 +150,7 @@ def test_a_start_that_is_refused_is_in_log_and_status_at_once(bench, arm, excita
     _, run = everything(bench, arm, excitation, tmp_path, Programs(), runs=1)
     bench.tick(round(1e9 * (arm.now + 10.0)))  # the last joint state is old by now
     bench.spin_until(lambda: run.complaints.counts.get('start', 0) > 1, 'two refusals')
-    run.look_for_trouble()
+    run.log_trouble()
     bench.settle()
     status = next(s for d in diagnostics for s in d.status if 'run 1' in s.message)
     assert status.level == DiagnosticStatus.WARN

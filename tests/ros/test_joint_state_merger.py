@@ -26,7 +26,7 @@ def merger(bench, **parameters):
 def sender(bench, node, kind, topic):
     """Return a publisher that the node listens to."""
     publisher = bench.probe.create_publisher(kind, topic, 10)
-    bench.spin_until(lambda: node.look() or publisher.get_subscription_count(), topic)
+    bench.spin_until(lambda: node.poll() or publisher.get_subscription_count(), topic)
     return publisher
 
 
@@ -92,7 +92,7 @@ def test_the_joints_are_those_of_the_description_for_which_it_waits(bench):
     robot, logged = load_robot('humanoid_arm'), bench.rosout()
     node = bench.add(JointStateMergerNode)
     for _ in range(3):
-        node.look_for_trouble()
+        node.log_trouble()
     bench.spin_until(lambda: logged, 'the log')
     bench.settle()
     assert ['robot_description' in log.msg for log in logged] == [True]

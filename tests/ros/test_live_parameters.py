@@ -124,7 +124,7 @@ def test_the_recorder_takes_up_and_lets_go_of_topics(bench, tmp_path):
     node = bench.add(RecorderNode, bag=str(tmp_path / 'bag'), topics=['one'])
     bench.spin_until(lambda: not node.missing, 'topic one')
     node.set_parameters([Parameter('topics', value=['two', 'three'])])
-    bench.spin_until(lambda: (node.look(), node.missing == ('/three',))[1], 'topic two')
+    bench.spin_until(lambda: (node.poll(), node.missing == ('/three',))[1], 'topic two')
     _, values = node.condition()
     assert values['topics'] == 1
     node.close()

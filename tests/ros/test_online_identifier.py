@@ -371,7 +371,7 @@ def test_joint_states_that_stop_are_stale_within_a_second(bench, arm, samples):
 
     def levels_after(seconds):
         now[0] += seconds
-        node.look()
+        node.poll()
         bench.settle()
         levels = [d.status[0].level for d in diagnostics]
         diagnostics.clear()
@@ -379,7 +379,7 @@ def test_joint_states_that_stop_are_stale_within_a_second(bench, arm, samples):
 
     assert DiagnosticStatus.STALE not in levels_after(0.4)
     now[0] += 0.2
-    node.look()
+    node.poll()
     bench.settle()
     assert any('0.6 s' in d.status[0].message for d in diagnostics)
     assert DiagnosticStatus.STALE in levels_after(0.0)  # at once, not at the next second

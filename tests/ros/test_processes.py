@@ -215,7 +215,7 @@ def test_a_process_that_cannot_leave_is_ended_and_says_where_it_hangs(tmp_path):
     command = [sys.executable, '-c', program]
     ended = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE, check=False)
     assert ended.returncode == 1
-    assert 'in _leave' in ended.stderr
+    assert 'in _shut_down' in ended.stderr
     assert (tmp_path / 'bag' / 'metadata.yaml').is_file()
 
 

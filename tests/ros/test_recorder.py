@@ -95,7 +95,7 @@ def test_a_type_that_cannot_be_loaded_costs_its_topic_alone(
         recorder.start()
     bench.spin_until(publishers[1].get_subscription_count, 'the recorder')
     for _ in range(3):
-        recorder.look()
+        recorder.poll()
     publishers[1].publish(String(data='there'))
     bench.settle()
     said = recorder.condition()[0]
@@ -113,7 +113,7 @@ def test_start_and_stop_make_one_bag_each_time(bench, tmp_path):
     publisher = bench.probe.create_publisher(JointState, 'joint_states', 1000)
     assert not recorder.recording
     refused = bench.call('recorder/stop')
-    assert not refused.success and 'nothing' in refused.message
+    assert not refused.success and 'no recording' in refused.message
     for _ in range(2):
         assert bench.call('recorder/start').success
         bench.spin_until(lambda: publisher.get_subscription_count() == 1)

@@ -48,7 +48,7 @@ def test_a_trajectory_is_stamped_after_the_discovery_of_the_controller(
     bench, arm, excitation, monkeypatch
 ):
     node, stamped = publisher(bench, arm, excitation), []
-    bench.spin_until(lambda: node.look() or node._controller._ready, 'the action')
+    bench.spin_until(lambda: node.poll() or node._controller._ready, 'the action')
     begun, begin = time.monotonic(), node._controller.begin
     monkeypatch.setattr(
         TrajectoryController, '_ready', property(lambda _: time.monotonic() > begun + 0.3)
@@ -86,7 +86,7 @@ def test_a_goal_that_is_refused_or_not_answered_is_no_run(
     node = publisher(bench, arm, excitation)
     arm.faults.deaf = deaf
     node.start()
-    bench.spin_until(lambda: node.look() or node.condition()[0], 'the reason')
+    bench.spin_until(lambda: node.poll() or node.condition()[0], 'the reason')
     assert f'/{NAME}' in node.condition()[0] and fact in node.condition()[0]
     assert node.elapsed is None
 
@@ -135,7 +135,7 @@ def test_a_stop_replaces_the_goal_by_one_that_comes_to_rest(bench, arm, excitati
     arm.run(101.5)
     trouble(fault)(node, arm)
     arm.run(104.5)
-    node.look()
+    node.poll()
     arm.run(106.0)
     assert len(arm.goals) >= 2
     assert {t.position for t in arm.goals[1].path_tolerance} == {-1.0}
@@ -194,7 +194,7 @@ def test_a_controller_that_replaces_nothing_is_told_to_cancel(bench, excitation,
     arm.run(101.0)
     trouble(fault)(node, arm)
     arm.run(102.0)
-    node.look()
+    node.poll()
     bench.spin_until(lambda: stubborn.cancelled, 'the cancellation')
     assert stubborn.cancelled[0].status == GoalStatus.STATUS_CANCELING
     assert node.elapsed is None
@@ -258,7 +258,7 @@ def test_a_controller_that_is_gone_is_said(bench, arm, excitation):
     node = begun(bench, arm, excitation, state_timeout=0.2)
     bench.settle()
     arm.leave()
-    bench.spin_until(lambda: node.look() or node.condition()[0], 'what is said')
+    bench.spin_until(lambda: node.poll() or node.condition()[0], 'what is said')
     assert f'/{NAME}' in node.condition()[0]
 
 

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Diagnosis of an arm while it moves, without ROS."""
+"""Diagnosis of a moving arm, without ROS: window, schedule, requests and process."""
 
 from armid_ros.nodes.live.assistant import Assistant, Worker
 from armid_ros.nodes.live.request import Answer, DiagnosisRequest, LiveSettings

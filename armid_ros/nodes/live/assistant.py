@@ -3,19 +3,17 @@
 """
 Diagnoses in a separate process, so that joint states at 1 kHz are not delayed.
 
-Tasks are sent to the process and results returned through a pair of sockets. The process ends when
-the other end is closed, so that it never outlives its parent.
+A pair of sockets sends tasks to the process and returns results. The process ends when the other
+end is closed, so it never outlives its parent.
 
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from contextlib import suppress
 from multiprocessing import Pipe
 from multiprocessing.connection import Connection
 import os
-from pathlib import Path
 import subprocess
 import sys
 import traceback
@@ -34,59 +32,49 @@ _ONE_THREAD = dict.fromkeys(('OMP_NUM_THREADS', 'OPENBLAS_NUM_THREADS'), '1')
 
 #: Files of a saved diagnosis.
 FILES = ('diagnosis.json', 'model.yaml', 'report.html')
-#: An answer; the text of another task, with its planned motion as YAML if any; or an error.
+#: A diagnosis; or the text of another task, with its planned motion as YAML if any; or an error.
 Result = Answer | tuple[str, str] | IdentificationError
 
 
 class Worker:
-    """Runs tasks, and keeps the last diagnosis for later tasks."""
+    """Executor of tasks in the diagnosis process, which keeps the last diagnosis."""
 
     def __init__(self) -> None:
         self._last: tuple[DiagnosisRequest, Diagnosis] | None = None
 
     def run(self, task: str, argument: Any) -> Result:
-        """Run 'diagnose', 'save' or 'plan'; errors of the data or the disk are returned."""
-        tasks: dict[str, Callable[[Any], Result]] = {
-            'diagnose': self._diagnose,
-            'save': self._save,
-            'plan': self._plan,
-        }
+        """
+        Compute a diagnosis, save the last diagnosis to a folder, or plan its next motion.
+
+        Errors of the data or the disk are returned, not raised. `argument` is that of
+        `Assistant.ask`.
+
+        """
         try:
-            return tasks[task](argument)
+            if task == 'diagnose':
+                found, diagnosis = answer(argument)
+                if diagnosis is not None:
+                    self._last = argument, diagnosis
+                return found
+            if self._last is None:
+                raise IdentificationError('no diagnosis is complete so far')
+            request, diagnosis = self._last
+            if task == 'save':
+                result = DiagnosisResult(diagnosis, request.arm, (request.window,), ())
+                return f'wrote {", ".join(FILES)} to {result.save(argument)}', ''
+            run = next_run(diagnosis, np.random.default_rng(argument))
+            if run is None:
+                raise IdentificationError('no candidates are ambiguous: no motion is needed')
+            return run.sentence, excitation_text(run.excitation)
         except ArmidError as error:
             return IdentificationError(str(error))
         except OSError as error:
-            return IdentificationError(f'{error.filename}: cannot be written: {error.strerror}')
-
-    def _diagnose(self, request: DiagnosisRequest) -> Answer:
-        found, diagnosis = answer(request)
-        if diagnosis is not None:
-            self._last = request, diagnosis
-        return found
-
-    def _save(self, folder: Path) -> tuple[str, str]:
-        """Write the last diagnosis to a folder."""
-        request, diagnosis = self._require()
-        result = DiagnosisResult(diagnosis, request.arm, (request.window,), ())
-        return f'wrote {", ".join(FILES)} to {result.save(folder)}', ''
-
-    def _plan(self, seed: int) -> tuple[str, str]:
-        """Plan the motion that separates the candidates of the last diagnosis."""
-        _, diagnosis = self._require()
-        run = next_run(diagnosis, np.random.default_rng(seed))
-        if run is None:
-            raise IdentificationError('no candidates are ambiguous: no motion is needed')
-        return run.sentence, excitation_text(run.excitation)
-
-    def _require(self) -> tuple[DiagnosisRequest, Diagnosis]:
-        if self._last is None:
-            raise IdentificationError('nothing has been diagnosed so far')
-        return self._last
+            return IdentificationError(f'{error.filename} cannot be written: {error.strerror}')
 
 
 class Assistant:
     """
-    Computes diagnoses in a separate process.
+    Connection to a separate process that computes diagnoses.
 
     Raises
     ------
@@ -101,15 +89,15 @@ class Assistant:
 
     @property
     def busy(self) -> bool:
-        """Return whether a task is under way."""
+        """Whether the process has a task that is not complete."""
         return self._pending > 0
 
     def ask(self, task: str, argument: Any) -> None:
         """
-        Send a task, which runs after the pending tasks; start a new process if the old one ended.
+        Send a task to the process, which runs it after the pending tasks.
 
-        A diagnosis request is larger than the buffer of the pipe, and would have to wait for the
-        pending tasks; send it when none is pending.
+        A new process is started if the last process has ended. A diagnosis request is larger than
+        the buffer of the socket; send it only without pending tasks, as it would wait for them.
 
         Parameters
         ----------
@@ -136,7 +124,7 @@ class Assistant:
         self._pending += 1
 
     def poll(self) -> Result | None:
-        """Return the result if one has arrived; None otherwise."""
+        """Return the next result of the process; None if no result has arrived."""
         if self._pipe.closed or not self._pipe.poll():
             return None
         self._pending -= 1
@@ -146,11 +134,11 @@ class Assistant:
             self._pending = 0
             self._pipe.close()
             code = self._process.wait()
-            return IdentificationError(f'the process that diagnoses has ended with {code}')
+            return IdentificationError(f'the diagnosis process has ended with exit code {code}')
         return result
 
     def close(self) -> None:
-        """Kill the process."""
+        """End the process at once."""
         self._process.kill()
         self._process.wait()
         self._pipe.close()
@@ -174,7 +162,7 @@ class Assistant:
 
 
 def main(fd: int) -> None:
-    """Run tasks from a socket until its other end is closed."""
+    """Run the tasks that arrive on a socket until its other end is closed."""
     os.nice(10)  # lower priority than the nodes
     worker = Worker()
     with suppress(EOFError, OSError), Connection(fd) as pipe:
@@ -184,6 +172,6 @@ def main(fd: int) -> None:
                 result = worker.run(task, argument)
             except Exception as error:  # of one window, which must not end the process
                 traceback.print_exc()
-                what = f'{task} failed: {type(error).__name__}: {error}'
-                result = IdentificationError(what)
+                text = f'{task} failed: {type(error).__name__}: {error}'
+                result = IdentificationError(text)
             pipe.send(result)

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Settings, request and answer of the diagnosis of a window of samples."""
+"""Settings, request and answer of the diagnosis of the latest samples of an arm."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class LiveSettings:
         Motion at the beginning in which the arm is healthy [s]. The misfit of the model is
         computed from it if neither a baseline nor a misfit is given. 0: no misfit is used.
     material : float
-        Share of a joint's torque below which a cause does not matter.
+        Share of a joint's torque below which an effect does not matter.
 
     """
 
@@ -59,15 +59,15 @@ class LiveSettings:
         """Raise an IdentificationError if the window is shorter than the shortest motion."""
         if not 0.0 < self.shortest <= self.window:
             raise IdentificationError(
-                f'a window of {self.window:g} s is shorter than the shortest motion that is '
-                f'diagnosed, {self.shortest:g} s'
+                f'window, {self.window:g} s, is shorter than the shortest diagnosed motion: '
+                f'shortest, {self.shortest:g} s'
             )
 
 
 @dataclass(frozen=True)
 class DiagnosisRequest:
     """
-    Request to diagnose a window.
+    Latest samples of an arm, with all inputs of their diagnosis.
 
     Attributes
     ----------
@@ -89,8 +89,8 @@ class DiagnosisRequest:
         Motion of the healthy arm, and the model at that time; they give the misfit if no
         baseline is given.
     of_one_arm : bool
-        Whether the whole window lies after the last change of the arm. The residual of a wrong
-        model varies with the motion and hides further changes, so that none is searched for.
+        Whether all samples follow the last change of the arm. The residual of a wrong model
+        varies with the motion and hides further changes, so they are not searched.
 
     """
 
@@ -108,7 +108,7 @@ class DiagnosisRequest:
 @dataclass(frozen=True)
 class Answer:
     """
-    The diagnosis of a window.
+    Diagnosis of the latest samples of an arm.
 
     Attributes
     ----------
@@ -146,15 +146,16 @@ class Answer:
 
     @property
     def named(self) -> tuple[Named, ...]:
-        """Return names and joints of the named effects, the largest first."""
+        """Return the names and joints of the found effects, the largest effect first."""
         return tuple((finding.name, finding.joints) for finding in self.findings)
 
 
 def answer(request: DiagnosisRequest) -> tuple[Answer, Diagnosis | None]:
     """
-    Diagnose a window; the diagnosis is None if the window cannot be diagnosed.
+    Diagnose the latest samples of an arm.
 
-    Samples before the last change of the residual are skipped.
+    Samples before the last change of the residual are skipped. The diagnosis is None for samples
+    that cannot be diagnosed.
 
     """
     begun, arm, window = time.process_time(), request.arm, request.window
@@ -168,7 +169,7 @@ def answer(request: DiagnosisRequest) -> tuple[Answer, Diagnosis | None]:
         if window.duration < request.settings.shortest:
             verdict = WAITING
             summary = (
-                f'the arm changed {window.duration:.0f} s ago: the diagnosis needs more motion'
+                f'the arm changed {window.duration:.0f} s ago: the diagnosis requires more motion'
             )
         else:
             misfit = request.misfit

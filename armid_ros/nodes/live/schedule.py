@@ -1,10 +1,10 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Schedule the diagnoses of a moving arm, and combine their results.
+Schedule of the diagnoses of a moving arm, and their combination.
 
-An effect is proposed if several diagnoses in a row name it, because a single window may contain
-the time of a change.
+An effect is proposed only if several diagnoses in a row name it, because the arm may change in the
+middle of a single window.
 
 """
 
@@ -24,7 +24,7 @@ NAMING_VERDICTS = ('named', 'ambiguous', 'partial')
 
 class LiveDiagnosis:
     """
-    Schedules diagnoses, and combines their results.
+    Schedule of the diagnoses of a moving arm, with the model that they propose.
 
     Parameters
     ----------
@@ -42,7 +42,7 @@ class LiveDiagnosis:
     Attributes
     ----------
     settings : LiveSettings
-        Present settings; see `use`.
+        Present settings, which `use` changes.
     accepted : ArmModel
         Model that the diagnoses use.
     proposed : ArmModel or None
@@ -50,11 +50,11 @@ class LiveDiagnosis:
     named : tuple of (str, tuple of str)
         Names and joints of the proposed effects.
     learning : bool
-        Whether the motion of the healthy arm is still being collected.
+        Whether the motion of the healthy arm is being collected.
     window : SampleWindow
         Latest samples.
     latest : Answer or None
-        Last answer with a verdict other than waiting.
+        Last diagnosis with another verdict than waiting.
     asked : int
         Number of requests so far.
 
@@ -76,21 +76,21 @@ class LiveDiagnosis:
         self.reset()
 
     def reset(self) -> None:
-        """Restart with the original model."""
+        """Restart the diagnoses with the original model."""
         arm, self._baseline, self._misfit = self._given
         self.accepted = arm
         self._rejected: set[Named] = set()
         self._propose(None)
         self.latest: Answer | None = None
         self.asked = 0
-        self._outdate()
+        self._outdated = self._under_way
         self.use(self.settings)
         self._healthy: tuple[ArmModel, Recording] | None = None
         known = bool(self._baseline) or self._misfit is not None
         self.learning = not known and self.settings.learning > 0.0
 
     def use(self, settings: LiveSettings) -> None:
-        """Use other settings, and empty the window."""
+        """Change the settings, and empty the window."""
         self.settings = settings
         joints, period = self.accepted.robot.joints, 1.0 / settings.rate
         self.window = SampleWindow(joints, max(settings.window, settings.learning), period)
@@ -105,40 +105,40 @@ class LiveDiagnosis:
 
     @property
     def confirmed(self) -> bool:
-        """Return whether enough diagnoses in a row agree on an effect."""
+        """Whether enough diagnoses in a row agree on an effect."""
         return bool(self._agreed) and len(self._agreed) >= self.settings.confirmations
 
     @property
     def due(self) -> bool:
-        """Return whether enough motion followed the last request."""
-        if self.learning or not self._holds(self.settings.shortest):
+        """Whether the arm has moved long enough since the last request."""
+        if self.learning or not self._contains(self.settings.shortest):
             return False
         return self.window.moved - self._asked_at >= self._next
 
     def add(
         self, t: float, q: npt.ArrayLike, dq: npt.ArrayLike | None, tau: npt.ArrayLike
     ) -> None:
-        """Add a sample; see `SampleWindow.add` for the arguments."""
+        """Add a sample of the arm; the arguments are those of `SampleWindow.add`."""
         held = len(self.window)
         kept = self.window.add(t, q, dq, tau)
         if kept and held and len(self.window) == 1:
             # after a gap, a new motion begins
             self._asked_at, self.window.moved = 0.0, 0.0
             self._begin, self._changed = -np.inf, False
-            self._outdate()
-        if self.learning and self._holds(self.settings.learning):
+            self._outdated = self._under_way
+        if self.learning and self._contains(self.settings.learning):
             # keep the motion so far, as the misfit of the model is computed from it
             began = self.window.end - self.settings.learning
-            motion = self.window.recording(began, 'the motion in which nothing was wrong')
+            motion = self.window.recording(began, 'motion of the healthy arm')
             self._healthy, self.learning = (self.accepted, motion), False
             self._asked_at = self.window.moved
 
-    def _holds(self, seconds: float) -> bool:
-        """Return whether the window contains motion of a given duration [s]."""
+    def _contains(self, seconds: float) -> bool:
+        """Return whether the window contains enough motion, of a given duration [s]."""
         return self.window.moved >= seconds <= self.window.end - self.window.begin
 
     def request(self) -> DiagnosisRequest:
-        """Return the next request, and register it."""
+        """Return the request for a diagnosis of the present window."""
         self._asked_at, self._next = self.window.moved, self.settings.every
         self.asked += 1
         self._under_way, self._outdated = True, False
@@ -157,12 +157,12 @@ class LiveDiagnosis:
 
     def take(self, answer: Answer) -> bool:
         """
-        Handle an answer; an outdated answer is ignored.
+        Process a diagnosis; an outdated diagnosis is ignored.
 
         Returns
         -------
         bool
-            Whether the model has changed.
+            Whether the proposed model has changed.
 
         """
         outdated, self._under_way, self._outdated = self._outdated, False, False
@@ -195,7 +195,7 @@ class LiveDiagnosis:
 
     def accept(self) -> None:
         """
-        Accept the proposed model; the last window replaces the baseline.
+        Use the proposed model in later diagnoses; the last window replaces the baseline.
 
         Raises
         ------
@@ -204,15 +204,15 @@ class LiveDiagnosis:
 
         """
         if self.proposed is None:
-            raise IdentificationError('nothing is proposed')
+            raise IdentificationError('no effect is proposed, so none can be accepted')
         self.accepted = self.proposed
         if self._baseline and self.latest is not None:
             self._baseline = (self.latest.window,)
-        self._decided()
+        self._clear_proposal()
 
     def reject(self) -> None:
         """
-        Reject the proposed effects, and do not propose them again.
+        Discard the proposed effects, and never propose them again.
 
         Raises
         ------
@@ -221,19 +221,15 @@ class LiveDiagnosis:
 
         """
         if self.proposed is None:
-            raise IdentificationError('nothing is proposed')
+            raise IdentificationError('no effect is proposed, so none can be rejected')
         self._rejected.add(self.named[0])
-        self._decided()
+        self._clear_proposal()
 
-    def _decided(self) -> None:
+    def _clear_proposal(self) -> None:
         """Clear the proposal and the count of agreeing diagnoses."""
         self._propose(None)
         self._agreed = []
-        self._outdate()
+        self._outdated = self._under_way
 
     def _propose(self, arm: ArmModel | None, named: tuple[Named, ...] = ()) -> None:
         self.proposed, self.named = arm, named if arm is not None else ()
-
-    def _outdate(self) -> None:
-        """Mark the pending answer as outdated."""
-        self._outdated = self._under_way

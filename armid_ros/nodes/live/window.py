@@ -18,7 +18,7 @@ _MIN_SPACING = 0.75
 
 class SampleWindow:
     """
-    Latest samples of an arm, one per period, without gaps.
+    Latest samples of an arm at a constant rate, without gaps.
 
     Further samples are skipped, so that a period of 5 ms gives 200 samples per second at any input
     rate. Late and repeated samples are skipped too. The window is cleared after a gap or a jump
@@ -66,7 +66,7 @@ class SampleWindow:
     @property
     def frozen(self) -> bool:
         """
-        Return whether positions are no longer measured, as they stay equal while efforts vary.
+        Whether positions are no longer measured: they stay equal while efforts vary.
 
         The efforts of an arm at rest are constant except for noise. If no position changes while
         an effort varies over half of its range in motion, the positions are not measured.
@@ -87,7 +87,7 @@ class SampleWindow:
         self, t: float, q: npt.ArrayLike, dq: npt.ArrayLike | None, tau: npt.ArrayLike
     ) -> bool:
         """
-        Add a sample to the window if one is due.
+        Add a sample of the arm, unless it follows the last kept sample too early.
 
         Parameters
         ----------
@@ -105,7 +105,7 @@ class SampleWindow:
 
         """
         step = t - self.end
-        # longest gap, and longest step back in time, without a restart
+        # a longer gap, or a longer step back in time, clears the window
         if self._rows and abs(step) > 20.0 * self._period:
             self._rows.clear()
         elif step < _MIN_SPACING * self._period:
@@ -115,8 +115,8 @@ class SampleWindow:
         row[0], row[1 : n + 1], row[2 * n + 1 :] = t, q, tau
         row[n + 1 : 2 * n + 1] = np.nan if dq is None else dq
         if self._rows:
-            way = np.abs(row[1 : n + 1] - self._rows[-1][1 : n + 1]).max()
-            if way > 0.01 * step:  # at rest, no joint is faster than 0.01 rad/s or m/s
+            distance = np.abs(row[1 : n + 1] - self._rows[-1][1 : n + 1]).max()
+            if distance > 0.01 * step:  # at rest, no joint is faster than 0.01 rad/s or m/s
                 self.moved += step
                 self._efforts[0] = np.fmin(self._efforts[0], row[2 * n + 1 :])
                 self._efforts[1] = np.fmax(self._efforts[1], row[2 * n + 1 :])
@@ -125,7 +125,7 @@ class SampleWindow:
 
     def recording(self, first: float = -np.inf, source: str = 'window') -> Recording:
         """
-        Return the samples from a given time on as a recording.
+        Return the samples after a given time as a recording.
 
         Parameters
         ----------

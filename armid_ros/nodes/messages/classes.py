@@ -13,7 +13,7 @@ from rclpy.type_support import check_for_type_support
 
 def message_class(type_name: str) -> type[Any]:
     """
-    Return the Python class of a message type.
+    Return the Python class of a ROS message type.
 
     Raises
     ------
@@ -27,7 +27,7 @@ def message_class(type_name: str) -> type[Any]:
         check_for_type_support(message_type)
     except Exception as error:  # packages built for another system raise arbitrary exceptions
         raise RecordingError(
-            f'type {type_name} is not available ({error}): install or source the package '
-            f"'{package}'"
+            f'the message type {type_name} is not available ({error}): install or source the '
+            f"package '{package}'"
         ) from error
     return message_type

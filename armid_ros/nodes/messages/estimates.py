@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Convert estimates to messages, statuses of /diagnostics and files."""
+"""Convert parameter estimates to messages and values for /diagnostics."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def estimate_message(
 
 
 def estimate_values(estimate: Estimate) -> dict[str, float]:
-    """Return the values of parameters with the ends of their 95 % intervals, for diagnostics."""
+    """Return estimated parameters and the ends of their 95 % intervals, for /diagnostics."""
     found: dict[str, float] = {}
     for parameter, value, (lower, upper) in zip(
         estimate.parameters, estimate.values, estimate.interval(), strict=True

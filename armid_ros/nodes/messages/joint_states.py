@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Decode joint states, check them, and sort them in the order of the robot."""
+"""Decode and check joint states, and sort their values in the joint order of the robot."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ import numpy.typing as npt
 from rclpy.clock import Clock
 from rclpy.time import Time
 
-#: Texts about faulty sequences of joint states, by reason.
+#: Messages about faulty sequences of joint states, by reason.
 DISTURBANCES = {
     'out_of_order': 'joint states whose stamp is not after the previous one are skipped',
     'impossible': 'joint states with values that no arm can reach are skipped',
@@ -43,7 +43,7 @@ SENDER_CONFLICTS = frozenset(
 
 class JointSample(NamedTuple):
     """
-    One joint state in the order of the robot.
+    Positions, velocities and torques of one joint state, in the joint order of the robot.
 
     Attributes
     ----------
@@ -64,7 +64,7 @@ class JointSample(NamedTuple):
 
 class JointStateReader:
     """
-    Reads JointState messages, and reports unreadable ones as complaints.
+    Decoder of JointState messages for one robot, which counts and logs unusable messages.
 
     Parameters
     ----------
@@ -87,11 +87,11 @@ class JointStateReader:
         self._epoch: int | None = None
 
     def read(self, data: bytes) -> JointSample | None:
-        """Decode a serialised message; None for an unusable one, as of some of the joints."""
+        """Decode a serialised message; None if it is unusable or lacks joints of the robot."""
         try:
             message = self._messages.read(data)
             if message.names is not self._names and message.names != self._names:
-                self._match(message.names)
+                self._find_joints(message.names)
             stamp = self._time(message.sec, message.nanosec)
             q = self._values(message.names, message.position, 'position')
             dq = None
@@ -101,12 +101,12 @@ class JointStateReader:
                 dq = dq if math.isfinite(sum(dq.tolist())) else None
             tau = self._values(message.names, message.effort, 'effort')
         except (MalformedMessage, RecordingError) as error:
-            self._complaints.say('joint_states', str(error))
+            self._complaints.add('joint_states', str(error))
             return None
         return JointSample(stamp, q, dq, tau)
 
-    def _match(self, names: Sequence[str]) -> None:
-        """Find the indices of the joints in messages with these names."""
+    def _find_joints(self, names: Sequence[str]) -> None:
+        """Find the index of each joint of the robot in messages with these names."""
         self._names = None
         try:
             self._order = joint_places(self._joints, names)
@@ -118,17 +118,19 @@ class JointStateReader:
         self._names = names
 
     def stamp(self, t: float) -> Time:
-        """Convert a time of this reader to a stamp."""
+        """Return the stamp of a sample time [s] of this reader."""
         return Time(nanoseconds=(self._epoch or 0) * 10**9 + round(t * 1e9))
 
     def _time(self, sec: int, nanosec: int) -> float:
         if sec == 0 and nanosec == 0:
-            self._complaints.say(
-                'stamp', 'joint states without a stamp: the time of reception is used'
+            self._complaints.add(
+                'stamp', 'joint states have no stamp: the time of reception is used'
             )
             sec, nanosec = divmod(self._clock.now().nanoseconds, 10**9)
         if sec < 0 or nanosec >= 10**9:
-            raise RecordingError('joint states with an invalid stamp are skipped')
+            raise RecordingError(
+                f'joint states with an invalid stamp, {sec} s and {nanosec} ns, are skipped'
+            )
         if self._epoch is None:
             self._epoch = sec
         return float(sec - self._epoch) + 1e-9 * nanosec
@@ -137,11 +139,13 @@ class JointStateReader:
         if len(field) != len(names):
             hint = '; identification needs measured torque' if name == 'effort' else ''
             raise RecordingError(
-                f'joint states have {len(names)} names but {len(field)} values of {name}{hint}'
+                f'joint states have {len(names)} joint names, but {len(field)} values of '
+                f'{name}{hint}'
             )
         return field[self._order]
 
     def _values(self, names: Sequence[str], field: FloatArray, name: str) -> FloatArray:
+        """Return the sorted values of a field; RecordingError if one is not a number."""
         values = self._ordered(names, field, name)
         # a sum is faster than isfinite; skipped joints may be NaN
         if not math.isfinite(sum(values.tolist())) and not np.all(np.isfinite(values)):

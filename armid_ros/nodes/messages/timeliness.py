@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Monitor the arrival of messages, and the difference of stamps and clock."""
+"""Monitor the arrival of messages, and the difference between their stamps and a clock."""
 
 from __future__ import annotations
 
@@ -12,42 +12,42 @@ from rclpy.clock import ROSClock
 
 class Freshness:
     """
-    Measures the time since the last message of a topic, independent of /clock.
+    Time since the last message of a topic, measured independently of /clock.
 
     Parameters
     ----------
-    what : str
+    kind : str
         Name of the messages, such as 'joint states'.
 
     """
 
-    def __init__(self, what: str) -> None:
-        self._what = what
+    def __init__(self, kind: str) -> None:
+        self._kind = kind
         self.now = time.monotonic
-        self._heard: float | None = None
+        self._received: float | None = None
 
-    def heard(self) -> None:
+    def mark_received(self) -> None:
         """Register that a message has arrived."""
-        self._heard = self.now()
+        self._received = self.now()
 
     @property
     def silence(self) -> float:
         """Return the time since the last message [s]; 0 before the first message."""
-        return 0.0 if self._heard is None else self.now() - self._heard
+        return 0.0 if self._received is None else self.now() - self._received
 
     @property
     def stopped(self) -> bool:
-        """Return whether messages have stopped after the first message."""
+        """Whether messages arrived before, but have stopped."""
         return self.silence > 0.5  # joint states below 2 Hz are not usable for identification
 
     def trouble(self) -> str:
-        """Return a message if the topic has stopped; empty otherwise."""
-        return f'{self._what} stopped {self.silence:.1f} s ago' if self.stopped else ''
+        """Return a text on how long messages have been missing; empty while they arrive."""
+        return f'{self._kind} stopped {self.silence:.1f} s ago' if self.stopped else ''
 
 
 class StampDifference:
     """
-    Compares the stamps of messages with their time of reception.
+    Difference between the stamps of messages and the clock of the receiving node.
 
     Parameters
     ----------
@@ -63,22 +63,22 @@ class StampDifference:
 
     @property
     def late(self) -> float:
-        """Return the smallest difference of clock and recent stamps [s]."""
+        """Return the smallest delay of recent stamps behind the clock [s]; negative if ahead."""
         return min(self._recent, key=abs, default=0.0)
 
     def take(self, stamp_ns: int, now_ns: int | None = None) -> None:
-        """Register the stamp of a message [ns]; 0: no stamp. By default it was received now."""
+        """Add the stamp of a message and its time of reception [ns]; a stamp of 0 is missing."""
         now = self._clock.now().nanoseconds if now_ns is None else now_ns
         self._late = (now - stamp_ns) * 1e-9 if stamp_ns and now else 0.0
         self._recent.append(self._late)
 
     def side(self, late: float) -> str:
-        """Return 'ahead of' or 'behind' and the name of the clock, for stamps with a delay [s]."""
+        """Return 'behind' or 'ahead of' with the name of the clock, for a delay of stamps [s]."""
         clock = '/clock' if self._clock.ros_time_is_active else "this computer's clock"
         return f'{"behind" if late > 0.0 else "ahead of"} {clock}'
 
     def of_results(self, topic: str) -> str:
-        """Return a message if the stamps of results are far from the clock; empty otherwise."""
+        """Return a text if stamps, and so those of results, differ from the clock by over 10 s."""
         # tf2 keeps ten seconds, so RViz cannot draw older results; up to 1000 messages in the
         # queue of a busy node are younger
         if abs(self._late) <= 10.0:

@@ -25,23 +25,23 @@ ARM_PARAMETERS = (
     setting(
         'effects',
         [''],
-        'Effects, each as NAME[@joint+joint]:quantity=value,quantity=value; set on the running '
-        'node, the arm continues with them.',
+        'Effects, each as NAME[@joint+joint]:quantity=value,quantity=value; a change applies to '
+        'the moving arm.',
     ),
     NodeParameter(
         'start', '', 'Initial position q1,q2,...; empty: middle of the limits [rad or m].'
     ),
     *(
-        setting(name, [0.0], f'{what}, one or one per joint; 0: none.', unit)
-        for name, what, unit in (
-            ('torque_noise', 'Standard deviation', 'N m or N'),
-            ('position_noise', 'Standard deviation', 'rad or m'),
-            ('velocity_noise', 'Standard deviation', 'rad/s'),
-            ('resolution', 'Encoder step', 'rad or m'),
+        setting(name, [0.0], f'{text}, one number or one per joint; 0: none.', unit)
+        for name, text, unit in (
+            ('torque_noise', 'Standard deviation of measured torques', 'N m or N'),
+            ('position_noise', 'Standard deviation of measured positions', 'rad or m'),
+            ('velocity_noise', 'Standard deviation of measured velocities', 'rad/s'),
+            ('resolution', 'Step of the encoders', 'rad or m'),
         )
     ),
     NodeParameter(
-        'torque_delay', 0, 'Delay of the torque measurement in time steps.', limits=(0, 100000)
+        'torque_delay', 0, 'Delay of the torque measurement [time steps].', limits=(0, 100000)
     ),
     NodeParameter(
         'loop_gain', 1.0, 'Factor on the loop gains of elastic joints.', limits=(0.0, 10.0)
@@ -57,12 +57,12 @@ SENSOR_PARAMETERS = ('torque_noise', 'position_noise', 'velocity_noise', 'resolu
 
 def sensors_of(value: Values, joints: Sequence[str]) -> Sensors:
     """
-    Return the sensors that parameters describe.
+    Return the noise, resolution and delay of the sensors that parameters describe.
 
     Raises
     ------
     ArmidError
-        If the count of numbers differs from that of the joints, or a number is negative.
+        If a parameter has neither one number nor one per joint, or a number is negative.
 
     """
     return Sensors(
@@ -76,12 +76,12 @@ def sensors_of(value: Values, joints: Sequence[str]) -> Sensors:
 
 def with_effects(arm: ArmModel, texts: Iterable[str]) -> ArmModel:
     """
-    Return an arm model with effects added.
+    Return an arm model with added effects.
 
     Parameters
     ----------
     arm : ArmModel
-        Arm model without the effects.
+        Arm model to which the effects are added.
     texts : iterable of str
         Each NAME[@joint+joint]:quantity=value,quantity=value; empty texts are ignored.
 

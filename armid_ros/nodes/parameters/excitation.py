@@ -61,8 +61,8 @@ PUBLISHER_PARAMETERS = (
     NodeParameter(
         'speed',
         'slow',
-        'Share of the velocity limits used by what is designed, and on the way there; fast by '
-        'default in a simulation. A file keeps its own.',
+        'Share of the velocity limits that a designed excitation and the approach use; fast by '
+        'default in a simulation. An excitation from a file keeps its own speed.',
         choices=tuple(SPEED_CLASSES),
     ),
     NodeParameter('effects', USUAL.split(','), 'Effects to excite, with the rigid body.'),
@@ -100,8 +100,8 @@ PUBLISHER_PARAMETERS = (
     setting(
         'goal_tolerance',
         0.0,
-        'Largest distance of a joint from the end of a goal that is reached; 0: default of the '
-        'controller. Its path tolerance is tracking_tolerance.',
+        'Tolerance of each joint at the end of the run, for the action; 0: default of the '
+        'controller. The tolerance on the path is tracking_tolerance.',
         'rad or m',
         limits=(0.0, 10.0),
     ),
@@ -136,8 +136,8 @@ PUBLISHER_PARAMETERS = (
     NodeParameter(
         'zero_stamp',
         False,
-        'Stamp the run with zero, so that the controller begins at once: for clocks of this '
-        'computer and of the robot that differ. Stops are always stamped with zero.',
+        'Send the run with a zero stamp, so that the controller begins at once: for a robot whose '
+        'clock differs from that of this computer. Stops always have a zero stamp.',
     ),
     setting(
         'stopping',
@@ -157,7 +157,7 @@ PUBLISHER_PARAMETERS = (
     setting(
         'tracking_tolerance',
         0.2,
-        'The arm is stopped if a joint is further from its planned position.',
+        'Distance of a joint from its planned position at which the arm is stopped.',
         'rad or m',
         limits=(0.001, 10.0),
     ),
@@ -171,7 +171,7 @@ PUBLISHER_PARAMETERS = (
     setting(
         'state_timeout',
         0.5,
-        'The arm is stopped, and not started, without a joint state for so long; 5 s by default '
+        'Time without a joint state after which the arm is stopped or not started; 5 s by default '
         'in a simulation.',
         's',
         limits=(0.01, 10.0),
@@ -179,7 +179,7 @@ PUBLISHER_PARAMETERS = (
     NodeParameter(
         'subscriber_timeout',
         10.0,
-        'How long to wait for a subscriber and joint states; then only ~/start begins.',
+        'How long a run waits for a subscriber and joint states; later it needs ~/start.',
         's',
         limits=(0.0, 3600.0),
     ),
@@ -188,19 +188,19 @@ PUBLISHER_PARAMETERS = (
 
 def make_planner(value: Values) -> tuple[TransferPlanner, tuple[str, ...]]:
     """
-    Load the robot and its obstacles that parameters describe.
+    Return the planner of paths to an excitation for the robot and obstacles of parameters.
 
     Parameters
     ----------
     value : callable
-        Returns the value of a parameter of `PUBLISHER_PARAMETERS`.
+        Function from the name of one of `PUBLISHER_PARAMETERS` to its value.
 
     Returns
     -------
     planner : TransferPlanner
-        Plans the path to an excitation, with arm and obstacles.
+        Planner of the path to an excitation, with arm and obstacles.
     unchecked : tuple of str
-        Checks that are not possible.
+        Checks that the description does not allow.
 
     Raises
     ------
@@ -224,14 +224,14 @@ def make_planner(value: Values) -> tuple[TransferPlanner, tuple[str, ...]]:
 
 def make_excitation(value: Values, rate: float, planner: TransferPlanner) -> Excitation:
     """
-    Load or design an excitation according to parameters.
+    Return the excitation of a file, or design one for the robot of the parameters.
 
     Parameters
     ----------
     value : callable
-        Returns the value of a parameter of `PUBLISHER_PARAMETERS`.
+        Function from the name of one of `PUBLISHER_PARAMETERS` to its value.
     rate : float
-        Samples per second at which it will be sent [Hz].
+        Rate at which the excitation will be sent [Hz].
     planner : TransferPlanner
         Planner with arm and obstacles.
 
@@ -263,14 +263,14 @@ def make_excitation(value: Values, rate: float, planner: TransferPlanner) -> Exc
 
 def checked(excitation: Excitation, planner: TransferPlanner, source: str) -> Excitation:
     """
-    Check an excitation, and return it with the joints in the order of the arm.
+    Return an excitation in the joint order of the arm, if it keeps limits and distances.
 
-    A joint without an acceleration limit gets the one that designs assume; see `Limits.of`.
+    For a joint without an acceleration limit, the limit of `Limits.of` is assumed.
 
     Parameters
     ----------
     excitation : Excitation
-        From a file or a topic.
+        Excitation from a file or a topic.
     planner : TransferPlanner
         Planner with arm and obstacles.
     source : str
@@ -290,6 +290,6 @@ def checked(excitation: Excitation, planner: TransferPlanner, source: str) -> Ex
     faults = faults or excitation_faults(planner.arm, limits, excitation)
     if faults:
         assumed = np.isinf(robot.acceleration_limit).any() and 'acceleration' in str(faults)
-        remedy = '; the parameter joint_limits declares other acceleration limits' * assumed
+        remedy = '; the parameter joint_limits sets other acceleration limits' * assumed
         raise TrajectoryError(f'{source}: {faults}{remedy}')
     return excitation

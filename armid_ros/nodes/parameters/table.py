@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Tables of node parameters, for descriptors, checks and documentation."""
+"""Tables of node parameters: defaults, ranges and descriptions."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from functools import partial
 import math
 from typing import Any
 
-from armid_ros.errors import ArmidError, meant
+from armid_ros.errors import ArmidError
 from rcl_interfaces.msg import (
     FloatingPointRange,
     IntegerRange,
@@ -28,12 +28,12 @@ Values = Callable[[str], Any]
 @dataclass(frozen=True)
 class NodeParameter:
     """
-    One parameter of a node.
+    Parameter of a node: default, description, unit and permitted values.
 
     Attributes
     ----------
     name : str
-        Its name.
+        Name of the parameter.
     default : bool, int, float, str, list of str or list of float
         Default value, which also fixes the type. ROS cannot infer the type of an empty list, so
         that [''] stands for no names; [] is accepted for it.
@@ -48,7 +48,7 @@ class NodeParameter:
     read_only : bool
         Whether the parameter cannot change at run time.
     check : callable, or None
-        Raises ArmidError for an invalid value inside the range.
+        Function that raises an ArmidError for an invalid value.
 
     """
 
@@ -62,7 +62,7 @@ class NodeParameter:
     check: Callable[[Any], object] | None = None
 
     def descriptor(self) -> ParameterDescriptor:
-        """Return the ROS parameter descriptor."""
+        """Return the ROS descriptor of the parameter."""
         descriptor = ParameterDescriptor(description=self.text(), read_only=self.read_only)
         if self.limits is not None and isinstance(self.default, float):
             ends = dict(zip(('from_value', 'to_value'), self.limits, strict=True))
@@ -73,14 +73,14 @@ class NodeParameter:
         return descriptor
 
     def text(self) -> str:
-        """Return the description with unit and choices."""
+        """Return the description with the unit and the choices."""
         unit = f' [{self.unit}]' if self.unit else ''
         choices = f' One of: {", ".join(self.choices)}.' if self.choices else ''
         return f'{self.description}{unit}{choices}'
 
     def converted(self, value: Any) -> Value:
         """
-        Return a value with the type of the parameter.
+        Return a value converted to the type of the parameter.
 
         An integer is accepted for a float, one value for a list, and [] for no names.
 
@@ -103,10 +103,10 @@ class NodeParameter:
         instead = f'use a value such as {str(default).lower() if kind is bool else default}'
         if kind is str:
             instead = f'use a text; quote other values twice: -p {self.name}:="\'{value}\'"'
-        raise ParameterError(f"parameter '{self.name}' cannot be {value}; {instead}")
+        raise ParameterError(f"the parameter '{self.name}' cannot be {value}; {instead}")
 
     def objection(self, value: object) -> str:
-        """Return why a value of the right type is invalid; empty if it is valid."""
+        """Return why a value of the right type is not permitted; empty if it is permitted."""
         if isinstance(value, float) and not math.isfinite(value):
             return f"parameter '{self.name}' is {value}, not a finite number"
         if isinstance(value, int | float) and self.limits is not None:
@@ -132,18 +132,17 @@ setting = partial(NodeParameter, read_only=False)
 
 
 class ParameterError(ArmidError):
-    """A node was started with an invalid parameter."""
+    """Invalid parameter of a node."""
 
 
 def declare(node: Node, table: Iterable[NodeParameter]) -> dict[str, NodeParameter]:
     """
-    Declare the parameters of a table on a node, check later changes, and return them by name.
+    Declare the parameters of a table on a node, and return them by name.
 
     Raises
     ------
     ParameterError
-        If an override has the wrong type, is out of range or invalid. The message contains the
-        remedy.
+        If a given value has the wrong type, or is not permitted. Later changes are checked too.
 
     """
     entries = {entry.name: entry for entry in table}
@@ -170,17 +169,6 @@ def declare(node: Node, table: Iterable[NodeParameter]) -> dict[str, NodeParamet
 
 
 def overrides(node: Node) -> Mapping[str, Parameter]:
-    """Return the parameters with which a node was started, by name, declared or not."""
+    """Return the parameters that were given at the start of a node, by name."""
     given: Mapping[str, Parameter] = node._parameter_overrides
     return given
-
-
-def unknown(node: Node) -> str:
-    """Return a message on overrides of unknown parameters; empty if there are none."""
-    known = node.get_parameters_by_prefix('')
-    given = [name for name in overrides(node) if not name.startswith('qos_overrides.')]
-    wrong = [name for name in given if name not in known]
-    if not wrong:
-        return ''
-    named = '; '.join(f"no parameter is named '{name}'{meant(name, known)}" for name in wrong)
-    return f'{named}; left out, see --help'

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Reserve ROS domains for runs without communication with other robots."""
+"""Reserve ROS domains, so that nodes do not communicate with other robots."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def private_context(domain: int | None = None) -> Iterator[Context]:
     Parameters
     ----------
     domain : int, optional
-        ROS domain; by default one that no other private context uses.
+        ROS domain; by default a domain that no other private context uses.
 
     Raises
     ------
@@ -51,7 +51,7 @@ def private_context(domain: int | None = None) -> Iterator[Context]:
 @contextmanager
 def reserved_domain() -> Iterator[int]:
     """
-    Reserve a domain until the context is closed or the process ends.
+    Reserve a ROS domain until the context is closed or the process ends.
 
     Raises
     ------

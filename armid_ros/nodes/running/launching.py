@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Build launch files with optional arguments, and nodes that use them."""
+"""Launch descriptions with optional arguments, and the nodes that they start."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ SIMULATED_DRIVES: Mapping[str, Any] = {
 
 class Argument(NamedTuple):
     """
-    Argument of a launch file.
+    Argument of a launch file, with its type and default.
 
     Attributes
     ----------
     name, description : str
-        For `ros2 launch --show-args`.
+        Name, and description in `ros2 launch --show-args`.
     kind : type
         str, bool, int, float, or list for names separated by commas.
     default : str or None
@@ -43,7 +43,7 @@ class Argument(NamedTuple):
     default: str | None = ''
 
     def read(self, text: str) -> Any:
-        """Convert a text to the type of the argument; RuntimeError if that fails."""
+        """Return the value of a text in the type of the argument; RuntimeError for other texts."""
         try:
             if self.kind is list:
                 return [part.strip() for part in listed(text) if part.strip()]
@@ -52,21 +52,23 @@ class Argument(NamedTuple):
             return self.kind(text)
         except (KeyError, ValueError):
             kind = self.kind.__name__
-            raise RuntimeError(f"{self.name}:={text} is not of type '{kind}'") from None
+            raise RuntimeError(
+                f"the launch argument {self.name}:={text} is not of type '{kind}'"
+            ) from None
 
 
 def described(
     arguments: Sequence[Argument], start: Callable[[dict[str, Any]], Sequence[Any]]
 ) -> Any:
     """
-    Return a launch description.
+    Return a launch description with arguments, which starts actions with their values.
 
     Parameters
     ----------
     arguments : sequence of Argument
         Arguments of `ros2 launch`.
     start : callable
-        Returns the actions; called with the values of the arguments that are not empty.
+        Function from the values of the arguments that are not empty to the launch actions.
 
     """
     from launch import LaunchDescription
@@ -94,7 +96,7 @@ def node(
     **more: Any,
 ) -> Any:
     """
-    Return the launch action of a node of this package.
+    Return the launch action that starts a node of this package.
 
     Parameters
     ----------

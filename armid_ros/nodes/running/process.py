@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Run a node in its own process, and handle signals."""
+"""Run a node in its own process until it is finished or a signal arrives."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def steady() -> Iterator[None]:
 
 
 class _Ending:
-    """Signal handler that ends the process between two callbacks."""
+    """Signal handler that lets a process end between two callbacks."""
 
     # A node must publish the stop of an arm after a signal, but the handlers of rclpy shut down
     # its context. During the construction of a node, SIGINT and SIGTERM end the process at once.
@@ -69,13 +69,13 @@ class _Ending:
 
     @property
     def due(self) -> bool:
-        """Return whether the process must end, by a signal or because its parent has ended."""
+        """Whether the process has to end, after a signal or the end of its parent process."""
         ended = self.with_parent and os.getppid() != self._parent
         return self._requested or self.hung_up or ended
 
     @contextmanager
     def at_once(self) -> Iterator[None]:
-        """Make signals end the process at once."""
+        """Let signals end the process at once inside this context."""
         self._at_once = True
         try:
             yield
@@ -93,12 +93,12 @@ class _Ending:
 
 
 class _EndedAtOnce(BaseException):
-    """A signal arrived during the construction of the node; caught by `run` only."""
+    """Exception of a signal during the construction of a node, which `run` catches."""
 
 
 def run(make_node: Callable[[], ArmidNode], args: Sequence[str] | None = None) -> None:
     """
-    Run a node until it is finished or a signal arrives; with --help print its help only.
+    Run a node until it is finished or a signal arrives; --help only prints its help.
 
     Raises
     ------
@@ -134,7 +134,7 @@ def run(make_node: Callable[[], ArmidNode], args: Sequence[str] | None = None) -
     except ArmidError as error:
         trouble.append(str(error))
     finally:
-        trouble += _leave(node)
+        trouble += _shut_down(node)
     if ending.hung_up:
         trouble.append('ended by SIGHUP, as by a terminal that is closed')
     if node is not None and node.failure:
@@ -146,7 +146,7 @@ def run(make_node: Callable[[], ArmidNode], args: Sequence[str] | None = None) -
 
 
 def _made(make_node: Callable[[], ArmidNode], args: Sequence[str] | None) -> ArmidNode:
-    """Initialise ROS and make a node; ParameterError for arguments that are not of ROS."""
+    """Initialise ROS, and return a new node; ParameterError for invalid arguments."""
     own = sys.argv[1:] if args is None else args
     try:
         rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
@@ -154,14 +154,14 @@ def _made(make_node: Callable[[], ArmidNode], args: Sequence[str] | None) -> Arm
         raise ParameterError(unreadable(error)) from error
     others = remove_ros_args(['', *own])[1:]
     if others:
-        raise ParameterError(f'{" ".join(others)}: these are not ROS arguments; {_SYNTAX}')
+        raise ParameterError(f'{" ".join(others)}: no ROS arguments; {_SYNTAX}')
     node = make_node()
     node.warn_of_unknown()
     return node
 
 
-def _leave(node: ArmidNode | None) -> list[str]:
-    """Close a node, and shut down DDS; return the error of closing."""
+def _shut_down(node: ArmidNode | None) -> list[str]:
+    """Close a node and shut down ROS; return the errors."""
     # Under `ros2 launch` Ctrl-C arrives twice; the second must not interrupt closing.
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, signal.SIG_IGN)
@@ -183,7 +183,7 @@ def _leave(node: ArmidNode | None) -> list[str]:
 
 def unreadable(error: Exception) -> str:
     """
-    Return the text of an error of rclpy on its arguments, with their syntax.
+    Return a readable message for an error of rclpy on its arguments, with their syntax.
 
     Parameters
     ----------
@@ -197,7 +197,7 @@ def unreadable(error: Exception) -> str:
 
 def usage(node: type[ArmidNode]) -> str:
     """
-    Format the help of a node: its purpose and parameters.
+    Return the help text of a node: its purpose and its parameters.
 
     Parameters
     ----------

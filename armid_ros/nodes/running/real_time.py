@@ -10,14 +10,14 @@ import time
 
 class RealTime:
     """
-    Keeps a simulation in step with real time.
+    Synchronisation of a simulation with real time, which skips time that cannot be caught up.
 
     Parameters
     ----------
     elapsed : callable
-        Returns the time of the simulation [s].
+        Function that returns the time of the simulation [s].
     step : callable
-        Advances the simulation by one sample.
+        Function that advances the simulation by one sample.
 
     Attributes
     ----------
@@ -32,12 +32,12 @@ class RealTime:
         self.begin()
 
     def begin(self) -> None:
-        """Restart at the present time; skipped time is kept."""
+        """Synchronise again from the present time on; the skipped time is kept."""
         self._anchor = self._clock(), self._elapsed()
 
     def catch_up(self, factor: float, period: float) -> float:
         """
-        Simulate until real time times a factor; skip time that cannot be caught up.
+        Simulate up to the present real time; skip time that cannot be caught up.
 
         Parameters
         ----------
@@ -71,7 +71,7 @@ class RealTime:
         return behind
 
     def trouble(self, advice: str) -> str:
-        """Return a message with the skipped time and the remedy; empty if none was skipped."""
+        """Return a text with the skipped time and the remedy; empty if no time was skipped."""
         if self.given_up <= 0.5:  # delays during the start are normal
             return ''
         return f'{self.given_up:.1f} s of real time were skipped: {advice}'

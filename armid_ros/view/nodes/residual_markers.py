@@ -71,7 +71,7 @@ class ResidualMarkersNode(ListeningNode):
         self.create_subscription(
             Diagnosis, 'live_diagnosis/diagnosis', self._on_diagnosis, LATCHED
         )
-        self.look_every(1.0 / self.value('rate'), self.draw)
+        self.create_steady_timer(1.0 / self.value('rate'), self.draw)
 
     def condition(self) -> tuple[str, Mapping[str, object]]:
         """Return the missing inputs, and the ratio of residual to torque of each joint."""

@@ -57,7 +57,7 @@ def test_springs_are_found_from_the_topics(bench):
         assert abs(value - 1e4) < 5.0 * std < 5e3
     for fresh in learner.freshness:
         fresh.now = lambda: 0.0  # time does not go on while the estimate is made
-        fresh.heard()
+        fresh.mark_received()
     state = bench.diagnose(learner, bench.diagnostics())
     stated = next(float(v.value) for v in state.values if v.key.startswith('stiffness all'))
     assert stated == pytest.approx(1e4, rel=0.02)

@@ -96,7 +96,7 @@ class InteractionIdentifierNode(ArmidNode):
             for k, topic in enumerate(_TOPICS)
         )
         self.offer('~/reset', self.reset)
-        self.look_every(LOOK_PERIOD, self.match)
+        self.create_steady_timer(LOOK_PERIOD, self.match)
 
     @property
     def hardware(self) -> str:
@@ -147,13 +147,13 @@ class InteractionIdentifierNode(ArmidNode):
     def _take(self, machine: int, message: JointState) -> None:
         """Add a joint state of the exoskeleton (0) or wearer (1); publish a new estimate."""
         self.received += 1
-        self.freshness[machine].heard()
+        self.freshness[machine].mark_received()
         topic, n = _TOPICS[machine], len(self._joints[machine])
         for sample in self._signals(machine, message):
             if sample.begins:
                 self.identifier.interrupt()
                 text = f'{topic}: positions jump; earlier samples are discarded'
-                self.complaints.say(f'{topic} step', text)
+                self.complaints.add(f'{topic} step', text)
             q, tau = sample.x[:n], sample.x[n:]
             if machine:
                 self.identifier.take_other(sample.t, q)
@@ -187,7 +187,7 @@ class InteractionIdentifierNode(ArmidNode):
         good = gate.take(float(stamp.sec - self._epoch) + 1e-9 * stamp.nanosec, signal)
         for reason, count in (gate.rejected - self._told[machine]).items():
             for _ in range(count):
-                self.complaints.say(f'{topic} {reason}', f'{topic}: {_DAMAGED[reason]}')
+                self.complaints.add(f'{topic} {reason}', f'{topic}: {_DAMAGED[reason]}')
         self._told[machine] = gate.rejected.copy()
         return good
 

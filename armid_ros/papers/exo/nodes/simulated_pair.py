@@ -78,7 +78,7 @@ class SimulatedPairNode(ArmidNode):
         factor = self.value('real_time_factor')
         if factor:
             period = max(1.0 / (self.value('rate') * factor), 0.0005)
-            self.look_every(period, self.catch_up)
+            self.create_steady_timer(period, self.catch_up)
 
     @property
     def hardware(self) -> str:
