@@ -1,10 +1,10 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Identify an arm from the excitation to the report, and end.
+Excite, record, identify and diagnose an arm, write the reports, and end.
 
 THE ARM MOVES: `ros2 launch armid_ros identify.launch.py robot:=my_arm.urdf` begins as soon as a
-controller and joint states are there. `simulate:=true` tries it on a simulated arm first.
+controller and joint states are available. `simulate:=true` moves a simulated arm instead.
 
 """
 
@@ -14,40 +14,54 @@ from armid_ros.nodes.running.launching import Argument, described, node, SIMULAT
 from launch.actions import Shutdown
 
 ARGUMENTS = (
-    Argument('robot', str, 'shipped name, URDF or xacro; empty: that of params_file'),
-    Argument('gravity', str, 'earth, moon, or x,y,z in the frame of the base [m/s^2]'),
-    Argument('joints', list, 'driven joints, with commas; empty: all but those of grippers'),
-    Argument('effects', list, 'beside the rigid body, with commas; empty: friction and offset'),
-    Argument('save_to', str, 'folder for recordings, model and reports; empty: identification'),
-    Argument('namespace', str, 'of the nodes and of the topics of the robot'),
+    Argument('robot', str, 'shipped robot, URDF or xacro; empty: the robot of params_file'),
+    Argument('gravity', str, 'earth, moon, or x,y,z in the base frame [m/s^2]'),
     Argument(
-        'controller', str, 'of its topic and action; empty: neither', 'joint_trajectory_controller'
+        'joints',
+        list,
+        'driven joints, separated by commas; empty: all joints except those of grippers',
     ),
-    Argument('joint_states', str, 'topic of the robot', 'joint_states'),
-    Argument('robot_description', str, 'topic of the robot', 'robot_description'),
-    Argument('effort_topic', str, 'topic with torques, where joint_states have none'),
-    Argument('params_file', str, 'parameters of the nodes; empty: config/real_robot.yaml'),
+    Argument(
+        'effects',
+        list,
+        'effects added to the rigid body, separated by commas; empty: friction and offset',
+    ),
+    Argument('save_to', str, 'folder for recordings, model and reports; empty: identification'),
+    Argument('namespace', str, 'namespace of the nodes and of the topics of the robot'),
+    Argument(
+        'controller',
+        str,
+        'namespace of the topic and action of the controller; empty: none',
+        'joint_trajectory_controller',
+    ),
+    Argument('joint_states', str, 'topic with the joint states of the robot', 'joint_states'),
+    Argument('robot_description', str, 'topic with the URDF of the robot', 'robot_description'),
+    Argument('effort_topic', str, 'topic with torques, if joint_states have none'),
+    Argument('params_file', str, 'parameter file of the nodes; empty: config/real_robot.yaml'),
     Argument('use_sim_time', bool, 'take the time from /clock'),
-    Argument('file', str, 'excitation of armid excite; empty: design one'),
-    Argument('environment', str, 'what stands around the arm: YAML, MoveIt scene'),
-    Argument('floor', str, 'height above the base [m], or none; empty: that of the robot'),
-    Argument('duration', float, 'of an excitation that is designed [s]; empty: 44.0'),
-    Argument('runs', int, 'how often it is run; the last of several is held out; empty: 2'),
-    Argument('rehearse', bool, 'run it slowly first, and go on only if that is as foreseen'),
-    Argument('diagnose', bool, 'look for what the model lacks, too; empty: true'),
-    Argument('simulate', bool, 'have a simulated arm, with friction and noise, for a robot'),
+    Argument('file', str, 'excitation file of armid excite; empty: design an excitation'),
+    Argument('environment', str, 'obstacles around the arm: YAML file or MoveIt scene'),
+    Argument(
+        'floor', str, 'height of the floor above the base [m], or none; empty: that of the robot'
+    ),
+    Argument('duration', float, 'duration of a designed excitation [s]; empty: 44.0'),
+    Argument('runs', int, 'number of runs, the last of several is held out; empty: 2'),
+    Argument('rehearse', bool, 'first run slowly; continue only if the arm moves as predicted'),
+    Argument('diagnose', bool, 'also find effects that the model lacks; empty: true'),
+    Argument('simulate', bool, 'simulate an arm with friction and noise; no robot moves'),
 )
 
 
 def generate_launch_description():
-    """Describe what is started; `ros2 launch armid_ros identify.launch.py --show-args`."""
+    """Return the launch description; `ros2 launch ... --show-args` lists its arguments."""
     return described(ARGUMENTS, start)
 
 
 def start(given):
-    """Return the nodes."""
+    """Return the launch actions of the nodes for the given arguments."""
 
     def some(*names):
+        """Return the given arguments of some names."""
         return {name: given[name] for name in names if name in given}
 
     def one(name, chosen, usual, remapped=(), **more):
@@ -57,8 +71,8 @@ def start(given):
     simulate = given.get('simulate', False)
     shipped = '' if simulate else str(Path(__file__).parents[1] / 'config' / 'real_robot.yaml')
     if not simulate and not {'robot', 'params_file'} & given.keys():
-        raise RuntimeError('robot is missing: give robot:=URDF, or a params_file with robot')
-    unnamed = {} if simulate else {'robot': ''}  # no robot, rather than the default one
+        raise RuntimeError('robot is missing: add robot:=URDF, or a params_file with robot')
+    unnamed = {} if simulate else {'robot': ''}  # no default robot
     topics = some('joint_states', 'robot_description')
     own, simulation = dict(topics), {'simulation': True} if simulate else {}
     if 'effort_topic' in given:
@@ -68,7 +82,7 @@ def start(given):
     folder = Path(given.get('save_to', 'identification')).expanduser()
     live, run = {'save_to': str(folder / 'live')}, {'save_to': str(folder)}
     bag = {'bag': str(folder / 'run')}
-    saved = 'save_to' in given  # in one folder, whatever the parameter file has
+    saved = 'save_to' in given  # takes precedence over the parameter file
     arm, effects = some('robot', 'gravity', 'joints'), some('effects')
     design = some('file', 'environment', 'floor', 'duration')
     steps = some('runs', 'rehearse', 'diagnose')

@@ -1,33 +1,34 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""A simulated arm that is excited, identified online and recorded."""
+"""Simulate an arm, excite it, identify it online and record it."""
 
 from armid_ros.nodes.running.launching import Argument, described, node, SIMULATED_DRIVES
 
 ARGUMENTS = (
-    Argument('robot', str, 'shipped name, URDF or xacro; empty: humanoid_arm'),
-    Argument('gravity', str, 'earth, moon, or x,y,z in the frame of the base [m/s^2]'),
-    Argument('bag', str, 'directory to record to; empty: dated'),
-    Argument('rate', float, 'of joint_states [Hz]; empty: 500.0'),
-    Argument('duration', float, 'of the excitation [s]; empty: 44.0'),
+    Argument('robot', str, 'shipped robot, URDF or xacro; empty: humanoid_arm'),
+    Argument('gravity', str, 'earth, moon, or x,y,z in the base frame [m/s^2]'),
+    Argument('bag', str, 'directory of the recorded bag; empty: armid_<date>_<time>'),
+    Argument('rate', float, 'rate of joint_states [Hz]; empty: 500.0'),
+    Argument('duration', float, 'duration of the excitation [s]; empty: 44.0'),
     Argument(
-        'floor', str, 'height above the origin of the base [m], or none; empty: that of the robot'
+        'floor', str, 'height of the floor above the base [m], or none; empty: that of the robot'
     ),
-    Argument('namespace', str, 'of the nodes and of the topics'),
-    Argument('params_file', str, 'parameters of the nodes'),
+    Argument('namespace', str, 'namespace of the nodes and of the topics'),
+    Argument('params_file', str, 'parameter file of the nodes'),
     Argument('use_sim_time', bool, 'take the time from /clock'),
 )
 
 
 def generate_launch_description():
-    """Describe what is started; `ros2 launch armid_ros simulation.launch.py --show-args`."""
+    """Return the launch description; `ros2 launch ... --show-args` lists its arguments."""
     return described(ARGUMENTS, start)
 
 
 def start(given):
-    """Return the nodes."""
+    """Return the launch actions of the nodes for the given arguments."""
 
     def some(*names):
+        """Return the given arguments of some names."""
         return {name: given[name] for name in names if name in given}
 
     topics = ['joint_states', 'robot_description', 'joint_trajectory']
