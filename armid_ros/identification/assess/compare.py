@@ -272,8 +272,7 @@ def residual_changes(
     for joint in (one for one in before.misfit.rms if one in after.misfit.rms):
         left = [one.misfit.rms[joint] for one in (before, after)]
         torques = [(one.misfit.torque_rms or {}).get(joint, 0.0) for one in (before, after)]
-        # residual of a joint, as a share of its torque, below which filters rather than the arm
-        # cause it
+        # a residual below this share of the torque of a joint is caused by filters, not by the arm
         first, second = (
             max(rms, 1e-3 * torque) for rms, torque in zip(left, torques, strict=True)
         )

@@ -78,8 +78,8 @@ def check_data(
     if alone and not faults:  # another machine that is tied to the arm may drive it
         driven = driven_by_friction(arm.robot, [part.motion for part in data])
         faults += [driven] if driven else []
-    notes = [note for one in recordings for note in _extremes(arm.robot, one)]
-    notes += [*_described_friction(arm), *(one.text for one in sensors)]
+    notes = [note for one in recordings for note in _limit_notes(arm.robot, one)]
+    notes += [*_missing_friction(arm), *(one.text for one in sensors)]
     try:
         notes += check_motion(arm.robot, recordings)
     except IdentificationError as error:
@@ -132,7 +132,7 @@ def unit_faults(
     if not before or len(clear) < min(2, robot.n_joints):
         return []
     typical = float(np.median(factors[clear]))
-    # masses cancel in factors since a baseline, which are near that of a unit of force to 5 %
+    # errors of masses cancel in factors since a baseline: a unit is found within 5 % of its factor
     unit = unit_of(typical, factors[clear].tolist(), 1.05)
     if not unit and 1.0 / 4.0 < typical < 4.0:  # loads cause such factors
         return []
@@ -175,7 +175,7 @@ def _torque_ratios(
     return factors
 
 
-def _described_friction(arm: ArmModel) -> list[str]:
+def _missing_friction(arm: ArmModel) -> list[str]:
     """Return a note if the model lacks friction that the URDF states; otherwise an empty list."""
     robot = arm.robot
     there = {(effect.name, joint) for effect in arm.effects for joint in effect.joints}
@@ -198,7 +198,7 @@ def _described_friction(arm: ArmModel) -> list[str]:
     ]
 
 
-def _extremes(robot: Robot, recording: Recording) -> Iterator[str]:
+def _limit_notes(robot: Robot, recording: Recording) -> Iterator[str]:
     """Yield notes on joints whose torque saturates, or exceeds the limit of the drive."""
     if recording.tau is None:
         return
@@ -210,11 +210,11 @@ def _extremes(robot: Robot, recording: Recording) -> Iterator[str]:
         share = float(np.mean(np.abs(reading) >= top * (1.0 - 1e-9)))
         if top > 0.0 and share > 0.02 and len(np.unique(reading)) > 10:  # the reading is clipped
             yield (
-                f'{source}: {100 * share:.0f} % of the torque of {joint} is at {top:.4g} {unit}, '
-                'its highest value: a limit'
+                f'{source}: {100 * share:.0f} % of the torques of {joint} are at the largest '
+                f'value, {top:.4g} {unit}, which seems to be a limit'
             )
         if top > 1.5 * limit:
             yield (
-                f'{source}: the torque of {joint} reaches {top:.4g}, its limit is {limit:.4g} '
-                f'{unit}'
+                f'{source}: the torque of {joint} reaches {top:.4g} {unit}, but its described '
+                f'limit is {limit:.4g} {unit}'
             )

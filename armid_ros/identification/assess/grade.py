@@ -37,7 +37,7 @@ _RANK: dict[Word, int] = {'unusable': 0, 'poor': 1, 'good': 2}
 @dataclass(frozen=True)
 class Grade:
     """
-    Grade of an identification, with reasons.
+    Grade of an identification (good, poor or unusable), with its reasons.
 
     Attributes
     ----------
@@ -121,7 +121,7 @@ def grade(
         worst = {None: _worst_joint(halves, result.training, result)}
     reasons = [
         *faults,
-        *_errors(result, worst, [fit for fits in validation.values() for fit in fits]),
+        *_torque_errors(result, worst, [fit for fits in validation.values() for fit in fits]),
         *_resting(result, validation),
         *(fault for fault in sensors if fault.word == 'good'),
     ]
@@ -139,7 +139,7 @@ def grade(
     )
 
 
-def _errors(
+def _torque_errors(
     result: Identification, worst: Mapping[str | None, _WorstJoint], held_out: Sequence[Fit]
 ) -> Iterator[Fault]:
     """Yield the torque error of the worst joint, and joints whose torque is hardly predicted."""
@@ -185,7 +185,7 @@ def _errors(
         named = ', '.join(
             f'{result.arm.robot.joints[j]} ({every[j]:.0f} %)' for j in np.flatnonzero(noisy)
         )
-        text = f'torque is mostly noise or friction at rest, hardly predicted: {named}'
+        text = f'torques that are mostly noise or friction at rest are hardly predicted: {named}'
         yield Fault(text, 'good')
 
 
@@ -221,14 +221,14 @@ def _resting(result: Identification, validation: Mapping[str, Sequence[Fit]]) ->
     joints = np.array(result.arm.robot.joints)
     if not np.all(fitted):
         yield Fault(
-            'not identified and not checked, as they do not move: '
-            f'{", ".join(joints[~fitted])}; record a motion of all joints, or ask for the others '
+            'joints that do not move are neither identified nor checked: '
+            f'{", ".join(joints[~fitted])}; record a motion of all joints, or identify the others '
             f'alone with --joints {",".join(joints[fitted])}',
             'poor',
         )
     if np.any(fitted & ~checked):
         names = ', '.join(joints[fitted & ~checked])
-        yield Fault(f'not checked, as they do not move in held-out data: {names}', 'good')
+        yield Fault(f'joints that do not move in held-out data are not checked: {names}', 'good')
 
 
 def beyond_noise(errors: FloatArray, fits: Sequence[Fit], used: Conditioning) -> FloatArray:

@@ -90,7 +90,7 @@ def hypotheses(robot: Robot, motions: Sequence[Motion]) -> Iterator[Hypothesis]:
     """
     turned = np.max([np.abs(one.q).max(axis=0) for one in motions], axis=0) > 2.0 * np.pi
     turned &= ~robot.prismatic
-    yield from _of_all_torques(robot, motions)
+    yield from _gravity_and_scale(robot, motions)
     if np.any(turned):
         yield _in_degrees(robot)
     for joint, name in enumerate(robot.joints):
@@ -100,7 +100,7 @@ def hypotheses(robot: Robot, motions: Sequence[Motion]) -> Iterator[Hypothesis]:
             text = f'the {quantity} of {name} seems to have the opposite sign: negate it'
             if quantity == 'position and torque':
                 text = f'position and torque of {name} seem to have the opposite sign: negate both'
-            change = _times(robot, quantity, joint, -1.0)
+            change = _scaling(robot, quantity, joint, -1.0)
             yield Hypothesis('sign', text, change, (joint, quantity))
         if turned[joint] and robot.n_joints > 1:
             yield _in_degrees(robot, joint)
@@ -115,13 +115,13 @@ def hypotheses(robot: Robot, motions: Sequence[Motion]) -> Iterator[Hypothesis]:
                 'exchange',
                 f'the {quantity} of {robot.joints[first]} and of {robot.joints[second]} seem to '
                 'be exchanged: check the names of the joints',
-                partial(_changed, quantity, matrix),
+                partial(_transformed, quantity, matrix),
                 (first, second, quantity),
             )
 
 
-def _of_all_torques(robot: Robot, motions: Sequence[Motion]) -> Iterator[Hypothesis]:
-    """Yield the best gravity and factor of all torques, unless wrong masses explain them."""
+def _gravity_and_scale(robot: Robot, motions: Sequence[Motion]) -> Iterator[Hypothesis]:
+    """Yield the hypotheses of another gravity and of a wrong factor of all torques."""
     motion = thinned(motions, 600)
     if motion is None:
         return
@@ -150,9 +150,9 @@ def _of_all_torques(robot: Robot, motions: Sequence[Motion]) -> Iterator[Hypothe
         shown = zip(factors, known, strict=True)
         gains = ','.join(f'{1.0 / one:.3g}' if clear else '?' for one, clear in shown)
         hidden = ', '.join(robot.joints[k] for k in np.flatnonzero(~known))
-        text += f'; for currents give --current-gain {gains}, no more accurate than those masses'
+        text += f'; for currents give --current-gain {gains}, which is as accurate as those masses'
         text += f'; the factor of {hidden} is not determined' if hidden else ''
-    scaled = _times(robot, 'torque', slice(None), 1.0 / factor)
+    scaled = _scaling(robot, 'torque', slice(None), 1.0 / factor)
     yield Hypothesis('units' if unit else 'scale', text, scaled)
 
 
@@ -164,7 +164,7 @@ def in_unit(robot: Robot, joint: int, unit: str) -> Hypothesis:
         'unit',
         f'the torque of {robot.joints[joint]} seems to be in {wrong} instead of {right}: '
         'convert it',
-        _times(robot, 'torque', joint, 1.0 / TORQUE_UNITS[unit]),
+        _scaling(robot, 'torque', joint, 1.0 / TORQUE_UNITS[unit]),
         (joint, unit),
     )
 
@@ -277,25 +277,25 @@ def _in_degrees(robot: Robot, joint: int | None = None) -> Hypothesis:
     text = 'the positions seem to be in degrees: convert them to rad'
     if joint is not None:
         text = f'the position of {robot.joints[joint]} seems to be in degrees: convert it to rad'
-    change = _times(robot, 'position', slice(None) if joint is None else joint, np.deg2rad(1.0))
+    change = _scaling(robot, 'position', slice(None) if joint is None else joint, np.deg2rad(1.0))
     return Hypothesis('degrees', text, change, (joint,))
 
 
 def _beyond_masses(factor: float) -> bool:
-    """Whether a torque factor is too far from 1 to be an error that all masses share."""
+    """Return whether a torque factor is too large or small for wrong masses."""
     return not 1.0 / LIMITS.torque_factor < factor < LIMITS.torque_factor
 
 
-def _times(
+def _scaling(
     robot: Robot, quantity: Quantity, joint: int | slice, factor: float
 ) -> Callable[[Motion], Motion]:
-    """Return a function that multiplies a quantity of one or all joints by a factor."""
+    """Return a function that multiplies positions or torques of a motion by a factor."""
     scale = np.ones(robot.n_joints)
     scale[joint] = factor
-    return partial(_changed, quantity, np.diag(scale))
+    return partial(_transformed, quantity, np.diag(scale))
 
 
-def _changed(quantity: Quantity, matrix: FloatArray, motion: Motion) -> Motion:
+def _transformed(quantity: Quantity, matrix: FloatArray, motion: Motion) -> Motion:
     """Return a motion with the positions or torques of all joints multiplied by a matrix."""
     if quantity != 'torque':
         q, dq, ddq = (x @ matrix for x in (motion.q, motion.dq, motion.ddq))

@@ -189,7 +189,7 @@ def find_mistake(
     sure = [row for row in tried if row.as_described >= 1.0]
     both = [row for row in sure if row.as_fitted >= 1.0]
     if both:
-        return _first(both, 'as_described', described)
+        return _most_likely(both, 'as_described', described)
     # the data have to be likelier too: links that absorb a missing effect leave their prior
     price = LIMITS.gain ** (LIMITS.free_body - 1.0)
     changes = [
@@ -201,9 +201,9 @@ def find_mistake(
         and near.of_data(row.fitted) >= LIMITS.gain**row.hypothesis.values
     ]
     if changes and alone:
-        return _first(changes, 'as_fitted', near)
+        return _most_likely(changes, 'as_fitted', near)
     masses = [row for row in sure if row.hypothesis.of_masses]
-    return _first(masses, 'as_described', described) if masses else None
+    return _most_likely(masses, 'as_described', described) if masses else None
 
 
 def _error(
@@ -217,7 +217,7 @@ def _error(
     return prediction_error(one.body(robot), motion, near=near)
 
 
-def _first(rows: Sequence[_Tested], ratio: str, before: PredictionError) -> Mistake:
+def _most_likely(rows: Sequence[_Tested], ratio: str, before: PredictionError) -> Mistake:
     """Return the most likely mistake, with equally likely mistakes of other kinds."""
     value = attrgetter(ratio)
     first, *others = sorted(rows, key=value, reverse=True)

@@ -102,10 +102,12 @@ def prediction_error(robot: Robot, motion: Motion, *, near: bool) -> PredictionE
 
     """
     assert motion.tau is not None
-    scale, (own, weight) = root_mean_square(motion.tau), _own_columns(motion)
+    scale, (own, weight) = root_mean_square(motion.tau), _friction_columns(motion)
     if not near:
         target_torque = (motion.tau - inverse_dynamics(robot, motion)) / scale * weight
-        residual = target_torque - np.einsum('rja,ja->rj', own, _own_values(own, target_torque))
+        residual = target_torque - np.einsum(
+            'rja,ja->rj', own, _nonnegative_fit(own, target_torque)
+        )
         return PredictionError(np.sqrt(np.mean(residual**2, axis=0)), scale)
     (count, n), joints = motion.q.shape, np.arange(motion.n_joints)
     body = regressor(robot, motion)
@@ -128,7 +130,7 @@ def prediction_error(robot: Robot, motion: Motion, *, near: bool) -> PredictionE
     return PredictionError(np.sqrt(np.mean(residual**2, axis=0)), scale, off)
 
 
-def _own_values(own: FloatArray, target_torque: FloatArray) -> FloatArray:
+def _nonnegative_fit(own: FloatArray, target_torque: FloatArray) -> FloatArray:
     """
     Return nonnegative friction and drive inertia, and the offset, that fit each joint torque.
 
@@ -149,14 +151,14 @@ def _own_values(own: FloatArray, target_torque: FloatArray) -> FloatArray:
 
 def common_values(motion: Motion, fixed: FloatArray, columns: FloatArray) -> FloatArray:
     """
-    Fit values that all joints share, such as gravity; friction and drives are also fitted.
+    Fit parameters that all joints share, such as the gravity vector, together with friction.
 
     The motion has N samples with torque, of which `fixed`, (N, n) [N m or N], is known. The
     regressor of the k values has shape (N, n, k). Returns the values, (k,).
 
     """
     assert motion.tau is not None
-    own, weight = _own_columns(motion)
+    own, weight = _friction_columns(motion)
     target_torque = (motion.tau - fixed)[:, :, np.newaxis]
     scale = root_mean_square(motion.tau)[:, np.newaxis]
     both = np.concatenate([columns, target_torque], axis=2) / scale * weight[:, :, np.newaxis]
@@ -167,7 +169,7 @@ def shared_values(
     own: FloatArray, shared: FloatArray, near: FloatArray | None = None
 ) -> tuple[FloatArray, FloatArray]:
     """
-    Fit values that all joints share; parameters of joints and links are also fitted.
+    Fit parameters that all joints share, together with nuisance parameters of each joint.
 
     Columns of single joints are projected out (Frisch and Waugh 1933). Joints are weighted by
     their residuals, down to the floor. The interval allows for residuals that are correlated in
@@ -224,7 +226,7 @@ def root_mean_square(columns: FloatArray) -> FloatArray:
     return np.where(size > 0.0, size, 1.0)
 
 
-def _own_columns(motion: Motion) -> tuple[FloatArray, FloatArray]:
+def _friction_columns(motion: Motion) -> tuple[FloatArray, FloatArray]:
     """Return weighted friction columns of each joint, (N, n, 4), and their weights, (N, n)."""
     dq, ddq = motion.dq, motion.ddq
     columns = np.stack([np.ones_like(dq), dq, np.sign(dq), ddq], axis=-1)

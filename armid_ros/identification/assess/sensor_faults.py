@@ -140,13 +140,15 @@ def encoder_faults(recording: Recording, units: Sequence[str] | None) -> Iterato
             walk = float(np.sqrt(noise * np.sum(np.diff(time) ** 2)))
             distance = float(np.ptp(integral)) - 3.0 * walk
         if distance > hidden:
-            why = f', while its velocity goes {distance:.3g} {unit}: its encoder is frozen'
+            why = (
+                f', while its velocity integrates to {distance:.3g} {unit}: its encoder is frozen'
+            )
             value = f'{recording.q[start, j]:.4g} {unit}'
             yield _constant_channel(
                 recording, j, 'position', value, (start, stop), why, 'record again'
             )
         if measured and moved[j] > REST_RANGE and not changes[j] and deviation[j] > 0.1 * moved[j]:
-            why = f', while its position goes {moved[j]:.3g} {unit}: one of the two is frozen'
+            why = f', while its position moves by {moved[j]:.3g} {unit}: one of the two is frozen'
             remedy = 'record again, or leave velocities out if the positions are right'
             value = f'{recording.dq[0, j] + 0.0:.4g} {unit}/s'
             yield _constant_channel(recording, j, 'velocity', value, (0, len(t)), why, remedy)
@@ -220,10 +222,10 @@ def _constant_channel(
     value: str,
     run: tuple[int, int],
     why: str,
-    always: str,
+    remedy: str,
 ) -> Fault:
     """Return the fault of a sensor channel that is constant for some time or throughout."""
-    when, remedy = 'throughout', always
+    when = 'throughout'
     if run != (0, len(recording)):
         first, last = recording.t[run[0]], recording.t[run[1] - 1]
         when, remedy = f'from {first:.3f} s to {last:.3f} s', 'leave out that time'
@@ -342,8 +344,9 @@ def held_elsewhere(
         lowest, highest = min(one.lowest for one in seen), max(one.highest for one in seen)
         moves = highest - lowest > REST_RANGE
         if not (moves or joint.carries):
-            continue  # largest relative change of the described torque between positions of the
-        # joint; several positions, as weight and inertia may be equal at both ends of the range
+            continue
+        # largest relative change of the described torque between positions of the joint; several
+        # positions, as weight and inertia may be equal at both ends of the range
         places = [*np.linspace(lowest, highest, 7 if moves else 1), joint.position]
         robots = [described_at(robot, {joint.name: place}) for place in places]
         described = [np.concatenate([inverse_dynamics(r, m) for m in motions]) for r in robots]
@@ -360,7 +363,7 @@ def held_elsewhere(
             text = (
                 f'joint {joint.name} is not driven, but moves from {lowest:.3g} to {highest:.3g} '
                 f'{joint.unit}{carries}; {model}; its position makes up to {error}; '
-                f'{"leave out where it moves" if joint.follows else remedy}'
+                f'{"leave out the time in which it moves" if joint.follows else remedy}'
             )
             if not moves:
                 text = (

@@ -205,7 +205,7 @@ class ForwardValidation:
 @dataclass(frozen=True)
 class Verification:
     """
-    Results of the tests of an identified model.
+    Results of the tests of an identified model: encoder noise, and simulations.
 
     Attributes
     ----------
