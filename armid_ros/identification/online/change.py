@@ -33,8 +33,8 @@ class ChangeCandidate:
         The p physical quantities that change.
     directions : ndarray, shape (P, p)
         Change of the base parameters per unit of each quantity.
-    reopened : ndarray, shape (P, k)
-        Independent directions in which the base parameters may have changed.
+    changed_directions : ndarray, shape (P, k)
+        Independent directions of the base parameters that may have changed.
     common : bool
         Whether such changes are frequent, as changes of the payload are.
 
@@ -44,12 +44,12 @@ class ChangeCandidate:
     joint: str
     parameters: tuple[ParameterName, ...]
     directions: FloatArray
-    reopened: FloatArray
+    changed_directions: FloatArray
     common: bool = False
 
     def __post_init__(self) -> None:
         """Make the arrays read-only."""
-        for name in ('directions', 'reopened'):
+        for name in ('directions', 'changed_directions'):
             object.__setattr__(self, name, read_only(getattr(self, name)))
 
     @property
@@ -88,9 +88,9 @@ class Change:
     size: Estimate
 
     @property
-    def reopened(self) -> FloatArray:
+    def changed_directions(self) -> FloatArray:
         """Return independent directions of the candidate and its rivals, shape (P, k)."""
-        columns = np.hstack([c.reopened for c in (self.candidate, *self.rivals)])
+        columns = np.hstack([c.changed_directions for c in (self.candidate, *self.rivals)])
         columns = columns / np.linalg.norm(columns, axis=0)
         directions, size, _ = np.linalg.svd(columns, full_matrices=False)
         return np.asarray(directions[:, size > _MIN_SINGULAR_VALUE * size[0]])

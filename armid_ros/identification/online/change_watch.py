@@ -343,9 +343,9 @@ class ChangeWatch:
     def _apply(self, found: FoundChange) -> Job:
         """Return to the state before a change, forget the changed directions, add the change."""
         change, before, after = found
-        size, reopened = change.size, change.reopened
+        size, directions = change.size, change.changed_directions
         self._wider.restore(before.before)
-        self._wider.reopen(self._with_nuisance(reopened))
+        self._wider.forget_directions(self._with_nuisance(directions))
         yield
         yield from self._learn(self._wider, [x for block in after for x in block.samples])
         while len(rows := self._unsearched()) > self._samples_per_update:
@@ -361,7 +361,7 @@ class ChangeWatch:
             squares += float(np.sum((residual / self._residual_scale.value) ** 2))
             count += float(np.sum(weights))
             yield
-        factor, free = 1.0, reopened.shape[1]
+        factor, free = 1.0, directions.shape[1]
         if self._fit_ratios and count > free:
             factor = max(1.0, squares / (count - free) / float(np.median(self._fit_ratios)))
         self.changes.append(

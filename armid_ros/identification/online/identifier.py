@@ -168,7 +168,7 @@ class OnlineIdentifier:
     def _clear_estimate(self) -> None:
         """Clear the estimate; no background computation may be pending."""
         self._pending: tuple[Row, FloatArray] | None = None  # with its innovation
-        self._reopened = 0
+        self._n_changes = 0
         self.latest: tuple[OnlineSample, ...] = ()
         # of residuals: weighted squares, their weights, and the standard deviation
         self._squares, self._counts, self._deviation = np.zeros((3, self.arm.robot.n_joints))
@@ -262,8 +262,7 @@ class OnlineIdentifier:
         if step < self._row_period - 0.5 * (self._filter.period or 0.0):
             return None
         self._last_row = motion.t
-        # time constants of the row filter until the effect of its start, or a joint's rest, is
-        # 3e-3
+        # after ten time constants of the row filter, the effect of its start or of a rest is 3e-3
         used = motion.t - self._last_useless > 10.0 / self._row_filter.pole
         usable = not (self._checks.silent or self._checks.error)
         return self._new_row(motion, step, used & usable, begins)
@@ -416,9 +415,9 @@ class OnlineIdentifier:
             estimator.update(*sample)
         else:
             self._watch.update(row)
-            for change in self._watch.changes[self._reopened :]:
-                self._scores.reopen(change.reopened, estimator.values)
-                self._reopened += 1
+            for change in self._watch.changes[self._n_changes :]:
+                self._scores.allow_change(change.changed_directions, estimator.values)
+                self._n_changes += 1
         residual = sample.tau - sample.rows @ estimator.values
         self._squares = (
             estimator.forgetting * self._squares + sample.weights * innovation * residual

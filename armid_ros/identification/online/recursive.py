@@ -175,7 +175,7 @@ class RecursiveLeastSquares:
         scale = self.scale(by_sample).reshape(-1)
         rows = rows * scale[:, np.newaxis]
         if self._forgetting < 1.0:
-            self._root = replaced(self._root, rows, self._forgetting)
+            self._root = forget_and_add(self._root, rows, self._forgetting)
             gradient = rows.T @ (innovation * scale)
             half, _ = lapack.dtrtrs(self._root, gradient[:, np.newaxis], trans=1)
             self._values = self._values + lapack.dtrtrs(self._root, half)[0][:, 0]
@@ -227,7 +227,7 @@ class RecursiveLeastSquares:
         self._squares, self._freedom = other._squares, other._freedom
         self.samples = other.samples
 
-    def reopen(self, directions: FloatArray) -> None:
+    def forget_directions(self, directions: FloatArray) -> None:
         """
         Forget the information on some directions of the parameters.
 
@@ -237,8 +237,16 @@ class RecursiveLeastSquares:
             Independent combinations of parameters that may have changed.
 
         """
-        self._take(reopened(self._root, directions), self._values)
-        self._freedom -= directions.shape[1]
+        # The parameters become theta + directions delta, where nothing is known of delta: R theta
+        # = z is stacked with delta = 0 within PRIOR_STD, and reflections eliminate delta.
+        size, count = directions.shape
+        unit = directions / np.linalg.norm(directions, axis=0)
+        stacked = np.zeros((size + count, count + size))
+        stacked[:size, :count], stacked[:size, count:] = -self._root @ unit, self._root
+        stacked[size:, :count] = np.eye(count) / PRIOR_STD
+        root = np.linalg.qr(stacked, mode='r')[count:, count:]
+        self._take(np.asfortranarray(root), self._values)
+        self._freedom -= count
 
     @property
     def forgetting(self) -> float:
@@ -295,7 +303,7 @@ class RecursiveLeastSquares:
         self._right = np.asfortranarray((root @ values)[:, np.newaxis])
 
 
-def replaced(root: FloatArray, rows: FloatArray, forgetting: float) -> FloatArray:
+def forget_and_add(root: FloatArray, rows: FloatArray, forgetting: float) -> FloatArray:
     """
     Return R with the information of new rows, and less old information in their directions.
 
@@ -333,22 +341,6 @@ def replaced(root: FloatArray, rows: FloatArray, forgetting: float) -> FloatArra
             0, min(_BLOCK_COLUMNS, len(root)), root, (directions * kept).T @ rows, overwrite_a=1
         )
     return root
-
-
-def reopened(root: FloatArray, directions: FloatArray) -> FloatArray:
-    """
-    Return R without its information on some directions of the parameters, shape (P, k).
-
-    The parameters become theta + directions delta, where nothing is known of delta: R theta = z
-    is stacked with delta = 0 within PRIOR_STD, and delta is eliminated by reflections.
-
-    """
-    size, count = directions.shape
-    unit = directions / np.linalg.norm(directions, axis=0)
-    stacked = np.zeros((size + count, count + size))
-    stacked[:size, :count], stacked[:size, count:] = -root @ unit, root
-    stacked[size:, :count] = np.eye(count) / PRIOR_STD
-    return np.asfortranarray(np.asarray(np.linalg.qr(stacked, mode='r'))[count:, count:])
 
 
 def check_forgetting(factor: float) -> None:

@@ -97,7 +97,7 @@ class RobustCovariance:
             self._work.begin(self._add_window(self._rows, values))
             self.interrupt()
 
-    def reopen(self, directions: FloatArray, values: FloatArray) -> None:
+    def allow_change(self, directions: FloatArray, values: FloatArray) -> None:
         """
         Allow for a change of the parameters between earlier and later samples.
 
@@ -114,7 +114,7 @@ class RobustCovariance:
         """
         self.interrupt()
         self._shape = None
-        self._work.begin(self._reopened(directions, values))
+        self._work.begin(self._subtract_change(directions, values))
 
     def _add_window(self, columns: FloatArray, values: FloatArray) -> Job:
         """Add a window of k regressor rows and torques, shape (m, k, P + 1), to the sums."""
@@ -143,7 +143,7 @@ class RobustCovariance:
             self._shape = yield from _shape(every, values)
         self._latest = window
 
-    def _reopened(self, directions: FloatArray, values: FloatArray) -> Job:
+    def _subtract_change(self, directions: FloatArray, values: FloatArray) -> Job:
         """Subtract the torque of the best-fitting change of some directions from earlier sums."""
         self._latest = None
         if self._settled is None:

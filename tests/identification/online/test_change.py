@@ -122,7 +122,7 @@ def test_reopening_forgets_one_direction_and_nothing_else():
     estimator, _, _, _ = learned_and_block(rng, 0.0, seen=5)
     before, root = estimator.values, estimator.root.copy()
     information = root.T @ root
-    estimator.reopen(CHANGED)
+    estimator.forget_directions(CHANGED)
     np.testing.assert_allclose(estimator.values, before, rtol=1e-6)
     after = estimator.root.T @ estimator.root
     unit = CHANGED / np.linalg.norm(CHANGED)

@@ -54,7 +54,7 @@ def test_residuals_are_those_of_the_latest_estimate():
 
 @pytest.mark.parametrize('seed', range(70, 73))
 def test_changes_of_what_is_hardly_excited_leave_a_covariance(seed):
-    """What rounding takes of the information when values are reopened is restored."""
+    """Information that is lost to rounding when directions are forgotten is restored."""
     rng = np.random.default_rng(seed)
     size, rank = 12, rng.integers(2, 8)
     scores = RobustCovariance(16, 0.99, Foreground())
@@ -64,7 +64,7 @@ def test_changes_of_what_is_hardly_excited_leave_a_covariance(seed):
         scores.add(rows, rng.normal(size=2), rng.normal(size=size))
         if k % 50 == 40:
             chosen = rng.choice(size, rng.integers(1, 6), replace=False)
-            scores.reopen(np.eye(size)[:, chosen], rng.normal(size=size))
+            scores.allow_change(np.eye(size)[:, chosen], rng.normal(size=size))
     covariance = scores.covariance(np.diag(scale))
     assert np.all(np.isfinite(covariance)) and np.all(np.diag(covariance) >= 0.0)
 
@@ -77,7 +77,7 @@ def test_after_a_change_the_noise_is_still_known():
     scores, direction = RobustCovariance(400, 1.0, Foreground()), np.array([[0.0], [0.0], [1.0]])
     for row, error in zip(rows[:3900], noise[:3900], strict=True):
         scores.add(row, row @ before + error, before)
-    scores.reopen(direction, after)
+    scores.allow_change(direction, after)
     w = rows[:, 0]
     information = w.T @ w - np.outer(w.T @ w[:, 2], w.T @ w[:, 2]) / (w[:, 2] @ w[:, 2])
     information[2, 2] += 100.0
