@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""An arm whose base stands askew by three degrees, described as upright."""
+"""Find the tilt of a base, 3 degrees, that the description assumes to be upright."""
 
 from pathlib import Path
 

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Stiffness of the joints, from encoders at the motors and at the links."""
+"""Identify the stiffness of joints from encoders at the motors and at the links."""
 
 from pathlib import Path
 
@@ -13,7 +13,7 @@ import numpy as np
 
 URDF = Path(__file__).with_name('arm.urdf')
 
-# The robot: springs of 4000 N m/rad, and motors with an inertia of their own.
+# The simulated robot has joint springs of 4000 N m/rad, and motors with inertia.
 compliance = 'joint_elasticity:compliance=0.00025'
 robot = ar.ArmModel.of(URDF, effects=[compliance, 'rotor_inertia:rotor_inertia=0.5'])
 plan = ar.design_excitation(URDF, duration=12.0, starts=1, iterations=10)

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The springs that tie an exoskeleton to its wearer, from angles of both and torques of one."""
+"""Identify springs between an exoskeleton and its wearer, from joint angles and motor torques."""
 
 import armid_ros as ar
 from armid_ros.identification.ties.recorded import recorded_interaction_problem
@@ -16,7 +16,7 @@ tau = pair_torques(pair, machine, wearer).tau
 
 
 def measured(motion, tau=None):
-    """Return what encoders of 0.05 degrees and torque sensors of 0.5 N m read."""
+    """Return a recording with encoder noise of 0.05 degrees and torque noise of 0.5 N m."""
     q = motion.q + np.radians(0.05) * rng.normal(size=motion.q.shape)
     noisy = None if tau is None else tau + 0.5 * rng.normal(size=tau.shape)
     return ar.Recording(joints=motion.joints, t=t, q=q, tau=noisy, start_ns=10**9)

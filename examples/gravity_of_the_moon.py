@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""An arm that was described on Earth and recorded on the Moon."""
+"""Find the gravity of an arm that is described on Earth and recorded on the Moon."""
 
 from pathlib import Path
 

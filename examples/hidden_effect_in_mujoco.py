@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""A simulator lacks the spring of the real elbow; the diagnosis names it from the torques."""
+"""Find a spring of the real elbow that a MuJoCo model lacks."""
 
 from pathlib import Path
 
@@ -18,7 +18,7 @@ data = mujoco.MjData(model)
 
 
 def record(plan, source, noise, seed):
-    """Return what an ideal servo needs to follow a plan in MuJoCo."""
+    """Return a recording of the torques that make the MuJoCo model follow a plan exactly."""
     motion, tau = plan.motion(200.0), []
     for q, dq, ddq in zip(motion.q, motion.dq, motion.ddq, strict=True):
         data.qpos, data.qvel, data.qacc = q, dq, ddq

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Look at a recording before it is used: gaps, units, what identify would refuse."""
+"""Inspect a recording before its use: gaps, wrong units, and whether armid identify accepts it."""
 
 from dataclasses import replace
 from pathlib import Path

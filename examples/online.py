@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Identify while the arm moves: a node of its own, from /joint_states."""
+"""Identify friction from /joint_states while the arm moves, in a node of your own."""
 
 from pathlib import Path
 import sys
@@ -15,7 +15,7 @@ URDF = Path(__file__).with_name('arm.urdf')
 
 
 class Identifier(Node):
-    """Prints the estimate of the friction of each joint every second."""
+    """Node that logs the estimated friction of each joint every second."""
 
     def __init__(self, urdf=URDF, **settings):
         super().__init__('identifier', **settings)
@@ -25,14 +25,14 @@ class Identifier(Node):
         self.create_timer(1.0, self.tell)
 
     def on_joint_states(self, message):
-        """Learn from one sample; joints are taken by name."""
+        """Update the estimate by a joint state, whose joints may have any order."""
         order = [message.name.index(joint) for joint in self.arm.robot.joints]
         q, tau = np.array(message.position)[order], np.array(message.effort)[order]
         stamp = message.header.stamp
         self.online.update(stamp.sec + 1e-9 * stamp.nanosec, q, None, tau)
 
     def tell(self):
-        """Say what is known by now."""
+        """Log the present estimate of the friction."""
         estimate = self.online.estimate()
         for name, value, std in zip(
             estimate.parameters, estimate.values, estimate.std, strict=True

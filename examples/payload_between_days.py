@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""What somebody bolted to the arm between Monday and Friday, in kilograms."""
+"""Find the mass of a load that was bolted to the arm between Monday and Friday."""
 
 from pathlib import Path
 
@@ -17,10 +17,10 @@ loaded = ar.ArmModel.of(URDF, effects=[*FRICTION, LOAD])
 monday = ar.simulate(free, plan, torque_noise=0.05, rng=1)
 friday = ar.simulate(loaded, plan, torque_noise=0.05, rng=2)
 
-# Two identifications side by side ...
+# Compare the identifications of two days ...
 changed = ar.compare(ar.identify(URDF, monday), ar.identify(URDF, friday))
 print(changed)
 print(f'added: {changed.load:.2f} kg')
 
-# ... or Friday's recording against Monday's model.
+# ... or diagnose Friday's recording with Monday's model.
 print(ar.diagnose(ar.identify(URDF, monday), friday))

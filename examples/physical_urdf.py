@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""A URDF that a simulator takes: links that are bodies, with a mass from a scale."""
+"""Write a URDF for simulators: physically consistent links with a known total mass."""
 
 from pathlib import Path
 

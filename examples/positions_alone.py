@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""An arm under position control without torque sensors: two tables with commands and positions."""
+"""Write two tables of commanded and measured positions of a simulated position-controlled arm."""
 
 from pathlib import Path
 
@@ -8,9 +8,9 @@ import armid_ros as ar
 from armid_ros.positions.loop import CommandedMotion, LoopModel, Window
 import numpy as np
 
-#: Hidden in the arm: delay [s], gains, rotor inertia and friction of the joints.
+#: True values: delay of the commands [s]; gains, rotor inertia and friction of each joint.
 DELAY, KP, KD, ROTOR, VISCOUS, COULOMB = 0.008, 400.0, 40.0, 0.1, 2.0, 0.5
-#: Mass of the tool on each day [kg], and its place [m].
+#: Mass of the tool on each day [kg], its centre and radius [m].
 TOOL = {'monday': 0.0, 'friday': 0.4}
 CENTER, RADIUS = (0.0, 0.0, 0.1), 0.02
 

@@ -13,8 +13,8 @@
 # %% [markdown]
 # # First model
 #
-# From a URDF to a model with uncertainties. `arm.urdf` describes a small arm of three joints.
-# Any other URDF does as well.
+# This notebook leads from a URDF to a model with uncertainties. `arm.urdf` describes a small arm
+# of three joints; any other URDF works as well.
 
 # %%
 import armid_ros as ar
@@ -24,10 +24,10 @@ URDF = '../arm.urdf'
 print(ar.load_robot(URDF).joints)
 
 # %% [markdown]
-# ## A motion that is worth running
+# ## Design a motion
 #
-# It stays inside the limits of the URDF, and makes the parameters as visible as it can. The
-# table has how much of each limit it uses.
+# The designed motion stays inside the limits of the URDF, and makes the parameters identifiable.
+# The table shows the share of each limit that the motion uses.
 
 # %%
 plan = ar.design_excitation(URDF, duration=12.0, starts=1, iterations=10)
@@ -44,8 +44,9 @@ figure.tight_layout()
 # %% [markdown]
 # ## Two recordings
 #
-# On a robot you would run `plan.save('plan')` and record `/joint_states`. Here a simulated arm
-# stands for it. It has friction that the URDF does not mention.
+# On a robot you would run the trajectory that `plan.save('plan')` writes, and record
+# `/joint_states`. Here a simulated arm takes the place of the robot. The simulated arm has
+# friction that the URDF lacks.
 
 # %%
 friction = ['viscous_friction:viscous_coefficient=0.3', 'coulomb_friction:coulomb_torque=0.2']
@@ -56,21 +57,22 @@ monday
 # %% [markdown]
 # ## The model
 #
-# One recording is fitted, the other one predicted. The grade is about the prediction.
+# The model is fitted to one recording and predicts the torques of the other. The grade judges the
+# predicted torques.
 
 # %%
 model = ar.identify(URDF, monday, validate=tuesday)
 model
 
 # %% [markdown]
-# The friction that was hidden is 0.3 N m s/rad and 0.2 N m in every joint.
+# The true friction of every joint is 0.3 N m s/rad (viscous) and 0.2 N m (Coulomb).
 
 # %%
 table = model.to_dataframe()
 table[table.name.isin(['viscous_coefficient', 'coulomb_torque'])]
 
 # %% [markdown]
-# Measured torque, predicted torque, and what is left of the elbow:
+# Measured torque, predicted torque and residual of the elbow:
 
 # %%
 (fit,) = model.predict(tuesday)
@@ -85,5 +87,4 @@ below.set(xlabel='time [s]', ylabel='residual [N m]')
 figure.tight_layout()
 
 # %% [markdown]
-# `model.save('model')` writes `model.yaml`, `identification.json` and a report that opens
-# without a network.
+# `model.save('model')` writes `model.yaml`, `identification.json` and an HTML report.

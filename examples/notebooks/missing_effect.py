@@ -13,7 +13,7 @@
 # %% [markdown]
 # # The missing effect
 #
-# An arm is identified on Monday. On Friday its torques are no longer as predicted. What has
+# An arm is identified on Monday. On Friday its torques differ from the predicted ones. What has
 # changed?
 
 # %%
@@ -29,8 +29,8 @@ model = ar.identify(URDF, monday)
 model
 
 # %% [markdown]
-# Over the weekend somebody routed a hose along the elbow. It pulls like a spring of 2 N m/rad;
-# nobody writes it down.
+# During the week somebody routed a hose along the elbow. The hose pulls like a spring of
+# 2 N m/rad, which the model of Monday lacks.
 
 # %%
 spring = 'joint_spring@elbow:spring_stiffness=2'
@@ -38,10 +38,10 @@ as_it_is = ar.ArmModel.of(URDF, effects=[*friction, spring])
 friday = [ar.simulate(as_it_is, plan, torque_noise=0.05, rng=seed) for seed in (2, 3)]
 
 # %% [markdown]
-# ## Something is wrong, and where
+# ## Which joint has changed
 #
-# The model of Monday predicts Friday's torques. The residual of the elbow is no noise, and goes
-# with the position.
+# The model of Monday predicts Friday's torques. The residual of the elbow is not noise: it depends
+# on the position.
 
 # %%
 (fit,) = model.predict(friday[0])
@@ -53,10 +53,10 @@ axes[0].set(ylabel='residual [N m]')
 figure.tight_layout()
 
 # %% [markdown]
-# ## The name
+# ## Name the missing effect
 #
-# `validate` decides how much of the gap a cause closes; `baseline` shows what the model left
-# when it was right.
+# The recording of `validate` tests how much of the residual an effect explains. The recording of
+# `baseline` shows the residual of the model before the change.
 
 # %%
 found = ar.diagnose(model.arm, friday[0], validate=friday[1], baseline=monday)
@@ -68,8 +68,8 @@ found.to_dataframe()
 # %% [markdown]
 # ## The patch
 #
-# `found.arm` is the model with the named effects. Its residuals on the second recording of Friday,
-# which was not fitted:
+# `found.arm` is the model with the named effects. The plot shows its residual on the second
+# recording of Friday, which was not fitted.
 
 # %%
 motion = model.predict(friday[1])[0].motion
@@ -81,9 +81,10 @@ axes.legend()
 figure.tight_layout()
 
 # %% [markdown]
-# ## What silence is worth
+# ## Which effects could be missed
 #
-# Causes that were not named may be there, and too small to be seen. How small:
+# Effects that are not named may exist, but too small to be detected. The smallest detectable sizes
+# at the elbow are:
 
 # %%
 for row in found.document()['detectable']:

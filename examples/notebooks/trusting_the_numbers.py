@@ -13,8 +13,9 @@
 # %% [markdown]
 # # Trusting the numbers
 #
-# A standard deviation is a claim: a repeat of the experiment lands within it two times in three.
-# Here the experiment is repeated, and the claim is counted.
+# A standard deviation is a claim: in two of three repeats of an experiment, the estimate lies
+# within one standard deviation of the truth. This notebook repeats an experiment and tests the
+# claim.
 
 # %%
 import armid_ros as ar
@@ -31,9 +32,10 @@ models = [
 models[0]
 
 # %% [markdown]
-# ## Do the intervals hold the truth?
+# ## Do the intervals contain the truth?
 #
-# Viscous friction of the elbow, 20 times, with 95 % intervals. One of twenty may miss.
+# The plot shows the viscous friction of the elbow in 20 repeats, with 95 % intervals. One interval
+# in twenty may miss the truth.
 
 # %%
 k = models[0].estimate.index('viscous_coefficient', 'elbow')
@@ -47,7 +49,7 @@ figure.tight_layout()
 print(f'scatter {values.std(ddof=1):.5f}, stated {std.mean():.5f}')
 
 # %% [markdown]
-# All friction of all joints, all repeats:
+# The same for all friction parameters of all joints:
 
 # %%
 names = models[0].estimate.parameters
@@ -58,14 +60,14 @@ inside = [
     for k, name in enumerate(names)
     if name.name in true
 ]
-print(f'{100 * np.mean(inside):.0f} % of {len(inside)} intervals of 95 % hold the truth')
+print(f'{100 * np.mean(inside):.0f} % of {len(inside)} 95 % intervals contain the truth')
 
 # %% [markdown]
-# ## When the claim is void
+# ## When the claim is wrong
 #
-# The claim takes the model as right. Leave out the Coulomb friction, which is there, and the
-# intervals of the viscous friction miss by far. The residual shows it: it goes with the direction
-# of motion.
+# Intervals assume that the model lacks no effect. Without the Coulomb friction of the arm, the
+# intervals of the viscous friction miss the truth by far. The residual depends on
+# the direction of motion, which shows the missing effect.
 
 # %%
 recording = ar.simulate(truth, plan, torque_noise=0.05, rng=99)
@@ -81,10 +83,10 @@ axes.set(xlabel='velocity of the elbow [rad/s]', ylabel='residual [N m]')
 figure.tight_layout()
 
 # %% [markdown]
-# ## What to look at
+# ## What to check first
 #
-# The held-out error and the grade come first; a model that predicts is worth asking about its
-# parameters.
+# Check the grade and the held-out error first. Trust the parameters of a model only if the model
+# predicts well.
 
 # %%
 print(wrong.grade, models[0].grade)
