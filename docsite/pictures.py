@@ -1,9 +1,9 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Drawing of the pictures of the pages.
+Drawing of the pictures of the documentation.
 
-``python -m docsite.pictures``. ``armid demo`` draws those of the demo.
+``python -m docsite.pictures [NAME.png ...]`` draws them. ``armid demo`` draws those of the demo.
 
 """
 
@@ -63,7 +63,7 @@ _LASTING = 0.05
 
 
 def candidates() -> Figure:
-    """Draw the share of the gap that each cause explains alone, for the spring at the elbow."""
+    """Draw the share of the gap that each effect explains alone, for a spring at the elbow."""
     arm = ar.load_model('monday_result/model.yaml')
     found = ar.diagnose(arm, 'today_1', validate='today_2', baseline='monday')
     rows = found.document()['candidates'][:10][::-1]
@@ -77,7 +77,7 @@ def candidates() -> Figure:
 
 
 def deviations() -> Figure:
-    """Draw the errors of repeats in stated standard deviations, with correlated noise."""
+    """Draw the errors of repeated identifications, divided by the stated standard deviations."""
     truth = ar.ArmModel.of('my_arm.urdf', effects=FRICTION)
     clean = ar.simulate(truth, 'plan/excitation.yaml')
     true = {'viscous_coefficient': 0.3, 'coulomb_torque': 0.2, 'torque_offset': 0.0}
@@ -112,7 +112,7 @@ def _noise(run: ar.Recording, seed: int) -> np.ndarray:
 
 
 def exo_cycle() -> Figure:
-    """Draw hip, knee and feet of the leg pair over a cycle, errors with those of the source."""
+    """Draw hip, knee and feet of the leg pair over a gait cycle, and the errors of the paper."""
     cycle = gait_cycle(walking_pair(), read_gait())
     soft = cycle.pair.with_stiffness(0.8 * cycle.pair.stiffness)
     figure, panels = _figure(6.2, 3, 2, height_ratios=(2, 1.2, 2))
@@ -148,7 +148,7 @@ def exo_cycle() -> Figure:
 
 
 def growth() -> Figure:
-    """Draw processor time and memory of the jobs as their input grows: benchmarks.growth."""
+    """Draw processor time and memory over the size of the input, from benchmarks.growth."""
     document = json.loads(GROWTH.read_text())
     axes_names = list(dict.fromkeys(row['over'] for row in document['jobs']))
     jobs = list(dict.fromkeys(row['job'] for row in document['jobs']))
@@ -175,7 +175,7 @@ def growth() -> Figure:
 
 
 def reliability() -> Figure:
-    """Draw the share of right first names of the diagnosis over their stated probability."""
+    """Draw how often a named effect is right, over its stated probability."""
     found = json.loads((RESULTS / 'probabilities.json').read_text(encoding='utf-8'))
     figure, axes = _figure(3.2)
     axes.plot([0, 1], [0, 1], color=GREY, lw=1, label='calibrated')
@@ -200,12 +200,12 @@ def excitation() -> Figure:
 
 
 def recording() -> Figure:
-    """Draw the torques of a recording."""
+    """Draw the torques of all joints in a recording."""
     return _sized(ar.read_recording('monday', 'my_arm.urdf').plot())
 
 
 def currents() -> Figure:
-    """Draw a current of the log next to the torque that it is converted to."""
+    """Draw a motor current of a log, and the torque that the current is converted to."""
     log = np.genfromtxt('log.csv', delimiter=',', names=True)
     run = ar.read_recording('log.csv', 'my_arm.urdf', effort='amps_{}', effort_scale=GAIN)
     figure, panels = _figure(3.0, 2, 1, sharex=True)
@@ -217,7 +217,7 @@ def currents() -> Figure:
 
 
 def comparison() -> Figure:
-    """Draw the difference of each parameter in standard deviations."""
+    """Draw the difference of each parameter between two days, in standard deviations."""
     found = ar.compare('monday_result', 'friday_result').core.changes
     size = [abs(one.deviations) for one in found]
     figure, axes = _figure(4.2)
@@ -230,7 +230,7 @@ def comparison() -> Figure:
 
 
 def bodies() -> Figure:
-    """Draw the masses of links as described, and of a fit without and with bodies."""
+    """Draw link masses as described, by least squares, and by a physically consistent fit."""
     (figure, axes), robot = _figure(2.6), ar.load_robot('my_arm.urdf')
     for place, (label, colour, masses) in enumerate(
         (
@@ -254,7 +254,7 @@ def _masses(*, physical: bool) -> np.ndarray:
 
 
 def own_effect() -> Figure:
-    """Draw the residual of an arm with a hose over the angle, and the law that is fitted."""
+    """Draw the residual torque of an arm with a hose over the angle, and the fitted formula."""
     known = ar.ArmModel.of('my_arm.urdf', effects=FRICTION)
     run = ar.simulate(known, 'plan/excitation.yaml', torque_noise=0.05)
     elbow = run.joints.index('elbow')
@@ -277,13 +277,27 @@ def payload() -> Figure:
 
 
 def learned() -> Figure:
-    """Draw the torque of a worn gear over the angle."""
+    """Draw the torque of a worn gear over the joint angle."""
     x = np.linspace(-1.5, 2.0, 300)
     share = (x - 0.6) / 0.2
     figure, axes = _figure(2.4)
     axes.plot(x, share * np.exp(-(share**2)), color=BLUE)
     axes.axvspan(0.2, 1.0, color=ORANGE, alpha=0.2, label='worn place')
     axes.set(xlabel='angle of elbow [rad]', ylabel='torque [N m]')
+    axes.legend(frameon=False)
+    return _plain(figure)
+
+
+def temperature() -> Figure:
+    """Draw friction over temperature, with a cold joint on the identified line and a worn one."""
+    celsius = np.linspace(15.0, 45.0, 2)
+    figure, axes = _figure(2.4)
+    axes.plot(celsius, 0.5 - 0.01 * (celsius - 25.0), color=GREY, label='identified on Monday')
+    for name, friction, colour in (('cold', 0.55, BLUE), ('worn', 0.68, ORANGE)):
+        axes.plot(20.0, friction, 'o', color=colour)
+        axes.annotate(name, (20.0, friction), (8, 5), color=colour, **TEXT)
+    axes.set(xlabel='temperature of joint [degC]', ylabel='viscous friction [N m s/rad]')
+    axes.set_ylim(0.25, 0.75)
     axes.legend(frameon=False)
     return _plain(figure)
 
@@ -308,7 +322,7 @@ def limits() -> Figure:
 
 
 def damaged() -> Figure:
-    """Draw the output for a bag that ends early."""
+    """Draw the printed lines of armid identify for a bag that ends early."""
     (bag,) = Path('monday').glob('*.mcap')
     Path('crashed.mcap').write_bytes(bag.read_bytes()[:300_000])
     command = ('identify', 'crashed.mcap', '--robot', 'my_arm.urdf', '--out', 'result')
@@ -316,7 +330,7 @@ def damaged() -> Figure:
 
 
 def springs() -> Figure:
-    """Draw the responses of two joints with springs: measured, and with identified parameters."""
+    """Draw measured and modelled frequency responses of two elastic joints."""
     shipped, rng = two_link_set('after'), np.random.default_rng(0)
     sensors, loop = Sensors(velocity_noise=0.004), two_link_loop(shipped, RESONANCE_GAIN)
     runs = [
@@ -344,7 +358,7 @@ def _decibel(values: np.ndarray) -> np.ndarray:
 
 
 def fleet() -> Figure:
-    """Draw the output for three arms, one of which holds a load from the fourth day on."""
+    """Draw the printed lines of armid fleet for three arms, one with a load from day four on."""
     for arm in ('arm_1', 'arm_2', 'arm_3'):
         for day in range(1, 7):
             loaded = arm == 'arm_2' and day > 3
@@ -365,7 +379,7 @@ def fleet() -> Figure:
 
 
 def live() -> Figure:
-    """Draw the error of the elbow in windows of a stream, during which a spring is added."""
+    """Draw the torque error of the elbow over time; a spring is added on the way."""
     arm = ar.load_model('monday_result/model.yaml')
     parts = [ar.read_recording(name, 'my_arm.urdf') for name in ('tuesday', 'today_1')]
     stream, answers = LiveDiagnosis(arm, LiveSettings(learning=12.0)), []
@@ -396,7 +410,7 @@ def live() -> Figure:
 
 
 def online() -> Figure:
-    """Draw the online estimate of the elbow friction with its interval."""
+    """Draw the online estimate of the elbow's viscous friction over time, with its interval."""
     run = ar.read_recording('monday', 'my_arm.urdf')
     arm = ar.ArmModel.of('my_arm.urdf', effects='viscous_friction,coulomb_friction')
     identifier, times, values = ar.OnlineIdentifier(arm, rng=np.random.default_rng(0)), [], []
@@ -418,7 +432,7 @@ def online() -> Figure:
 
 
 def installed() -> Figure:
-    """Draw the answer of the first command after an installation."""
+    """Draw the printed lines of the first commands after an installation."""
     return _terminal(
         [
             '$ make',
@@ -436,7 +450,7 @@ def refused() -> Figure:
 
 
 def chain() -> Figure:
-    """Draw the steps of a description from the vendor to a plan."""
+    """Draw the steps from a vendor's description to a planned trajectory as boxes."""
     return _boxes(
         [
             'arm.xacro\nwith arguments',
@@ -449,7 +463,7 @@ def chain() -> Figure:
 
 
 def control() -> Figure:
-    """Draw the nodes from a plan to a recording."""
+    """Draw the nodes between a planned trajectory and a recording as boxes."""
     return _boxes(
         [
             'excitation.yaml',
@@ -462,7 +476,7 @@ def control() -> Figure:
 
 
 def _boxes(texts: list[str]) -> Figure:
-    """Return texts in boxes from left to right, with arrows between them."""
+    """Return a figure with texts in boxes from left to right, and arrows between them."""
     figure, axes = _figure(1.1)
     for place, text in enumerate(texts):
         style = {'boxstyle': 'round,pad=0.5', 'fc': 'white', 'ec': BLUE}
@@ -477,7 +491,7 @@ def _boxes(texts: list[str]) -> Figure:
 
 
 def _answer(*command: str) -> list[str]:
-    """Return the lines that a command prints, without progress."""
+    """Return the lines that an armid command prints, without its progress."""
     run = [sys.executable, '-m', 'armid_ros.cli', *command]
     done = subprocess.run(run, capture_output=True, text=True, check=False)
     lines = (done.stdout + done.stderr).rstrip().splitlines()
@@ -486,7 +500,7 @@ def _answer(*command: str) -> list[str]:
 
 
 def _terminal(lines: list[str]) -> Figure:
-    """Return lines as a terminal shows them."""
+    """Return a figure of lines as a terminal shows them."""
     figure = Figure(figsize=(WIDTH, 0.135 * len(lines) + 0.25), facecolor='#1f2326')
     top = {'family': 'monospace', 'fontsize': 7.5, 'color': '#e6e6e6', 'va': 'top'}
     figure.text(
@@ -520,13 +534,13 @@ PICTURES = {
     for picture in (
         *(bodies, candidates, chain, comparison, control, currents, damaged, deviations),
         *(excitation, exo_cycle, fleet, growth, installed, learned, limits, live, online),
-        *(own_effect, payload, recording, refused, reliability, springs),
+        *(own_effect, payload, recording, refused, reliability, springs, temperature),
     )
 }
 
 
 def main() -> None:
-    """Write the named pictures, or all."""
+    """Draw the pictures that the command line names, or all."""
     with TemporaryDirectory() as folder:
         os.chdir(lay_out(Path(folder)))
         for name in sys.argv[1:] or PICTURES:

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The page of all written files, from their JSON Schemas."""
+"""The page of all written files, from their JSON Schemas and the schemas of fleet tables."""
 
 from __future__ import annotations
 
@@ -9,30 +9,50 @@ import json
 from pathlib import Path
 from typing import Any
 
+from armid_ros.fleet import diagnose, results, watch
 from jsonschema import Draft202012Validator
 
 from docsite.markdown import cell, table
 
 FOLDER = Path(__file__).parents[1] / 'docs' / 'schemas'
 SUFFIX = '.schema.json'
+#: Arrow schemas of the Parquet files that armid fleet writes, by data set.
+FLEET_TABLES = {
+    'bags': results.BAGS,
+    'parameters': results.PARAMETERS,
+    'arms': results.ARMS,
+    'refused': results.REFUSED,
+    'watch/arms': watch.ARMS,
+    'watch/changes': watch.CHANGES,
+    'watch/wear': watch.WEAR,
+    'watch/diagnoses': diagnose.DIAGNOSES,
+}
 
 
 def schemas_page(introduction: str) -> str:
-    """Return the introduction, and then the keys of every kind of file."""
+    """Return the introduction, the keys of every JSON file, and the columns of fleet tables."""
     lines = [introduction]
     for path in sorted(FOLDER.glob(f'*{SUFFIX}')):
         schema = json.loads(path.read_text(encoding='utf-8'))
         lines += [f'## {schema["title"]}', '', schema['description'], '']
         lines += [f'JSON Schema: [{path.name}](../schemas/{path.name})', '']
         rows = [(f'`{key}`', kind, cell(text)) for key, kind, text in _keys(schema, schema, '')]
-        lines += table(('key', 'type', 'what it holds'), rows)
+        lines += table(('key', 'type', 'meaning'), rows)
+    lines += ['## Tables of armid fleet', '']
+    lines += table(
+        ('data set', 'columns with Arrow types'),
+        [
+            (name, ', '.join(f'`{field.name}` ({field.type})' for field in schema))
+            for name, schema in FLEET_TABLES.items()
+        ],
+    )
     return '\n'.join(lines)
 
 
 def _keys(
     whole: dict[str, Any], schema: dict[str, Any], prefix: str
 ) -> Iterator[tuple[str, str, str]]:
-    """Return path, type and description of every key; nested keys follow their parent."""
+    """Yield path, type and description of each key of a schema; a parent precedes its children."""
     for name, found in schema.get('properties', {}).items():
         one = resolved(whole, found)
         key = f'{prefix}{name}'
@@ -50,14 +70,14 @@ def _keys(
 
 def faults(name: str, document: dict[str, Any]) -> list[str]:
     """
-    Return the faults of a document: violations of its schema, and keys without a schema.
+    Return the faults of a JSON document: violations of its schema, and keys without a schema.
 
     Parameters
     ----------
     name : str
-        Of the schema, such as 'identification'.
+        Name of the schema, such as 'identification'.
     document : dict
-        As it was read.
+        The content of the JSON file.
 
     """
     schema = json.loads((FOLDER / f'{name}{SUFFIX}').read_text(encoding='utf-8'))
@@ -71,7 +91,7 @@ def faults(name: str, document: dict[str, Any]) -> list[str]:
 def _undescribed(
     whole: dict[str, Any], schema: dict[str, Any], document: Any, where: str
 ) -> Iterator[str]:
-    """Return the keys of a document that are not properties of its schema."""
+    """Yield the keys of a JSON document that are not properties of its schema."""
     schema = resolved(whole, schema)
     for choice in schema.get('anyOf', ()):
         if choice.get('type') != 'null':
@@ -89,7 +109,7 @@ def _undescribed(
 
 
 def resolved(whole: dict[str, Any], schema: dict[str, Any]) -> dict[str, Any]:
-    """Return the target of a reference within a schema."""
+    """Return the part of a JSON schema that a `$ref` refers to; a schema without one as it is."""
     reference = schema.get('$ref')
     if reference is None:
         return schema
