@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The page with a diagram of each job through the rooms, drawn from the calls in the code."""
+"""The documentation page with a diagram of the function calls of each job."""
 
 from __future__ import annotations
 
@@ -31,15 +31,16 @@ _EVERYWHERE = re.compile(
 _ROW, _LANE, _NAME, _TEXT = 18, 22, 240, 560
 _BEGINNING = """# Architecture
 
-Each diagram follows one command, from top to bottom. A lane is a room: a folder of the package.
-The dot of a function is in the lane of its room, and a line leads to it from its caller. The text
-to the right is the first line of its docstring. Each function is shown once, without helpers.
+Each diagram shows the function calls of one armid command, from top to bottom. Each vertical lane
+stands for a room, which is a folder of the package. The dot of a function lies in the lane of its
+room; a line connects the function to its caller. The text to the right of a function is the first
+line of its docstring. Each function is shown once; helper functions are left out.
 """
 
 
 @dataclass(frozen=True)
 class Step:
-    """A call: its depth, room and name of the function, and its purpose."""
+    """A function call of a diagram: depth, room, function name, and the docstring's first line."""
 
     depth: int
     room: str
@@ -57,7 +58,7 @@ class Module:
 
 @cache
 def module(package: Path, dotted: str) -> Module | None:
-    """Parse a module or a folder of the package; None if it does not exist."""
+    """Parse a module or subpackage by its dotted name; return None if the file does not exist."""
     place = package.parent.joinpath(*dotted.split('.'))
     path = place / '__init__.py' if place.is_dir() else place.with_suffix('.py')
     if not path.is_file():
@@ -74,7 +75,7 @@ def module(package: Path, dotted: str) -> Module | None:
 
 
 def found(package: Path, dotted: str, name: str) -> tuple[str, str] | None:
-    """Return the module that defines a name, through any number of re-exports."""
+    """Return module and name where a name is defined, through re-exports; None if nowhere."""
     here = module(package, dotted)
     if here is None:
         return None
@@ -84,7 +85,7 @@ def found(package: Path, dotted: str, name: str) -> tuple[str, str] | None:
 
 
 def calls(body: ast.AST) -> Iterator[str]:
-    """Yield the names of calls; those within arguments come before the call itself."""
+    """Yield the names of called functions; calls within arguments come before the outer call."""
     for child in ast.iter_child_nodes(body):
         yield from calls(child)
     if isinstance(body, ast.Call):
@@ -94,7 +95,7 @@ def calls(body: ast.AST) -> Iterator[str]:
 
 
 def steps(package: Path, dotted: str, name: str) -> list[Step]:
-    """Return the calls between rooms that a function makes, each once, in order."""
+    """Return the calls from room to room that a function leads to, each once, in order."""
     seen: set[tuple[str, str]] = set()
 
     def follow(dotted: str, own: str, depth: int) -> Iterator[Step]:
@@ -121,14 +122,14 @@ def steps(package: Path, dotted: str, name: str) -> list[Step]:
     return list(follow(dotted, name, 1))
 
 
-def diagram(job: str, calls_of_it: list[Step]) -> Iterator[str]:
+def diagram(job: str, calls_of_job: list[Step]) -> Iterator[str]:
     """Yield the lines of an SVG image with a lane for each room and a row for each call."""
-    rows = [Step(0, 'cli', job, f'The command armid {job}.'), *calls_of_it]
+    rows = [Step(0, 'cli', job, f'The command armid {job}.'), *calls_of_job]
     rooms = list(dict.fromkeys(('cli', 'api', *(one.room for one in rows))))
     lane = {room: 8 + _LANE * k for k, room in enumerate(rooms)}
     names, top = 12 + _LANE * len(rooms), 78
-    beside = names + _NAME
-    width, height = beside + _TEXT, top + _ROW * len(rows)
+    texts = names + _NAME
+    width, height = texts + _TEXT, top + _ROW * len(rows)
     yield (
         f'<div class="diagram"><svg viewBox="0 0 {width} {height}" width="{width}" role="img" '
         f'aria-label="Calls of armid {job} from room to room">'
@@ -146,13 +147,13 @@ def diagram(job: str, calls_of_it: list[Step]) -> Iterator[str]:
         last.append((x, y))
         yield f'<circle cx="{x}" cy="{y}" r="4"/>'
         yield f'<text class="name" x="{names + 10 * one.depth}" y="{y + 4}">{one.name}</text>'
-        yield f'<text x="{beside}" y="{y + 4}">{escape(one.summary)}</text>'
+        yield f'<text x="{texts}" y="{y + 4}">{escape(one.summary)}</text>'
     yield '</svg></div>'
     yield ''
 
 
 def architecture_page(package: Path) -> str:
-    """Return the page: a diagram for each job."""
+    """Return a Markdown page with a diagram of calls for each job."""
     lines = [_BEGINNING]
     for job, (dotted, name) in JOBS.items():
         lines += [f'## {job}', '', *diagram(job, steps(package, dotted, name))]

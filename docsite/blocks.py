@@ -30,18 +30,18 @@ _START = re.compile(r'\A<!-- starts with: (.+) -->$', re.MULTILINE)
 @dataclass(frozen=True)
 class Block:
     """
-    A code block.
+    A code block of a Markdown page.
 
     Attributes
     ----------
     line : int
-        Where it begins, from 1.
+        Number of its first line, from 1.
     language : str
-        As the fence says; 'indented' for a block without one.
+        Language after the opening fence; 'indented' for an indented block.
     text : str
-        What is in it.
+        The code.
     excuse : str
-        Why it is not run; empty if it is.
+        Reason why the block cannot run; empty if it can.
 
     """
 
@@ -52,7 +52,7 @@ class Block:
 
 
 def blocks(path: Path) -> tuple[Block, ...]:
-    """Return the code blocks of a page, in their order."""
+    """Return the code blocks of a Markdown page, in their order."""
     lines = path.read_text(encoding='utf-8').splitlines()
     found, k = [], 0
     while k < len(lines):
@@ -70,9 +70,9 @@ def blocks(path: Path) -> tuple[Block, ...]:
 
 
 def starts_with(path: Path) -> tuple[str, ...] | None:
-    """Return the files that a page needs at its start; None for all files of the desk."""
-    said = _START.search(path.read_text(encoding='utf-8'))
-    return None if said is None else tuple(said[1].split())
+    """Return the files that the first line of a page lists; None for all files of the desk."""
+    listed = _START.search(path.read_text(encoding='utf-8'))
+    return None if listed is None else tuple(listed[1].split())
 
 
 def script(page: tuple[Block, ...]) -> str:

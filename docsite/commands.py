@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The page of all commands, from the parser that reads the command line."""
+"""The documentation page of all commands, generated from their command-line parser."""
 
 from __future__ import annotations
 
@@ -14,13 +14,14 @@ from docsite.markdown import cell, prose, table
 
 
 def commands_page() -> str:
-    """Return the page: usage, text and options of every command, in the order of the work."""
+    """Return a Markdown page with usage, help and options of every armid command."""
     group = click.Context(main, info_name='armid', **main.context_settings)
     lines = [
         '# Commands',
         '',
-        'Made from the parser of `armid` itself. A command ends with code 0 when the job was '
-        'done, with 2 and one line on stderr when its input is bad.',
+        'This page lists the commands and options of `armid`. A command that did its job ends '
+        'with exit code 0. A command with bad input prints one line on stderr and ends with exit '
+        'code 2.',
         '',
     ]
     for name in main.list_commands(group):
@@ -40,9 +41,9 @@ def _command(command: click.Command, context: click.Context) -> Iterator[str]:
     options = (p for p in command.get_params(context) if isinstance(p, click.Option))
     records = (option.get_help_record(context) for option in options)
     rows = [(_names(option), cell(text)) for option, text in filter(None, records)]
-    yield from table(('option', 'what it does'), rows)
+    yield from table(('option', 'meaning'), rows)
 
 
 def _names(option: str) -> str:
-    """Return the names of an option, each a piece that is not broken."""
+    """Return the names of an option as inline code, separated by commas."""
     return ', '.join(f'`{name}`' for name in option.replace(', -', '\n-').split('\n'))

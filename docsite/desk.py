@@ -3,9 +3,9 @@
 """
 The files in the examples of pages and docstrings: an arm, its plan, and a week of recordings.
 
-``my_arm.urdf`` is the arm of the examples. It has friction that its URDF lacks. On Monday and
-Tuesday nothing is wrong; on Friday it holds 0.4 kg; today a spring pulls at its elbow.
-``bags`` and ``examples`` are folders of the repository.
+``my_arm.urdf`` is the arm of the examples. The recorded arm has friction that ``my_arm.urdf``
+lacks. The arm is unchanged on Monday and Tuesday, holds 0.4 kg on Friday, and has a spring at its
+elbow today. ``bags`` and ``examples`` are folders of the repository.
 
 """
 
@@ -29,7 +29,7 @@ GAIN = 4.0
 
 
 def lay_out(folder: Path) -> Path:
-    """Write all files into a folder, and return the folder."""
+    """Write the files of the examples into a folder, and return the folder."""
     urdf = folder / 'my_arm.urdf'
     shutil.copy(ARM, urdf)
     for name in ('bags', 'examples'):
@@ -55,7 +55,7 @@ def lay_out(folder: Path) -> Path:
 
 
 def write_log(path: Path, run: ar.Recording) -> None:
-    """Write a log as of a data logger: milliseconds, degrees, currents."""
+    """Write a recording as the CSV file of a data logger: milliseconds, degrees, currents."""
     numbers = range(1, run.n_joints + 1)
     names = ['t_ms', *(f'angle_deg_{k}' for k in numbers), *(f'amps_{k}' for k in numbers)]
     rows = np.column_stack([1e3 * run.t, np.degrees(run.q), run.tau / GAIN])

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The page of all effects in the catalogue."""
+"""The documentation page of all effects in the catalogue."""
 
 from __future__ import annotations
 
@@ -12,13 +12,14 @@ from docsite.markdown import cell, table
 
 
 def effects_page() -> str:
-    """Return the page: description, formula, source and parameters of each effect."""
+    """Return a Markdown page with formula, source and parameters of each effect."""
     lines = [
         '# Effects',
         '',
-        'What `--effects`, `effects=` and a diagnosis can name, from the catalogue itself. Units '
-        'are those of a revolute joint; a prismatic one has N for N m and m for rad. An effect '
-        'that is not here is one class: [An effect of your own](../howto/own_effect.md).',
+        'This page lists the effects of the catalogue, which a diagnosis can name and `--effects` '
+        'and `effects=` can select. Units are those of revolute joints; for prismatic joints, '
+        'read N for N m and m for rad. You can [write an effect of your own]'
+        '(../howto/own_effect.md).',
         '',
     ]
     for name, effect in CATALOGUE.items():

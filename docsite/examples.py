@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The page of all examples, from their files."""
+"""The documentation page of all examples, generated from their files."""
 
 from __future__ import annotations
 
@@ -10,11 +10,12 @@ import re
 
 
 def examples_page(folder: Path) -> str:
-    """Return the page: purpose and code of each example."""
+    """Return a Markdown page with purpose and code of each example."""
     lines = [
         '# Examples',
         '',
-        'One job each, complete: `python examples/own_urdf.py`. The tests run all of them.',
+        'Each example is a complete program for one job: `python examples/own_urdf.py`. The tests '
+        'run all examples.',
         '',
     ]
     for path in sorted(folder.glob('*.py')):

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Hook of mkdocs that adds pages made from the code to the files of docs/."""
+"""Hook of mkdocs that adds the pages generated from code to the files of docs/."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ NOTEBOOKS = ROOT / 'examples' / 'notebooks'
 
 
 def on_files(files: Files, config: MkDocsConfig) -> Files:
-    """Add the pages that are generated."""
+    """Add the generated pages to the files of the site."""
     reference = Path(config.docs_dir) / 'reference'
     pages = {
         'explanation/architecture.md': architecture_page(ROOT / 'armid_ros'),
@@ -32,8 +32,8 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
         'reference/effects.md': effects_page(),
         'reference/examples.md': examples_page(ROOT / 'examples'),
         'reference/numbers.md': numbers_page(ROOT / 'armid_ros' / 'diagnosis'),
-        'reference/nodes.md': nodes_page(_taken(files, reference / 'nodes.md')),
-        'reference/files.md': schemas_page(_taken(files, reference / 'files.md')),
+        'reference/nodes.md': nodes_page(_removed(files, reference / 'nodes.md')),
+        'reference/files.md': schemas_page(_removed(files, reference / 'files.md')),
         'reference/speed.md': speed_page(ROOT / 'benchmarks' / 'results' / 'speed.json'),
     }
     for uri, text in pages.items():
@@ -47,8 +47,8 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
     return files
 
 
-def _taken(files: Files, path: Path) -> str:
-    """Return the hand-written beginning of a page, which the whole page replaces."""
+def _removed(files: Files, path: Path) -> str:
+    """Return the hand-written text of a page, and remove the page from the files of the site."""
     for file in list(files):
         if file.abs_src_path and Path(file.abs_src_path) == path:
             files.remove(file)

@@ -14,7 +14,7 @@ _LINKS = ('href', 'src')
 
 
 class _Page(HTMLParser):
-    """The links and anchors of a page."""
+    """The links and anchors of an HTML page."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -22,7 +22,7 @@ class _Page(HTMLParser):
         self.anchors: set[str] = set()
 
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        """Store the links of a tag, and its anchors."""
+        """Store the links and anchors of an HTML tag."""
         for name, value in attrs:
             if name in _LINKS and value:
                 self.links.append((tag, value))
@@ -38,7 +38,7 @@ def _read(path: Path) -> _Page:
 
 def broken_links(site: Path) -> Iterator[str]:
     """
-    Return links without a target on all pages, and files that a page would load from a network.
+    Yield the links of all pages without a target, and files that a page loads from a network.
 
     Links to other sites are not checked.
 
@@ -62,4 +62,4 @@ def broken_links(site: Path) -> Iterator[str]:
                 yield f'{path.name}: {link}'
             elif there.fragment and target in pages:
                 if unquote(there.fragment) not in pages[target].anchors:
-                    yield f'{path.name}: {link} names no place'
+                    yield f'{path.name}: the anchor of {link} does not exist'

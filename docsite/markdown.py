@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Pieces of Markdown."""
+"""Markdown of table cells, paragraphs and tables."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def prose(text: str) -> str:
 
 
 def table(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> Iterator[str]:
-    """Return the lines of a table, followed by a blank line; cells are Markdown."""
+    """Yield the lines of a Markdown table, and a blank line; cells are Markdown."""
     yield f'| {" | ".join(heads)} |'
     yield '|' + '---|' * len(heads)
     for row in rows:

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The page of all nodes, with the tables of their parameters."""
+"""The documentation page of all nodes, with the tables of their parameters."""
 
 from __future__ import annotations
 
@@ -37,17 +37,17 @@ NODES: dict[str, type[ArmidNode]] = {
 
 
 def nodes_page(introduction: str) -> str:
-    """Return the introduction, and then purpose and parameters of every node."""
+    """Return the introduction, followed by purpose and parameters of every node."""
     lines = [introduction]
     for name, node in NODES.items():
-        lines += [f'## {name}', '', _told(node), '']
+        lines += [f'## {name}', '', _purpose(node), '']
         rows = [_row(parameter) for parameter in (*node.table, *COMMON)]
-        lines += table(('parameter', 'default', 'range', 'what it is'), rows)
+        lines += table(('parameter', 'default', 'range', 'meaning'), rows)
     return '\n'.join(lines)
 
 
-def _told(node: type[ArmidNode]) -> str:
-    """Return the part of a docstring before its sections."""
+def _purpose(node: type[ArmidNode]) -> str:
+    """Return the docstring of a node without its section of attributes."""
     return prose(node.__doc__ or '').split('\nAttributes\n')[0].strip()
 
 

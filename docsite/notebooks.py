@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Pages of notebooks, which are executed at every build of the site."""
+"""Documentation pages of notebooks, which every build of the site executes."""
 
 from __future__ import annotations
 
@@ -20,11 +20,9 @@ CELL_TIMEOUT = 600
 
 def executed(path: Path) -> tuple[str, dict[str, bytes]]:
     """
-    Return the page of a notebook with the output of its cells, and its files by name.
+    Execute a notebook in its own folder; return its page with outputs, and its files by name.
 
-    The files are its pictures, and the notebook itself as .ipynb.
-
-    It runs in its own folder, as in an editor.
+    The files are the pictures of the page, and the notebook as .ipynb.
 
     Parameters
     ----------
@@ -34,7 +32,7 @@ def executed(path: Path) -> tuple[str, dict[str, bytes]]:
     Raises
     ------
     nbclient.exceptions.CellExecutionError
-        Where a cell fails, with the cell and the traceback.
+        If a cell fails; the message has the cell and the traceback.
 
     """
     notebook = jupytext.read(path)
@@ -52,7 +50,7 @@ def executed(path: Path) -> tuple[str, dict[str, bytes]]:
 
 @contextmanager
 def _own_kernel() -> Iterator[None]:
-    """Make the kernel import this tree, and write nothing to the home directory."""
+    """Let a kernel import this repository, and write nothing to the home directory."""
     before = dict(os.environ)
     folders = (str(Path(__file__).parents[1]), before.get('PYTHONPATH', ''))
     with TemporaryDirectory() as folder:

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The page of all numbers of the diagnosis, from the code: thresholds of decisions, and others."""
+"""The documentation page of all numbers in the code of the diagnosis."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _ENTRY = re.compile(r'^(?P<names>\w+(?:, \w+)*) : (?P<type>.+)$')
 
 
 def numbers_page(package: Path) -> str:
-    """Return the page of the numbers in the folder of the diagnosis, and of those it imports."""
+    """Return a Markdown page of the numbers that the modules of a folder define or import."""
     meaning = _meanings(inspect.cleandoc(Thresholds.__doc__ or ''))
     rows = [
         (f'`{field.name}`', f'{field.default:g}', cell(meaning.get(field.name, '')))
@@ -34,27 +34,27 @@ def numbers_page(package: Path) -> str:
         [
             '# Numbers of the diagnosis',
             '',
-            'Made from the code, so that none is left out.',
+            'This page lists every number in the code of the diagnosis.',
             '',
-            f'## {len(rows)} that decide a name',
+            f'## {len(rows)} numbers that decide which effect is named',
             '',
-            'Shares are of the held-out squares over the unit of the gap.',
+            'A share is a part of the gap of held-out data.',
             '',
-            *table(('number', 'value', 'what it is'), rows),
+            *table(('number', 'value', 'meaning'), rows),
             '',
-            f'## {len(others)} of data, numerics and words',
+            f'## {len(others)} numbers of data, numerics and messages',
             '',
-            'What a row is, when data are at fault, how finely shapes are searched, what a '
-            'sentence says.',
+            'These numbers select rows, recognise faults of data, set the steps of searches, and '
+            'choose the words of messages.',
             '',
-            *table(('number', 'value', 'what it is, and why', 'where'), others),
+            *table(('number', 'value', 'meaning and reason', 'file'), others),
             '',
         ]
     )
 
 
 def _others(package: Path) -> Iterator[tuple[str, str, str, str]]:
-    """Yield files, names, values and comments of all numbers except thresholds."""
+    """Yield file, name, value and comment of every numeric constant, imported ones included."""
     wanted: dict[str, set[str]] = {}
     for path in sorted(package.rglob('*.py')):
         text = path.read_text(encoding='utf-8')
@@ -73,7 +73,7 @@ def _others(package: Path) -> Iterator[tuple[str, str, str, str]]:
 
 
 def _meanings(docstring: str) -> dict[str, str]:
-    """Return the description of each attribute in a numpydoc section."""
+    """Return the descriptions of a docstring's attributes, by name."""
     found: dict[str, str] = {}
     names: list[str] = []
     for line in docstring.splitlines():
@@ -87,7 +87,7 @@ def _meanings(docstring: str) -> dict[str, str]:
 
 
 def constants(source: str) -> Iterator[tuple[str, str, str]]:
-    """Yield names, values and preceding comments of the numeric constants of a module."""
+    """Yield name, value and preceding comment of every numeric constant of a module."""
     lines = source.splitlines()
     for node in ast.parse(source).body:
         if not isinstance(node, ast.Assign) or not _is_numbers(node.value):

@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-A sample of the project's language, for a reader who did not write it.
+A sample of docstrings, messages and sentences, for a reader who did not write them.
 
 ``python -m docsite.sample [--seed 0] [--count 100]`` prints docstrings, messages and sentences
 of pages in equal numbers. The reader marks each item: clear, clear on second reading, or unclear.
@@ -19,13 +19,13 @@ import re
 import numpy as np
 
 ROOT = Path(__file__).parents[1]
-_SENTENCE = re.compile(r'(?<=[.!?]) +(?=[A-Z])')
+_SENTENCE = re.compile(r'(?<=[.!?]) +(?=[A-Z`[])')
 #: Fewest words of a message.
 _FEWEST = 4
 
 
 def docstrings(package: Path) -> Iterator[tuple[str, str]]:
-    """Yield the place of each function and class, and the first paragraph of its docstring."""
+    """Yield file and name of each function and class, and the first paragraph of its docstring."""
     for place, node in _nodes(package):
         if isinstance(node, ast.FunctionDef | ast.ClassDef):
             text = (ast.get_docstring(node) or '').partition('\n\n')[0]
@@ -34,7 +34,7 @@ def docstrings(package: Path) -> Iterator[tuple[str, str]]:
 
 
 def messages(package: Path) -> Iterator[tuple[str, str]]:
-    """Yield the places where errors are raised, and the messages with values in braces."""
+    """Yield file and line of each raised error, and its message with values in braces."""
     for place, node in _nodes(package):
         if isinstance(node, ast.Raise) and isinstance(node.exc, ast.Call):
             for given in node.exc.args:
@@ -45,12 +45,13 @@ def messages(package: Path) -> Iterator[tuple[str, str]]:
 
 
 def sentences(pages: Path) -> Iterator[tuple[str, str]]:
-    """Yield the sentences of the pages, without code, tables and headings."""
+    """Yield the sentences of all pages, without code, tables, headings, bullets and directives."""
     for path in sorted(pages.rglob('*.md')):
         text = re.sub(r'^```.*?^```$', '', path.read_text('utf-8'), flags=re.MULTILINE | re.DOTALL)
         for paragraph in re.split(r'\n\s*\n', text):
-            if paragraph.strip() and not re.match(r'\s*[#|<!\-]', paragraph):
-                for one in _SENTENCE.split(' '.join(paragraph.split())):
+            if paragraph.strip() and not re.match(r'\s*([#|<!\-]|:::)', paragraph):
+                text = re.sub(r'^\d+\. ', '', ' '.join(paragraph.split()))
+                for one in _SENTENCE.split(text):
                     yield path.relative_to(pages).as_posix(), one
 
 
@@ -62,7 +63,7 @@ def _nodes(package: Path) -> Iterator[tuple[str, ast.AST]]:
 
 
 def drawn(seed: int, count: int) -> list[tuple[str, str]]:
-    """Draw a number of items, in equal parts of each kind."""
+    """Draw docstrings, messages and sentences in equal numbers; return place and text of each."""
     rng = np.random.default_rng(seed)
     package = ROOT / 'armid_ros'
     kinds = [
@@ -77,7 +78,7 @@ def drawn(seed: int, count: int) -> list[tuple[str, str]]:
 
 
 def main() -> None:
-    """Print the sample."""
+    """Print the drawn items with their numbers and places."""
     parser = argparse.ArgumentParser(description=__doc__.strip().partition('\n')[0])
     parser.add_argument('--seed', type=int, default=0)
     parser.add_argument('--count', type=int, default=100)

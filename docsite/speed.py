@@ -1,19 +1,20 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The page of measured speeds, from the last results of ``make bench``."""
+"""The documentation page of measured speeds, from the last results of ``make bench``."""
 
 import json
 from pathlib import Path
 
 _BEGINNING = """# Speed
 
-Each block is what a benchmark printed when it was last run. Ratios compare both sides in one run
-on one machine; seconds are of that machine. `make bench BENCH=NAME` runs it again.
+Each block on this page shows the lines that a benchmark printed in its last run. A ratio of speeds
+compares two programs in one run on one machine. `make bench BENCH=NAME` repeats a benchmark.
 
 ## Growth
 
-`python -m benchmarks.growth` measures the jobs as the data grow. Elsewhere there are 7 joints, one
-recording of 12 s at 1 kHz and two effects. The slope is the exponent over the upper half.
+`python -m benchmarks.growth` measures processor time and memory over the size of the input. Inputs
+that do not grow have 7 joints, one recording of 12 s at 1 kHz, and two effects. The slope of a
+curve is the exponent of its growth, fitted to the upper half.
 
 ![Processor time and memory over samples, joints, bags and effects](../images/growth.png)
 """
@@ -21,17 +22,12 @@ recording of 12 s at 1 kHz and two effects. The slope is the exponent over the u
 
 def speed_page(results: Path) -> str:
     """
-    Return the page.
+    Return a Markdown page with the results of the benchmarks.
 
     Parameters
     ----------
     results : Path
-        File of names with machine, commit and the lines that were printed.
-
-    Returns
-    -------
-    str
-        Markdown.
+        JSON file with machine, commit and printed lines of each benchmark, by name.
 
     """
     parts = [_BEGINNING]
