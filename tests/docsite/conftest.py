@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The files that examples in pages and docstrings use."""
+"""Fixtures with the files that examples in pages and docstrings use."""
 
 import shutil
 
@@ -11,7 +11,7 @@ from docsite.desk import lay_out
 
 @pytest.fixture(scope='session')
 def desk(tmp_path_factory):
-    """Make the files once, and return their folder."""
+    """Write the files once; return their folder."""
     return lay_out(tmp_path_factory.mktemp('desk'))
 
 

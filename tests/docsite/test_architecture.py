@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The diagrams of jobs show the calls of the code."""
+"""The diagrams on the page Architecture show the calls in the code."""
 
 from pathlib import Path
 

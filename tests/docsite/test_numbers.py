@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Every number of the diagnosis is on one page, with what it is."""
+"""The page of numbers lists every number of the diagnosis with its meaning."""
 
 from dataclasses import fields
 from pathlib import Path
@@ -13,16 +13,16 @@ PACKAGE = Path(__file__).parents[2] / 'armid_ros' / 'diagnosis'
 
 
 def rows(page):
-    """Return the cells of all rows of all tables."""
+    """Return the cells of all table rows of a page."""
     lines = [line for line in page.splitlines() if line.startswith('| `')]
     return [[cell.strip() for cell in line.strip('|').split(' | ')] for line in lines]
 
 
 def test_each_has_a_value_and_a_reason():
     page = numbers_page(PACKAGE)
-    told = rows(page)
-    assert {field.name for field in fields(Thresholds)} <= {row[0].strip('`') for row in told}
-    assert not [row for row in told if not (row[1] and row[2])]
+    found = rows(page)
+    assert {field.name for field in fields(Thresholds)} <= {row[0].strip('`') for row in found}
+    assert not [row for row in found if not (row[1] and row[2])]
 
 
 def test_what_decides_is_few():

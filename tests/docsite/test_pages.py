@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Every block of code on a page does what it says, or says why it is not run."""
+"""Every block of code on a page runs, or states why it cannot."""
 
 import json
 import os
@@ -72,7 +72,7 @@ def test_the_blocks_of_a_page_run_one_after_the_other(page, at_desk):
 
 
 def options():
-    """Return all options of all commands."""
+    """Return the names of all options of all armid commands."""
     context = click.Context(main)
     return {
         option
@@ -83,7 +83,7 @@ def options():
 
 
 def commands_of(group, context):
-    """Yield all commands of a group, and those of the groups in it."""
+    """Yield all commands of a group and of its subgroups."""
     for name in group.list_commands(context):
         command = group.get_command(context, name)
         yield command
@@ -93,14 +93,14 @@ def commands_of(group, context):
 
 @pytest.mark.parametrize('page', PAGES, ids=name_of)
 def test_every_option_that_a_page_names_exists(page):
-    """Those of programs that are not of this package are named with the program alone."""
+    """Options of other programs are allowed after the name of the program."""
     text = re.sub(r'^```.*?^```$', '', page.read_text(encoding='utf-8'), flags=re.M | re.S)
-    said = [
+    texts = [
         code
         for code in re.findall(r'`([^`\n]+)`', text)
         if not code.startswith(('python -m', 'python3 -m', 'colcon ', 'pip '))
     ]
-    named = {option for code in said for option in re.findall(r'(?<!\S)--[a-z][\w-]*', code)}
+    named = {option for code in texts for option in re.findall(r'(?<!\S)--[a-z][\w-]*', code)}
     assert named <= {*options(), '--ros-args'}
 
 

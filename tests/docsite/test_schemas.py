@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""What golden results do not hold is what the schemas say, which describe every key of it."""
+"""The schemas describe every key of documents that the golden results lack."""
 
 import json
 
@@ -64,5 +64,5 @@ def test_a_key_that_no_schema_has_and_a_value_of_another_kind_are_faults(at_desk
     document = ar.compare('monday_result', 'friday_result').document()
     (added,) = faults('comparison', {**document, 'new': 1})
     assert added.startswith('$.new: ')
-    (said,) = faults('comparison', {**document, 'only_after': 'none'})
-    assert said.startswith('$.only_after')
+    (wrong,) = faults('comparison', {**document, 'only_after': 'none'})
+    assert wrong.startswith('$.only_after')

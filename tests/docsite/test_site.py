@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The site is built without a warning, whole, and leads nowhere that is not there."""
+"""The site builds without a warning, is complete, and has no broken link."""
 
 import json
 import os
@@ -23,7 +23,7 @@ ROOT = Path(__file__).parents[2]
 
 @pytest.fixture(scope='module')
 def site(tmp_path_factory):
-    """Build it as `make docs` does, notebooks executed."""
+    """Build the site as `make docs` does, with executed notebooks; return its folder."""
     folder = tmp_path_factory.mktemp('site')
     done = subprocess.run(
         [sys.executable, '-m', 'mkdocs', 'build', '--strict', '--site-dir', folder],
