@@ -1,6 +1,6 @@
-# The wheels of ROS 2 export include directories of the machine that built them, and cmake does not
-# generate for a directory that is not there. They are not needed here: leave them out. An
-# installation by apt has none.
+# Remove include directories that do not exist from all imported targets. The wheels of ROS 2
+# export include directories of the machine that built them, and cmake fails on missing
+# directories. An installation by apt has no such directories.
 get_property(imported_targets DIRECTORY PROPERTY IMPORTED_TARGETS)
 foreach(imported_target IN LISTS imported_targets)
   get_target_property(directories ${imported_target} INTERFACE_INCLUDE_DIRECTORIES)

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Compiles the messages with cmake against the ROS 2 of this environment, into a wheel."""
+"""Build backend that compiles the messages with the ROS 2 of the environment into a wheel."""
 
 import os
 from pathlib import Path
@@ -15,7 +15,7 @@ NAME = 'armid_msgs'
 
 
 def build_wheel(wheel_directory, config_settings=None, metadata_directory=None):
-    """Build the wheel, as PEP 517 asks for it; return its name."""
+    """Build the wheel (hook of PEP 517) and return its file name."""
     from wheel.wheelfile import WheelFile
 
     version = ElementTree.parse(HERE / 'package.xml').findtext('version')
@@ -41,16 +41,16 @@ def build_wheel(wheel_directory, config_settings=None, metadata_directory=None):
 
 
 def placed(path, data):
-    """Return where a file that was installed goes in the wheel."""
+    """Return the path in the wheel of an installed file."""
     _, found, inside = path.as_posix().partition('/site-packages/')
     return inside if found else f'{data}/{path.as_posix()}'
 
 
 def compiled(folder):
-    """Compile and install below a folder; return the prefix."""
+    """Compile the messages and install them below a folder; return the prefix."""
     if not Path(sys.prefix, 'share', 'rosidl_default_generators').is_dir():
         raise SystemExit(
-            f"{NAME}: there is no ROS 2 in {sys.prefix}: pip install 'armid_ros[ros]' first, and "
+            f"{NAME}: there is no ROS 2 in {sys.prefix}: first pip install 'armid_ros[ros]', "
             f'then pip install --no-build-isolation {HERE}'
         )
     build, prefix = folder / 'build', folder / 'prefix'
