@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Folders of the source tree and of the installation."""
+"""Fixtures with the folders of the source tree and of the installation."""
 
 from importlib import metadata
 from pathlib import Path
@@ -14,13 +14,13 @@ ROOT = Path(__file__).parents[2]
 
 @pytest.fixture(scope='session')
 def root():
-    """Return the folder of package.xml."""
+    """Return the root of the source tree, which contains package.xml."""
     return ROOT
 
 
 @pytest.fixture(scope='session')
 def distribution():
-    """Return the distribution that pip installed; skip the test if it did not."""
+    """Return the distribution installed by pip; skip the test if there is none."""
     site_packages = [sysconfig.get_path('purelib')]  # not the source tree, which has metadata too
     for installed in metadata.distributions(name='armid_ros', path=site_packages):
         return installed
@@ -29,5 +29,5 @@ def distribution():
 
 @pytest.fixture(scope='session')
 def prefix(distribution):
-    """Return the prefix of the installation of armid_ros."""
+    """Return the installation prefix of armid_ros."""
     return Path(sys.prefix)

@@ -23,12 +23,12 @@ def test_flake8(root, folders):
 
 
 def test_pep257(folders):
-    """With the settings of the tool itself."""
+    """Run the ament linter with its own settings."""
     main = pytest.importorskip('ament_pep257.main').main
     assert main(argv=folders) == 0
 
 
 def test_xmllint(root):
-    """It asks the schema from the network, so it is left out without."""
+    """The XML linter downloads the schema; without a network the test is skipped."""
     main = pytest.importorskip('ament_xmllint.main').main
     assert main(argv=[str(root / 'package.xml'), str(root / 'msg_schemas' / 'package.xml')]) == 0

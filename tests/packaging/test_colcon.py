@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The tree is a pair of packages that colcon finds, builds and installs for `ros2 run`."""
+"""colcon finds, builds and installs the two ROS packages of the source tree."""
 
 import os
 from pathlib import Path
@@ -19,8 +19,8 @@ LEFT_BEHIND = shutil.ignore_patterns(
 
 
 def run(command, folder):
-    """Run a command as in a sourced workspace; return what it prints."""
-    measured = ('COVERAGE_', 'PYTHONPATH')  # coverage of colcon is slow and nobody's business
+    """Run a command in a sourced workspace; return its output."""
+    measured = ('COVERAGE_', 'PYTHONPATH')  # coverage of colcon itself is slow and not needed
     env = {name: value for name, value in os.environ.items() if not name.startswith(measured)}
     env['PATH'] = os.pathsep.join([str(Path(sys.prefix, 'bin')), env['PATH']])
     env['AMENT_PREFIX_PATH'] = sys.prefix
@@ -32,7 +32,7 @@ def run(command, folder):
 
 @pytest.fixture(scope='module')
 def workspace(root, tmp_path_factory):
-    """Lay out a workspace as docs/howto/install.md says: the clone, and a link within it."""
+    """Make the workspace of docs/howto/install.md: a clone, and a link into it."""
     folder = tmp_path_factory.mktemp('workspace')
     shutil.copytree(root, folder / 'src' / 'armid_ros', ignore=LEFT_BEHIND)
     (folder / 'src' / 'armid_msgs').symlink_to('armid_ros/msg_schemas')
@@ -45,7 +45,7 @@ def workspace(root, tmp_path_factory):
     ids=['copied', 'linked'],
 )
 def install(request, workspace, tmp_path_factory):
-    """Build armid_ros alone; its messages are in the environment, of the same CMakeLists.txt."""
+    """Build armid_ros without armid_msgs, whose messages the environment has."""
     folder = tmp_path_factory.mktemp('package')
     (folder / 'src').mkdir()
     (folder / 'src' / 'armid_ros').symlink_to(workspace / 'src' / 'armid_ros')
@@ -54,14 +54,14 @@ def install(request, workspace, tmp_path_factory):
 
 
 def test_both_packages_are_found_messages_first(workspace):
-    """In a workspace above the clone, and in the clone itself without any option."""
+    """Colcon finds the packages from the workspace, and from the clone itself without options."""
     listed = ['colcon', 'list', '--topological-order', '--names-only']
     assert run(listed, workspace).split() == ['armid_msgs', 'armid_ros']
     assert run(listed, workspace / 'src' / 'armid_ros').split() == ['armid_msgs', 'armid_ros']
 
 
 def test_build_installs_what_ros2_looks_for(install, root, request):
-    """Marker, manifest and executables, without one of the scripts being lost or added."""
+    """The installation has marker, manifest, and exactly one executable per script."""
     share = install / 'armid_ros' / 'share'
     assert (share / 'ament_index' / 'resource_index' / 'packages' / 'armid_ros').is_file()
     assert (share / 'armid_ros' / 'package.xml').is_file()
@@ -71,13 +71,13 @@ def test_build_installs_what_ros2_looks_for(install, root, request):
     first = {(libexec / name).read_text().partition('\n')[0] for name in executables}
     if (
         'copied' in request.node.name
-    ):  # the Python of the active environment, which has what pip installed
+    ):  # the Python of the active environment, with the packages of pip
         assert first <= {'#!/usr/bin/env python3', '#!/bin/sh'}
 
 
 @pytest.mark.long
 def test_sourced_workspace_is_what_python_imports(workspace):
-    """Package and compiled messages come from the workspace, not from the environment."""
+    """Package and compiled messages are imported from the workspace, not from the environment."""
     run(['colcon', 'build'], workspace)
     install = workspace / 'install'
     code = 'import armid_ros, armid_msgs.msg as m; print(armid_ros.__file__, m.__file__)'

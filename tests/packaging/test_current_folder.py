@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""No process that the package starts runs a module of the folder that it is started in."""
+"""Started processes never import modules from the current folder."""
 
 import os
 from pathlib import Path

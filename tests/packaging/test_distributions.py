@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""What `python -m build` makes holds what a user needs, and nothing else."""
+"""Wheel and source distribution have all files that users need, and no others."""
 
 from email.parser import HeaderParser
 import os
@@ -15,12 +15,12 @@ import pytest
 
 BUILD = 'import sys; from setuptools import build_meta; print(build_meta.{}(sys.argv[1]))'
 LEFT_OUT = ('.*', 'build', 'dist', '*.egg-info', '__pycache__', 'node_modules', 'site')
-#: What `armid demo` fills where it is run, and not the room of that name in the package.
+#: Folder that `armid demo` fills in the current folder; not the room of that name.
 DEMO = 'demo'
 
 
 def built(step, source, out):
-    """Run a step of a build as `python -m build` does, with the libraries that are there."""
+    """Run a step of `python -m build` with the installed build libraries."""
     command = [sys.executable, '-c', BUILD.format(step), out]
     environment = {**os.environ, 'PYTHONWARNINGS': 'ignore'}
     subprocess.run(command, cwd=source, env=environment, check=True, capture_output=True)
@@ -30,7 +30,7 @@ def built(step, source, out):
 
 @pytest.fixture(scope='module')
 def sdist(root, tmp_path_factory):
-    """Return the source distribution, of the tree as it is."""
+    """Build the source distribution of the tree; return its path."""
     folder = tmp_path_factory.mktemp('sdist')
     by_name = shutil.ignore_patterns(*LEFT_OUT)
 
@@ -44,7 +44,7 @@ def sdist(root, tmp_path_factory):
 
 @pytest.fixture(scope='module')
 def wheel(sdist, tmp_path_factory):
-    """Return the wheel that is made of the source distribution alone."""
+    """Build a wheel from the source distribution alone; return its path."""
     folder = tmp_path_factory.mktemp('wheel')
     with tarfile.open(sdist) as archive:
         filters = {'filter': 'data'} if hasattr(tarfile, 'data_filter') else {}  # not in 3.11.2

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""What an effect is and needs stands in the effect: elsewhere nobody knows its name."""
+"""Code outside the room effects names no effect: facts of an effect are in its class."""
 
 import ast
 import re
@@ -8,29 +8,29 @@ import re
 from armid_ros.effects import CATALOGUE
 import pytest
 
-#: Files that name effects still, and how often; a number goes down, and no file comes in.
+#: Files that still name effects, and how often; numbers may fall, and no file may be added.
 LEFT = {
-    # what acts on an arm that is shipped
+    # effects that act on a shipped arm
     'simulation/elastic.py': 7,
-    # advice and examples for a person
+    # advice and examples for users
     'papers/elastic/springs.py': 5,
     'identification/known_payload.py': 2,
     'simulation/springs.py': 3,
-    # what help shows without importing effects; a test holds it against the catalogue
+    # help without an import of effects; a test compares the names with the catalogue
     'cli/choices.py': 5,
     'nodes/running/launching.py': 2,
-    # the effects that a room makes, or fits to an arm at rest
+    # effects that a room makes, or fits to an arm at rest
     'residual/learn.py': 1,
     'zero/fit.py': 25,
     'positions/loop.py': 4,
     'positions/text.py': 1,
-    # a key of diagnosis.json that is called as an effect is
+    # a key of diagnosis.json with the name of an effect
     'diagnosis/next_run/plan.py': 1,
 }
 
 
 def _docstrings(tree):
-    """Return the constants that are docstrings, which may explain by example."""
+    """Return the docstrings of a module, which may name effects as examples."""
     found = set()
     for node in ast.walk(tree):
         body = getattr(node, 'body', None)
@@ -40,7 +40,7 @@ def _docstrings(tree):
 
 
 def _says(text, name):
-    """Return how often a text has a name; words of plain English count where they stand alone."""
+    """Count an effect name in a text; names that are English words count only alone."""
     if name not in text:
         return 0
     if '_' in name:
@@ -49,7 +49,7 @@ def _says(text, name):
 
 
 def count_names(source):
-    """Return how often code says the name, or imports the class, of an effect."""
+    """Count the names of effects and imports of their classes in a module."""
     tree = ast.parse(source)
     docstrings = _docstrings(tree)
     classes = {kind.__name__ for kind in CATALOGUE.values()}
@@ -67,7 +67,7 @@ def count_names(source):
 
 @pytest.fixture(scope='module')
 def counts(root):
-    """Return how often each file outside of ``effects`` names effects."""
+    """Return the number of effect names in each file outside the room effects."""
     package = root / 'armid_ros'
     files = [path for path in package.rglob('*.py') if path.parent != package / 'effects']
     assert len(files) > 100

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The layers of the package are kept, and a breach would be seen."""
+"""The package keeps its layers, and import-linter reports a violation."""
 
 from pathlib import Path
 import re
@@ -38,7 +38,7 @@ LAYERS = (
 
 
 def lint_imports(folder):
-    """Run import-linter in a folder; return its exit code and what it says."""
+    """Run import-linter in a folder; return its exit code and output."""
     command = [Path(sys.prefix, 'bin', 'lint-imports'), '--no-cache']
     result = subprocess.run(command, cwd=folder, capture_output=True, text=True)
     return result.returncode, result.stdout + result.stderr
@@ -46,7 +46,7 @@ def lint_imports(folder):
 
 @pytest.fixture
 def project(root, tmp_path):
-    """Copy the package and its contracts to where they can be broken."""
+    """Copy the package and its contracts to a folder in which tests break them."""
     shutil.copy(root / 'pyproject.toml', tmp_path)
     ignore = shutil.ignore_patterns('__pycache__')
     shutil.copytree(root / 'armid_ros', tmp_path / 'armid_ros', ignore=ignore)
@@ -54,13 +54,13 @@ def project(root, tmp_path):
 
 
 def test_contracts_are_kept(project):
-    """No module imports from its own height or above, and only the nodes import ROS 2."""
+    """Modules import from lower layers only, and only nodes import ROS 2."""
     code, output = lint_imports(project)
     assert code == 0, output
 
 
 def test_contract_lists_the_layers_in_order(root):
-    """A layer in parentheses may be missing."""
+    """An optional layer, in parentheses, may be missing."""
     contracts = tomllib.loads((root / 'pyproject.toml').read_text())['tool']['importlinter']
     written = [layer.split(' | ') for layer in contracts['contracts'][0]['layers']]
     assert tuple(tuple(name.strip('()') for name in layer) for layer in written) == LAYERS
@@ -99,7 +99,7 @@ def test_a_module_without_a_layer_is_seen(project):
 
 
 def test_nodes_may_import_ros(project):
-    """Nodes are the one place, and what imports them is not blamed for it."""
+    """Only nodes may import ROS 2; modules that import nodes are no violation."""
     (project / 'armid_ros' / 'nodes' / 'novelty.py').write_text('import rclpy\n')
     (project / 'armid_ros' / 'cli' / 'x.py').write_text('import armid_ros.nodes.novelty\n')
     code, output = lint_imports(project)
@@ -107,7 +107,7 @@ def test_nodes_may_import_ros(project):
 
 
 def circles(package):
-    """Return the sets of modules that import each other, imports for types included."""
+    """Return the sets of modules that import each other, type-checking imports included."""
     graph = grimp.build_graph(package)
     modules = sorted(graph.modules)
     place = {module: k for k, module in enumerate(modules)}

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Where `ros2 pkg`, `ros2 run` and `ros2 interface` look, something is to be found."""
+"""The installation has the files that `ros2 pkg`, `ros2 run` and `ros2 interface` read."""
 
 import os
 from pathlib import Path
@@ -23,53 +23,53 @@ NODES = {path.name for path in SCRIPTS.iterdir()} - {'armid'}
 
 @pytest.fixture(autouse=True)
 def index(prefix, monkeypatch):
-    """Let the ament index be that of the environment alone."""
+    """Restrict the ament index to the environment."""
     monkeypatch.setenv('AMENT_PREFIX_PATH', str(prefix))
 
 
 def executables(prefix, package):
-    """List what `ros2 pkg executables` lists: executable regular files in lib/<package>."""
+    """List executable regular files in lib/<package>, as `ros2 pkg executables` does."""
     paths = Path(prefix, 'lib', package).rglob('*')
     return {path.name for path in paths if path.is_file() and os.access(path, os.X_OK)}
 
 
 @pytest.fixture
 def console_scripts(distribution):
-    """Return the console scripts of the installed package, name to 'module:function'."""
+    """Return 'module:function' of each console script of the installed package, by name."""
     entries = distribution.entry_points
     return {entry.name: entry.value for entry in entries if entry.group == 'console_scripts'}
 
 
 @pytest.mark.parametrize('package', ['armid_ros', 'armid_msgs'])
 def test_index_finds_the_package_and_its_manifest(prefix, package):
-    """As `ros2 pkg prefix` and `ros2 pkg xml` do."""
+    """Find prefix and manifest as `ros2 pkg prefix` and `ros2 pkg xml` do."""
     assert Path(get_package_prefix(package)) == prefix
     manifest = Path(get_package_share_directory(package), 'package.xml')
     assert ElementTree.parse(manifest).findtext('name') == package
 
 
 def test_executables_are_the_scripts_and_the_console_scripts(prefix, root, console_scripts):
-    """Pip and colcon fill lib/armid_ros from different lists, which must not differ."""
+    """Pip and colcon install equal files to lib/armid_ros, from two lists."""
     scripts = {path.name for path in (root / 'scripts').iterdir()}
     assert scripts == executables(prefix, 'armid_ros') == set(console_scripts)
     assert 'armid' in scripts
 
 
 def test_scripts_are_executable_in_the_source_tree(root):
-    """Pip keeps the mode that a file has here; those of nodes are copies of one another."""
+    """Scripts are executable, and all scripts of nodes are equal."""
     for path in (root / 'scripts').iterdir():
         assert stat.S_IMODE(path.stat().st_mode) & 0o111 == 0o111, path
     assert len({(root / 'scripts' / name).read_bytes() for name in NODES}) == 1
 
 
 def test_console_scripts_of_nodes_say_what_is_missing_of_ros(console_scripts):
-    """They run the node that is named like them."""
+    """A script runs the node of the same name."""
     expected = dict.fromkeys(NODES, 'armid_ros.cli.node:main')
     assert console_scripts == expected | {'armid': 'armid_ros.cli:main'}
 
 
 def test_nodes_are_those_that_are_installed(root):
-    """A node without an executable cannot be run, an executable without a node does not run."""
+    """Every node has an executable, and every executable has a node."""
     files = (root / 'armid_ros').rglob('nodes/*.py')
     with_main = {path.stem for path in files if MAIN.search(path.read_text())}
     assert with_main == NODES
@@ -77,7 +77,7 @@ def test_nodes_are_those_that_are_installed(root):
 
 @pytest.mark.parametrize('name', sorted(NODES | {'armid'}))
 def test_script_runs_its_module_with_the_python_of_its_prefix(prefix, tmp_path, name):
-    """Also where no environment is active, with the exit code and the arguments passed on."""
+    """A script runs without an active environment, and passes on arguments and exit code."""
     script = tmp_path / 'lib' / 'armid_ros' / name
     script.parent.mkdir(parents=True)
     script.write_bytes((prefix / 'lib' / 'armid_ros' / name).read_bytes())
@@ -100,7 +100,7 @@ def test_script_runs_its_module_with_the_python_of_its_prefix(prefix, tmp_path, 
 
 
 def test_interface_show_finds_the_definition(prefix, root):
-    """As `ros2 interface show armid_msgs/msg/ParameterEstimate` does, by index and share."""
+    """Find ParameterEstimate as `ros2 interface show` does, by index and share folder."""
     listed, where = get_resource('rosidl_interfaces', 'armid_msgs')
     assert Path(where) == prefix
     assert 'msg/ParameterEstimate.msg' in listed.splitlines()
@@ -125,7 +125,7 @@ def test_proofs_that_every_change_has_to_pass_are_not_long(root, name):
 
 
 def test_all_say_one_version(root, distribution):
-    """Manifests, setup.py, the package and the changelog."""
+    """Manifests, setup.py, package and changelog have one version."""
     manifests = (root / 'package.xml', root / 'msg_schemas' / 'package.xml')
     versions = {ElementTree.parse(path).findtext('version') for path in manifests}
     setup = (root / 'setup.py').read_text()
@@ -138,7 +138,7 @@ def test_all_say_one_version(root, distribution):
 
 
 def test_manifest_names_what_the_code_imports(root):
-    """Every ROS 2 package that the nodes import is a dependency in package.xml."""
+    """package.xml lists every ROS 2 package that the nodes import."""
     manifest = ElementTree.parse(root / 'package.xml').getroot()
     declared = {element.text for element in manifest if element.tag.endswith('depend')}
     known = {'ament_index_python', 'launch', 'launch_ros', 'rclpy', 'rcl_interfaces', 'xacro'}
@@ -150,7 +150,7 @@ def test_manifest_names_what_the_code_imports(root):
 
 
 def test_documents_start_nodes_by_executables_that_the_environment_has():
-    """There is no `ros2` in it; a block that starts with it says that it is of a workspace."""
+    """The environment has no command `ros2`; blocks of pages with `ros2` are marked as not run."""
     root = Path(__file__).parents[2]
     started = set()
     for path in (root / 'README.md', *sorted((root / 'docs').rglob('*.md'))):

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The compiled messages are installed, and keep what is in them."""
+"""The compiled messages are installed, and keep their values through serialisation."""
 
 import importlib.util
 import sys

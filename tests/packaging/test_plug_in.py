@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""An effect of another package, installed with pip, goes all the way of a shipped one."""
+"""An effect of a package installed by pip works in all commands like a shipped effect."""
 
 import json
 import os
@@ -14,7 +14,7 @@ import pytest
 pytestmark = pytest.mark.slow
 
 PACKAGE = Path(__file__).with_name('plug_in')
-#: Runs commands, a JSON list of arguments each, in one process.
+#: Program that runs armid commands in one process; each is a JSON list of arguments.
 RUN = """
 import json, sys
 from armid_ros.cli import main
@@ -25,7 +25,7 @@ for arguments in json.loads(sys.argv[1]):
 
 @pytest.fixture(scope='module')
 def installed(tmp_path_factory):
-    """Return the folder that pip installed the package into; it takes nothing from a network."""
+    """Install the package with pip, without a network; return the folder."""
     folder = tmp_path_factory.mktemp('plug_in')
     shutil.copytree(PACKAGE, folder / 'source')
     pip = [sys.executable, '-m', 'pip', 'install', '--quiet', '--disable-pip-version-check']
@@ -35,7 +35,7 @@ def installed(tmp_path_factory):
 
 
 def run(root, path, *commands, folder, check=True):
-    """Run `armid` commands with a package on the path; return what they print."""
+    """Run `armid` commands with a package on the path; return their output."""
     paths = os.pathsep.join([str(root), str(path)])
     return subprocess.run(
         [sys.executable, '-c', RUN, json.dumps([[str(part) for part in c] for c in commands])],
@@ -49,7 +49,7 @@ def run(root, path, *commands, folder, check=True):
 
 @pytest.fixture(scope='module')
 def results(root, installed, tmp_path_factory):
-    """Simulate, identify, diagnose, and simulate what was found; return folder and output."""
+    """Simulate, identify, diagnose, and simulate the found model; return folder and output."""
     folder = tmp_path_factory.mktemp('results')
     robot = ('--robot', root / 'examples' / 'arm.urdf')
     arm = ('--effect', 'viscous_friction:viscous_coefficient=0.3')

@@ -10,7 +10,7 @@ import sys
 
 import pytest
 
-#: Folders of plug-ins that bring a command, and its name.
+#: Folders of plug-ins with a command, and the name of the command.
 WITH_COMMAND = {
     'fleet': 'fleet',
     'papers/elastic': 'elastic',
@@ -20,7 +20,7 @@ WITH_COMMAND = {
     'view': 'view',
     'zero': 'zero',
 }
-#: Folders of plug-ins that serve commands of the core, and such a command.
+#: Folders of plug-ins that commands of the core use, and one of these commands.
 SERVING = {
     'residual': ('diagnose', 'bag', '--robot', 'ur10', '--out', 'found', '--residual', 'gp'),
     'recording/tables': ('convert', 'run.csv', '--dry-run'),
@@ -28,14 +28,14 @@ SERVING = {
 PLUG_INS = (*WITH_COMMAND, *SERVING)
 #: Folders of Python code; the others are linked.
 CODE = ('armid_ros', 'tests', 'benchmarks', 'docsite')
-#: Lists the commands, and runs one.
+#: Program that lists the commands, and runs one.
 ASK = """
 import sys
 from armid_ros.cli import main
 main(['--help'], standalone_mode=False)
 main(sys.argv[1:])
 """
-#: Imports every module of the core.
+#: Program that imports every module of the core.
 IMPORT = """
 from importlib import import_module
 from pkgutil import walk_packages
@@ -44,9 +44,9 @@ for module in walk_packages(armid_ros.__path__, 'armid_ros.'):
     if not module.name.endswith('.__main__'):
         import_module(module.name)
 """
-#: A few tests of the core: of a regression, and of commands.
+#: Tests of the core that run without plug-ins: a regression, and commands.
 FEW = ('cli/test_driven.py', 'identification/fitting/test_normal_equations.py')
-#: Tests of the tree, and tests of the core that only read tables.
+#: Tests that need the whole tree, and tests of the core that only read tables.
 OTHERS = (
     *('packaging', 'docsite', 'examples', 'golden'),
     *('cli/test_convert.py', 'cli/test_convert_real.py', 'fuzz/test_tables.py'),
@@ -62,12 +62,12 @@ OF_TABLES = (
 
 
 def code_of(folder):
-    """List what may import a plug-in: tests, benchmarks and the pages made from code."""
+    """List the files that may import a plug-in: tests, benchmarks and docsite."""
     return [path for name in CODE[1:] for path in (folder / name).rglob('*.py')]
 
 
 def copied(root, folder):
-    """Copy the tree without plug-ins, their tests and what imports them; link other files."""
+    """Copy the tree without plug-ins and the files that import them; link other folders."""
     ignored = shutil.ignore_patterns('__pycache__')
     for name in CODE:
         shutil.copytree(root / name, folder / name, ignore=ignored)
@@ -91,7 +91,7 @@ def copied(root, folder):
 
 
 def python(folder, *arguments):
-    """Run Python with the package of a folder."""
+    """Run Python with the package of a copied tree."""
     environment = {**os.environ, 'PYTHONPATH': str(folder)}
     return subprocess.run(
         [sys.executable, *arguments], env=environment, cwd=folder, capture_output=True, text=True

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The lock files pin all that is asked for, and the check names what a machine lacks."""
+"""Lock files pin all requirements, and the check of a machine names missing programs."""
 
 import importlib.util
 from pathlib import Path
@@ -17,21 +17,21 @@ LOCKS = {'build': ['build'], 'run': ['run', 'ros'], 'test': TESTS, 'bench': ['be
 
 
 def normal(name):
-    """Return a project name as PyPI compares it."""
+    """Return the normalised name of a project on PyPI."""
     return re.sub(r'[-_.]+', '-', name).lower()
 
 
 def wanted(root, group):
-    """Return the names in requirements/<group>.in."""
+    """Return the project names in requirements/<group>.in."""
     lines = (root / 'requirements' / f'{group}.in').read_text().splitlines()
     names = (re.match(r'[A-Za-z][\w.-]*', line) for line in lines)
     return {normal(name.group()) for name in names if name}
 
 
 def pinned(root, lock):
-    """Return name to version in requirements/<lock>.txt; each must have a hash."""
+    """Return the versions in requirements/<lock>.txt by name; check that each has a hash."""
     text = (root / 'requirements' / f'{lock}.txt').read_text()
-    assert not re.search(r'://|--(extra-)?index-url|--find-links', text)  # the user's to choose
+    assert not re.search(r'://|--(extra-)?index-url|--find-links', text)  # users choose the index
     pins = {}
     for entry in re.findall(r'^[a-z].*(?:\n    .*)*', text, re.MULTILINE):
         name, version = re.match(r'([\w.-]+)(?:\[.*\])?==([^ ]+)', entry).groups()
@@ -42,14 +42,14 @@ def pinned(root, lock):
 
 @pytest.mark.parametrize('lock', LOCKS)
 def test_lock_pins_all_that_is_asked_for(root, lock):
-    """With `make lock` forgotten after a change of an .in file, this fails."""
+    """The lock files are those that `make lock` makes from the .in files."""
     asked = set().union(*(wanted(root, group) for group in LOCKS[lock]))
     assert asked <= set(pinned(root, lock))
 
 
 @pytest.mark.parametrize('lock', LOCKS)
 def test_locks_agree(root, lock):
-    """What two of them pin, they pin to one version."""
+    """Two lock files pin a common project to one version."""
     assert pinned(root, lock).items() <= pinned(root, 'bench').items()
 
 
@@ -68,7 +68,7 @@ def test_requirements_of_users_have_a_lowest_and_a_highest_version(root, group):
 
 @pytest.fixture
 def host(root, monkeypatch, tmp_path):
-    """Load the check, in a folder without an environment."""
+    """Load the check of the machine in a folder without a virtual environment."""
     path = root / 'requirements' / 'check_host.py'
     spec = importlib.util.spec_from_file_location('check_host', path)
     module = importlib.util.module_from_spec(spec)
@@ -81,7 +81,7 @@ def host(root, monkeypatch, tmp_path):
 
 @pytest.mark.parametrize('version', [(2, 7, 18), (3, 10, 13), (3, 13, 0)])
 def test_unsupported_python_is_named(host, monkeypatch, version):
-    """The line says which are supported, which this is, and how to name another."""
+    """The message has the supported Python versions, the present one, and how to choose."""
     monkeypatch.setattr(sys, 'version_info', version)
     message = host.missing()
     for fact in ('3.11', '3.12', '.'.join(map(str, version)), 'PYTHON='):
@@ -97,7 +97,7 @@ def test_what_debian_leaves_out_of_python_is_named(host, monkeypatch, tmp_path):
 
 
 def test_missing_compiler_is_named(host, monkeypatch):
-    """Either on the path, or as CC and CXX name it."""
+    """The compiler is on the path, or is named by CC and CXX."""
     monkeypatch.setattr(shutil, 'which', lambda name: None if '+' in name else name)
     assert 'clang++' in host.missing()
     monkeypatch.setenv('CXX', 'mine++ -O2')
@@ -105,7 +105,7 @@ def test_missing_compiler_is_named(host, monkeypatch):
 
 
 def test_environment_of_another_python_is_not_mixed_with(host, tmp_path):
-    """`make PYTHON=...` does not quietly use the environment that is there."""
+    """`make PYTHON=...` refuses an existing environment of another Python."""
     (tmp_path / '.venv').mkdir()
     (tmp_path / '.venv' / 'pyvenv.cfg').write_text('home = /usr/bin\nversion = 3.9.1\n')
     assert 'Python 3.9' in host.missing()
@@ -127,6 +127,6 @@ def test_what_it_names_in_the_tree_is_there(root):
 
 
 def test_nothing_that_was_built_goes_into_the_image(root):
-    """The image leaves out the files that the repository ignores."""
+    """The container image leaves out the files that git ignores."""
     ignored = (root / '.dockerignore').read_text().split()
     assert {'.git', '.venv', 'build', 'install', 'log', 'dist'} <= set(ignored)

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Functions that can be read at a sight, and names that stand for one thing."""
+"""Functions and folders keep their limits of size, and names have one meaning."""
 
 import ast
 from collections import Counter, defaultdict
@@ -10,25 +10,25 @@ from pathlib import Path
 import pytest
 
 MOST_LINES, MOST_PARAMETERS, MOST_OF_FILE, MOST_IN_ROOM = 60, 8, 450, 28
-#: What is longer or takes more, until it is mended; nothing may be added.
+#: Functions that exceed a limit; none may be added.
 LONG: set[str] = set()
 MANY = {
-    'api/arguments.py:read_recording',  # what a user types is spelled out
+    'api/arguments.py:read_recording',  # each option of a user is a parameter
     'api/diagnosis.py:diagnose',
     'api/design.py:design_excitation',
     'api/identification.py:identify',
-    'diagnosis/diagnose.py:diagnose',  # what may be known of a gap is spelled out
+    'diagnosis/diagnose.py:diagnose',  # each input of a user is a parameter
 }
 
-#: Lines that a room of the package may have. A room that shrinks takes its number along: a budget
-#: is at most `SLACK` above what is there, and is raised only by the length of what is new.
+#: Largest number of lines of each room of the package. A budget is at most `SLACK` above the
+#: present number, and is raised only by the length of new code.
 BUDGETS = json.loads(Path(__file__).with_name('budgets.json').read_text('utf-8'))
 SLACK = 1.02
 
 
 @pytest.fixture(scope='module')
 def trees(root):
-    """Return every module of the package, parsed, by its path within it."""
+    """Return the syntax tree of every module of the package, by path."""
     package = root / 'armid_ros'
     return {
         path.relative_to(package).as_posix(): ast.parse(path.read_text('utf-8'))
@@ -37,7 +37,7 @@ def trees(root):
 
 
 def functions(trees):
-    """Yield the place of every function, and the function."""
+    """Yield every function of the package with its file and name."""
     for place, tree in trees.items():
         for node in ast.walk(tree):
             if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
@@ -45,12 +45,12 @@ def functions(trees):
 
 
 def is_command(function):
-    """Whether the parameters are the options of a command, which are declared where it is."""
+    """Return whether the parameters of a function are options of a command."""
     return any('.command(' in ast.unparse(one) for one in function.decorator_list)
 
 
 def lines_of(function):
-    """Count the lines of a function without its docstring; of a command without its imports."""
+    """Count the lines of a function without docstring, and without the imports of a command."""
     count = function.end_lineno - function.lineno + 1
     left_out = function.body[:1] if ast.get_docstring(function) else []
     if is_command(function):
@@ -60,7 +60,7 @@ def lines_of(function):
 
 
 def parameters_of(function):
-    """List the parameters of a function but for the object that a method is of."""
+    """Return the parameter names of a function without self and cls."""
     given = function.args
     names = [one.arg for one in (*given.posonlyargs, *given.args, *given.kwonlyargs)]
     return names[1:] if names[:1] in (['self'], ['cls']) else names

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Code of a user is checked against the types of this package."""
+"""mypy checks user code against the types of this package."""
 
 import subprocess
 import sys
@@ -41,7 +41,7 @@ ar.diagnose(arm, 'run').names.keys()
 
 
 def checked(root, folder, source):
-    """Return what mypy says, line by line."""
+    """Return the lines that mypy prints."""
     (folder / 'user.py').write_text(source)
     command = [sys.executable, '-m', 'mypy', '--strict', '--no-error-summary']
     settings = ['--config-file', root / 'pyproject.toml', '--cache-dir', root / '.mypy_cache']

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""An effect that the catalogue does not have, as a package of its own."""
+"""An effect that the catalogue lacks, in a package of its own."""
 
 import armid_ros as ar
 from armid_ros.effects import joint_columns
@@ -20,5 +20,5 @@ class Hose(ar.Effect):
     smooth = True
 
     def columns(self, motion, arm):
-        """Return dtau/dk = q^3; the torque is k times that."""
+        """Return the derivative of the torque by k, dtau/dk = q^3."""
         return joint_columns(self, motion, motion.q**3)
