@@ -17,15 +17,15 @@ from collections.abc import Sequence
 from armid_ros.arm import ArmModel
 from armid_ros.arm.memoized_arm import memoized_arm
 from armid_ros.diagnosis.data.baseline import excited, refitted
-from armid_ros.diagnosis.data.days import Rows
 from armid_ros.diagnosis.data.evidence import Evidence
+from armid_ros.diagnosis.data.rows import Rows
 from armid_ros.diagnosis.data.trajectory import trajectories
 from armid_ros.diagnosis.prepare import choose_filters
 from armid_ros.diagnosis.search.candidates import Causes
 from armid_ros.diagnosis.search.cause import Cause
+from armid_ros.diagnosis.search.hyperparameters import Hyperparameters
 from armid_ros.diagnosis.search.nuisance import Nuisance
 from armid_ros.diagnosis.search.odds import CauseInformation
-from armid_ros.diagnosis.search.setting import Setting
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.recording import Recording
 import numpy as np
@@ -69,15 +69,15 @@ def bic_selection(
     rows = Rows.over_noise(Evidence.over_noise(data, [alike] * len(data)))
     nuisance = Nuisance.of(rows, memoized_arm(arm), rng)
     catalogue = Causes(settings.kinds, nuisance, False, frozenset())
-    pooled = Setting(1.0, 0.0, 0.0, 1.0, 1.0)
+    pooled = Hyperparameters(1.0, 0.0, 0.0, 1.0, 1.0)
     count = sum(nuisance.count)
     chosen: list[Cause] = []
     while True:
-        under = nuisance.marginal(pooled)
-        squares = nuisance.squares_of_today(under)
+        posterior = nuisance.posterior(pooled)
+        squares = nuisance.squares_of_diagnosed(posterior)
         best, cause = 0.0, None
-        for candidate in catalogue.causes(nuisance, under):
-            known = CauseInformation.of([candidate], nuisance, under, by_day=True)
+        for candidate in catalogue.causes(nuisance, posterior):
+            known = CauseInformation.of([candidate], nuisance, posterior, by_day=True)
             if known.visible[0] < _LEAST_VISIBLE:
                 continue
             matrix, vector = known.matrix[0], known.vector[0]

@@ -1,12 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""
-The diagnosis: from recordings and a model to a verdict.
-
-Two models are compared with the data, with and without single causes: the given model (which shows
-errors of the description), and the model with refitted body and known effects.
-
-"""
+"""Diagnosis of a model: from recordings to named effects and a verdict."""
 
 from __future__ import annotations
 
@@ -16,9 +10,9 @@ from dataclasses import replace
 from armid_ros.arm import ArmModel, Misfit
 from armid_ros.arm.memoized_arm import memoized_arm, plain_arm
 from armid_ros.diagnosis.data.baseline import Baseline
-from armid_ros.diagnosis.data.evidence import Evidence, noise_floor, not_repeating
+from armid_ros.diagnosis.data.evidence import Evidence, joints_that_do_not_repeat, noise_floor
 from armid_ros.diagnosis.data.trajectory import trajectories, Trajectory
-from armid_ros.diagnosis.prepare import choose_filters, mended, prepare, with_friction
+from armid_ros.diagnosis.prepare import choose_filters, prepare, repaired, with_friction
 from armid_ros.diagnosis.search.explainer import Explainer
 from armid_ros.diagnosis.search.explanation import Explanation, NOISE
 from armid_ros.diagnosis.search.spans import acting_spans
@@ -27,9 +21,13 @@ from armid_ros.diagnosis.ties import diagnose_ties
 from armid_ros.diagnosis.verdict.attribution import Attribution, headline
 from armid_ros.diagnosis.verdict.bodies import as_bodies, on_outer_link
 from armid_ros.diagnosis.verdict.finding import Diagnosis, Finding, Gap
-from armid_ros.diagnosis.verdict.naming import findings, small_print
-from armid_ros.diagnosis.verdict.remaining_misfit import locate_blocked_joints, RemainingMisfit
-from armid_ros.diagnosis.verdict.remarks import data_remarks, doubt_of, doubted
+from armid_ros.diagnosis.verdict.naming import findings, minor_findings
+from armid_ros.diagnosis.verdict.remaining_misfit import (
+    locate_blocked_joints,
+    RemainingMisfit,
+    unlisted_laws,
+)
+from armid_ros.diagnosis.verdict.remarks import data_remarks, doubt_of_model, with_doubt
 from armid_ros.diagnosis.verdict.where import locate_explained, locate_remaining_gap
 from armid_ros.diagnosis.verdict.words import decide
 from armid_ros.errors import IdentificationError
@@ -41,7 +39,7 @@ from armid_ros.recording import Recording
 import numpy as np
 import numpy.typing as npt
 
-#: Verdicts with an unexplained part of the gap.
+#: Verdicts of a residual that no named effect explains completely.
 OPEN = ('unknown', 'partial')
 #: Callback with the completed share of the work and the name of the present step.
 Progress = Callable[[float, str], None]
@@ -51,16 +49,16 @@ _ASSUMED = (
     'noise of recordings without two equal periods is estimated from differences between '
     'neighbouring samples'
 )
-#: Note if a cause acts temporarily and its time span in held-out data is unknown.
+#: Note if a cause acts temporarily and its time span in held-out recordings is unknown.
 _NOT_TIMED = (
     'held-out recordings are not used: without a baseline, the seconds in which the cause acts in '
-    'them are not determined'
+    'them are unknown'
 )
 #: Fault if the residual of the baseline is larger than its torque.
 _NO_MODEL = (
-    'the residual of the model is {:.3g} times the torque of the baseline, so it is worse than no '
-    'model. It belongs to another arm, or has other units. Identify the arm from the baseline, '
-    'and give that model'
+    'in the baseline, the residual of the model is {ratio:.3g} times the measured torque. The '
+    'model belongs to another arm, or has other units. Identify the arm from the baseline, and '
+    'give the new model with --model'
 )
 
 
@@ -85,9 +83,9 @@ def diagnose(
     recordings : sequence of Recording
         The recordings to diagnose, with torques; several motions are best.
     validate : sequence of Recording
-        Recordings that are predicted and not fitted.
+        Held-out recordings, which are predicted and not fitted.
     baseline : sequence of Recording
-        Recordings from when the model was right, such as the recordings of its identification.
+        Recordings from a time at which the model was right, such as those of its identification.
         Their residual is the misfit of the model, and the diagnosis finds changes since then.
     misfit : Misfit, optional
         Misfit of the model at its identification. The result is in doubt if the residual of the
@@ -116,15 +114,18 @@ def diagnose(
         settings = replace(settings, material=0.0)
     tell(0.02, 'filtering')
     given, arm = arm, memoized_arm(arm)
-    recordings, validate, baseline, repairs = mended(recordings, validate, baseline, settings)
+    recordings, validate, baseline, repairs = repaired(recordings, validate, baseline, settings)
     used = choose_filters(arm, recordings, baseline, settings, rng.spawn(1)[0])
     data: Sequence[Trajectory] = trajectories(recordings, used, arm)
     stretches = [part.stretch for part in data]
     faults, notes = check_data(arm, recordings, used, stretches, baseline)
     notes += repairs
     if faults:
-        return _bad(given, data, faults, notes)
-    notes += [f'prior knowledge given: {name} {how}' for name, how in settings.prior.items()]
+        return _bad_data(given, data, faults, notes)
+    prior = settings.prior.items()
+    notes += [
+        f'prior odds set by the user: {effect} is {frequency}' for effect, frequency in prior
+    ]
     tell(0.1, 'noise floor')
     by_misfit = bool(baseline) and settings.partner is None
     prepared = prepare(arm, used, data, settings, rng, by_misfit)
@@ -133,10 +134,10 @@ def diagnose(
     before = trajectories(baseline, prepared.used, arm, prepared.allowed)
     known = Baseline.of(arm, before, rng) if baseline else None
     if known is not None and known.errors[0] > 1.0:
-        return _bad(given, data, [_NO_MODEL.format(known.errors[0])], notes)
+        return _bad_data(given, data, [_NO_MODEL.format(ratio=known.errors[0])], notes)
     held_out = trajectories(validate, prepared.used, arm, prepared.allowed)
     explainer = Explainer(arm, prepared, known, rng, tell, settings, misfit, held_out)
-    doubt = doubt_of(given, known, baseline, misfit, settings.thresholds)
+    doubt = doubt_of_model(given, known, baseline, misfit, settings.thresholds)
     if settings.partner is not None:
         tell(0.2, f'ties to {settings.partner.source}')
         tied = diagnose_ties(explainer, recordings, settings.partner)
@@ -151,12 +152,12 @@ def diagnose(
         days = [*recordings, *validate], baseline
         apart = [one for day in days for one in _with_unfitted_joints(arm, day, used)]
         alone = mistaken_recordings(arm, apart, used)
-        return _bad(given, result.data, alone, result.notes) if alone else result
+        return _bad_data(given, result.data, alone, result.notes) if alone else result
     return result
 
 
 def _hardly_explained(result: Diagnosis, settings: DiagnosisSettings) -> bool:
-    """Return whether a gap remains, or every named cause explains less than half of the gap."""
+    """Return whether a gap remains, or each finding explains less than half of the gap."""
     largest = max((one.share for one in result.findings), default=0.0)
     return result.verdict in OPEN or largest <= settings.thresholds.open_share
 
@@ -169,10 +170,10 @@ def _of_spans(
     notes: Sequence[str],
     doubt: str,
 ) -> Diagnosis | None:
-    """Diagnose only the time in which a cause acts; None if no cause explains that gap."""
+    """Diagnose only the seconds in which a cause acts; None if no cause explains their gap."""
     settings, arm, prepared = explainer.settings, explainer.arm, explainer.prepared
-    look = explanation.look
-    spans = () if look is None else acting_spans(look, settings.thresholds)
+    ranking = explanation.ranking
+    spans = () if ranking is None else acting_spans(ranking, settings.thresholds)
     if all(one.whole for one in spans):
         return None
     shorter, held_out = list[Recording](), list[Recording]()
@@ -192,19 +193,22 @@ def _of_spans(
             for part in (shorter, held_out)
         )
         prepared = prepare(arm, prepared.used, data, settings, explainer.rng, by_misfit)
-        within = replace(explainer, prepared=prepared, unseen=unseen)
+        within = replace(explainer, prepared=prepared, held_out=unseen)
         found = _as_diagnosis(within.explanation(), notes, within, doubt, plain_arm(arm))
     except IdentificationError:  # too short for the filters, or without motion
         return None
     if _hardly_explained(found, settings):
         return None
-    return found.acting_in([one for one in spans if one.stop > one.start])
+    spans = tuple(one for one in spans if one.stop > one.start)
+    seconds = [f'{one.source} from {one.start:.1f} to {one.stop:.1f} s' for one in spans]
+    summary = f'In {", ".join(seconds)}: {found.summary} Other seconds were not diagnosed.'
+    return replace(found, summary=summary, spans=spans)
 
 
 def _with_unfitted_joints(
     arm: ArmModel, day: Sequence[Recording], used: Conditioning
 ) -> Iterator[tuple[Recording, npt.NDArray[np.bool_]]]:
-    """Yield recordings with their joints whose torque the model fits only in other recordings."""
+    """Yield a recording and a mask of its joints whose torque fits the model only elsewhere."""
     unit = np.ones(arm.robot.n_joints)
     bad, sound = np.zeros((2, len(day), len(unit)), dtype=bool)
     for k, one in enumerate(day):
@@ -224,7 +228,7 @@ def _as_diagnosis(
     doubt: str,
     given: ArmModel,
 ) -> Diagnosis:
-    """Return the diagnosis of an explanation; shares are measured on held-out data."""
+    """Return the diagnosis for an explanation: findings, verdict, patched model and notes."""
     arm, settings, before = explainer.arm, explainer.settings, explainer.baseline
     explainer.tell(0.85, 'held-out gap')
     explanation, of_bodies = as_bodies(on_outer_link(explanation))
@@ -232,25 +236,26 @@ def _as_diagnosis(
     both = (explanation.evidence, *(() if unseen is None else (unseen,)))
     excess = RemainingMisfit(explanation, both, before, arm, settings)
     evidence, patched = explanation.evidence, explanation.fitted.arm
-    found, minor = findings(explanation, shares, arm, explainer.rng), small_print(explanation)
-    worse, of_residual = excess.worse_joints(), excess.of_residual()
-    resting, laws = excess.at_rest(), excess.of_laws()
+    found, minor = findings(explanation, shares, arm, explainer.rng), minor_findings(explanation)
+    worse, residual_over_limit = excess.worse_joints(), excess.residual_over_limit()
+    resting = excess.at_rest()
+    laws = [] if explanation.measured else unlisted_laws(explanation, settings)
     least = settings.material * evidence.torque_rms
-    different = not_repeating(explainer.prepared.floors, settings.thresholds, least)
+    different = joints_that_do_not_repeat(explainer.prepared.floors, settings.thresholds, least)
     explanation = explanation if found else replace(explanation, reference=explanation.fitted)
     gap = Gap.of(explanation, unseen)
     word = decide(
         found,
         [arm.robot.joints[k] for k in different] if explanation.measured else (),
-        [*of_residual, *resting, *laws],
+        [*residual_over_limit, *resting, *laws],
         arm,
         NOISE if explanation.measured else explanation.floor,
-        excess.of_given_body(),
+        excess.given_body_over_limit(),
         minor,
         gap,
     )
-    word, doubt = doubted(word, doubt, found, given, before)
-    worst = int(np.argmax([one.ratio.max() for one in of_residual]))
+    word, doubt = with_doubt(word, doubt, found, given, before)
+    worst = int(np.argmax([one.ratio.max() for one in residual_over_limit]))
     new = np.max([np.zeros(arm.robot.n_joints), *(one.ratio for one in laws)], axis=0) > 1.0
     left = locate_remaining_gap(explanation, both[worst], settings, new)
     places = locate_explained(explanation, unseen or evidence, settings) if found else left
@@ -266,7 +271,7 @@ def _as_diagnosis(
         where=places or locate_blocked_joints(arm, resting),
         left=left,
         gap=gap,
-        explanation=explanation.forgetting(),
+        explanation=explanation.without_data(),
         arm=plain_arm(patched) if found and not worse else given,
         data=tuple(evidence.data),
         not_visible=_not_visible(explanation, found, explainer),
@@ -282,19 +287,19 @@ def _with_shares(
     explanation: Explanation, explainer: Explainer
 ) -> tuple[Explanation, Attribution, Evidence | None]:
     """
-    Measure the share of each cause, and move causes with a small share to the minor ones.
+    Measure the share of the gap of each cause; causes with a small share become minor.
 
     Returns
     -------
     explanation : Explanation
         The explanation with the causes of the headline.
     shares : Attribution
-        Their shares: of the held-out gap, or cross-validated without held-out data.
+        Their shares in held-out recordings, or cross-validated without any.
     unseen : Evidence or None
-        The held-out recordings, weighted by the noise, or the misfit if larger.
+        Held-out recordings, with the floor of the gap as deviation.
 
     """
-    settings, data, unseen = explainer.settings, explainer.unseen, None
+    settings, data, unseen = explainer.settings, explainer.held_out, None
     if data:
         noise = tuple(noise_floor(part, explanation.fitted.arm).sigma for part in data)
         sigma = tuple(np.maximum(one, explanation.misfit) for one in noise)
@@ -313,7 +318,7 @@ def _with_shares(
 def _not_visible(
     explanation: Explanation, found: Sequence[Finding], explainer: Explainer
 ) -> tuple[str, ...]:
-    """Return the effects that are not visible on any joint, in the order of the catalogue."""
+    """Return the names of effects that the data show on no joint, in catalogue order."""
     hidden = {name for name, _ in explanation.invisible}
     hidden -= {one.effect.name for one in explanation.candidates}
     hidden -= {finding.name for finding in found}
@@ -330,7 +335,7 @@ def _remarks(
     doubt: str,
     explainer: Explainer,
 ) -> list[str]:
-    """Return remarks: why the model is doubtful or not patched, and which joints are unchecked."""
+    """Return notes: on a model that may be wrong or is not patched, and on unchecked joints."""
     names = ' and '.join(name_in_words(one.name) for one in found)
     remarks = {
         f'The model is not patched: {names} would make it worse in {", ".join(worse)}.': worse,
@@ -342,9 +347,9 @@ def _remarks(
     return [*(text for text, applies in remarks.items() if text and applies), *of_data]
 
 
-def _bad(
+def _bad_data(
     arm: ArmModel, data: Sequence[Trajectory], faults: Sequence[str], notes: Sequence[str]
 ) -> Diagnosis:
-    """Return a diagnosis with the verdict `bad_data`."""
+    """Return a diagnosis with the verdict `bad_data`, and the faults as its summary."""
     summary = f'The data cannot be diagnosed: {"; ".join(faults)}.'
     return Diagnosis('bad_data', summary, arm, tuple(data), tuple(notes))

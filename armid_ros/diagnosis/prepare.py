@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Preparation of recordings: repair, filters, rows and their noise."""
+"""Preparation of recordings: repair of damaged samples, choice of filters, and noise."""
 
 from __future__ import annotations
 
@@ -34,16 +34,16 @@ _PARTNER_BAND_RATIO = 1.25
 @dataclass(frozen=True)
 class Prepared:
     """
-    Data that were filtered for a diagnosis, with their noise.
+    Filtered recordings of a diagnosis, with their torque noise.
 
     Attributes
     ----------
     used : Conditioning
         Filters and decimation.
     data : tuple of Trajectory
-        Stretches of the recordings in rows.
+        The filtered recordings.
     floors : tuple of NoiseFloor
-        Noise of each trajectory in the residual of the arm as fitted to the data.
+        Torque noise of each trajectory.
 
     """
 
@@ -53,12 +53,12 @@ class Prepared:
 
     @property
     def allowed(self) -> FloatArray:
-        """Largest uncertain share of a row that is informative, shape (n,); see `Trajectory`."""
+        """Largest share of uncertain velocity signs in a used row, (n,); see `Trajectory`."""
         return self.data[0].allowed
 
     @property
     def sigma(self) -> list[FloatArray]:
-        """Noise of each trajectory, shape (n,) [N m]."""
+        """Standard deviation of the torque noise of each trajectory, shape (n,) [N m]."""
         return [floor.sigma for floor in self.floors]
 
 
@@ -70,7 +70,7 @@ def choose_filters(
     rng: np.random.Generator,
 ) -> Conditioning:
     """
-    Return the filters of an identification, narrowed to the band that a diagnosis needs.
+    Choose cut-off and decimation, as for an identification, but with fewer rows.
 
     The cut-off is chosen from the baseline, if any, as the baseline has no missing effect.
 
@@ -98,11 +98,11 @@ def prepare(
     misfit: bool = False,
 ) -> Prepared:
     """
-    Measure the noise of data, and which of their rows are informative.
+    Measure the torque noise of trajectories, and select the rows next to reversals that are used.
 
-    Rows next to reversals are informative if their noise exceeds the error of dry friction. If a
-    misfit is the unit, these rows are not informative: dry friction is the largest error of a
-    model, and it differs between motions.
+    Rows next to reversals are used if their noise exceeds the error of dry friction. They are not
+    used if the floor is a misfit: dry friction is then the largest error of a model, and it
+    differs between motions.
 
     """
     theory = arm.base_parameters(rng)
@@ -123,7 +123,7 @@ def prepare(
 
 
 def with_friction(arm: ArmModel, library: Sequence[str]) -> tuple[ArmModel, tuple[Effect, ...]]:
-    """Add usual friction and offsets to every joint; return the arm and the added effects."""
+    """Add usual friction and offsets to all joints; return the arm and the added effects."""
     there = {(effect.name, joint) for effect in arm.effects for joint in effect.joints}
     added: list[Effect] = []
     fuller = arm
@@ -138,19 +138,19 @@ def with_friction(arm: ArmModel, library: Sequence[str]) -> tuple[ArmModel, tupl
 def _measured(
     arm: ArmModel, used: Conditioning, data: Sequence[Trajectory], theory: BaseParameters
 ) -> Prepared:
-    """Measure the noise in the residual of the arm as given, and as fitted to the data."""
+    """Measure the noise twice: in the residual of the given arm, then of the refitted arm."""
     base, _ = excited(arm, theory, data)
     refit = refitted(arm, base, data, [noise_floor(part, arm).sigma for part in data])
     return Prepared(used, tuple(data), tuple(noise_floor(part, refit) for part in data))
 
 
-def mended(
+def repaired(
     recordings: Sequence[Recording],
     validate: Sequence[Recording],
     baseline: Sequence[Recording],
     settings: DiagnosisSettings,
 ) -> tuple[list[Recording], list[Recording], list[Recording], list[str]]:
-    """Return recordings without damaged samples, and notes on each damage and repair."""
+    """Return all recordings without damaged samples, and notes on each damage and repair."""
     notes: list[str] = []
     whole: list[list[Recording]] = []
     for part in (recordings, validate, baseline):

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Settings of a diagnosis: prior knowledge of causes, and all thresholds of its decisions."""
+"""Settings of a diagnosis: prior odds of effects, and all thresholds of its decisions."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ import numpy as np
 
 #: Log odds by frequency of an effect, which the user may set, relative to the default odds.
 HOW_OFTEN = {'often': 2.0, 'usual': 0.0, 'seldom': -3.0, 'never': -30.0}
-#: Log odds of a change of a link between two days, which is extremely rare.
+#: Log odds of a changed link inertia since the baseline, which is extremely rare.
 NEVER = -5.0
-#: Log odds of a load on an inner link, between two days.
+#: Log odds of a new load on a link other than the last one, since the baseline.
 INNER = -2.0
-#: Log odds of other unusual joints: a delay of one joint, a lag of the whole arm.
+#: Log odds of other effects on unusual joints: a delay of one joint, a lag of the whole arm.
 ELSEWHERE = -1.5
 #: Log odds of causes outside of the arm, which can pull in any direction.
 OUTSIDE = -4.0
-#: Log odds of friction that follows a measured temperature, as that of every gear does.
+#: Log odds of friction that depends on a measured temperature, as that of every gear does.
 FOLLOWS = 5.5
 #: Log odds per position in the catalogue, whose order is from common to rare effects.
 RARER = -0.05
@@ -33,17 +33,19 @@ RARER = -0.05
 UNLISTED = 0.09
 #: Log odds per fitted shape parameter.
 SHAPE = -3.0
-#: Prior standard deviations of the values over the unit of a cause, equally likely.
+#: Prior standard deviations of the values of a cause over their `unit`, equally likely.
 SIZES = np.array([0.01, 0.03, 0.1, 0.3, 1.0])
-#: Prior standard deviation of earlier values, and largest one of differences between recordings,
-#: both over the unit of a cause.
+#: Prior standard deviation of values in the baseline, and the largest one of differences between
+#: recordings, both over the `unit` of a cause.
 THERE = 0.3
 
 
 @dataclass(frozen=True)
 class Thresholds:
     """
-    Thresholds of the diagnosis. Shares are parts of the squared weighted held-out residual.
+    Thresholds of the decisions of a diagnosis.
+
+    A share is a part of the squared weighted held-out residual.
 
     Attributes
     ----------
@@ -54,25 +56,25 @@ class Thresholds:
     tie : float
         Log odds within which two causes are rivals: 20 to 1.
     inexact : float
-        Relative error of the law of a cause: a lead below this share of the explained part does
-        not count, nor does a joint with less than this share of the gap.
+        Relative error of torque laws: a lead below this share of the explained part does not
+        count, nor does a joint with less than this share of the gap.
     headline : float
         Share of the gap below which a cause is minor, if the model has a known misfit.
     same_fit : float
-        Largest ratio of the losses of two equally good explanations, if the unit is a misfit or
-        an assumed noise: both vary by this factor from motion to motion. The torque that holds a
-        joint at rest varies by it, too.
+        Largest ratio of the squared residuals of two equally good explanations. A misfit, an
+        estimated noise, and the torque that holds a joint at rest vary by this factor from motion
+        to motion.
     uncertain : float
-        Largest error of dry friction in an informative row, over its noise. Next to reversals,
-        dry friction is wrong by 0.5 to 2 times itself in five kinds of arms.
+        Largest error of dry friction in a used row, over its noise. Next to reversals, dry
+        friction is wrong by 0.5 to 2 times itself in five kinds of arms.
     least_visible : float
-        Smallest share of its columns that a visible cause has beyond the nuisance columns.
+        Smallest share of the norm of a visible cause that the nuisance columns cannot reproduce.
     confidence : float
         Confidence, over all joints, up to which a residual counts as noise measured by two
         periods: of a thousand healthy arms one is `unknown`.
     predicted : float
-        Factor by which the squared residual may be larger in motions that were not fitted: the
-        parameters are not exact there, and the misfit differs.
+        Factor by which the squared residual may be larger in held-out motions: the parameters are
+        not exact there, and the misfit differs.
     open_share : float
         Share of the gap that named causes have to explain, if the recordings do not separate a
         change from the misfit of another motion.
@@ -80,8 +82,8 @@ class Thresholds:
         Standard deviations attributed to noise: a value may exceed its bound by as many, and a
         joint is worse, or held, only beyond them.
     one_period : float
-        Power of the difference of two periods at low over high frequency that shows an event in
-        one of them: at most 3.6 in 60 sets of the laboratory without events.
+        Ratio of the power of the difference of two periods, at low over high frequency, that shows
+        an event in one of them: at most 3.6 in 60 sets of the laboratory without events.
     one_period_on_average : float
         The same ratio as a mean of three recordings or more: at most 2.4 in these sets. Noise
         correlated over 80 ms reaches 3.7, and events in one period start there. A false alarm is
@@ -108,7 +110,7 @@ class Thresholds:
 @dataclass(frozen=True)
 class DiagnosisSettings:
     """
-    Settings of a diagnosis, chosen by the user.
+    Settings of a diagnosis that the user may choose.
 
     Attributes
     ----------
@@ -151,11 +153,14 @@ class DiagnosisSettings:
     def __post_init__(self) -> None:
         """Check the names and frequencies of priors."""
         names = [kind.name for kind in self.kinds]
-        for name, how in self.prior.items():
-            for word, known, what in ((name, names, 'effect'), (how, HOW_OFTEN, 'frequency')):
+        for effect, frequency in self.prior.items():
+            for word, known, kind in (
+                (effect, names, 'effect'),
+                (frequency, HOW_OFTEN, 'frequency'),
+            ):
                 if word not in known:
                     raise ModelError(
-                        f"prior '{name}={how}': there is no {what} '{word}'"
+                        f"prior '{effect}={frequency}': unknown {kind} '{word}'"
                         f'{meant(word, known)}; known are: {", ".join(known)}'
                     )
 
@@ -167,7 +172,7 @@ class DiagnosisSettings:
 
 
 def log_prior(effect: Effect, robot: Robot, changed: bool) -> float:
-    """Return the prior log odds of an effect on certain joints."""
+    """Return the prior log odds of an effect on its joints, as an error or as a change."""
     names, name = list(CATALOGUE), effect.name
     odds = RARER * (names.index(name) if name in CATALOGUE else len(names))
     odds += SHAPE * len(effect.shape)

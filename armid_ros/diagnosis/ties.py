@@ -1,11 +1,12 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Diagnosis of an arm tied to another moving machine: the ties first, then other causes.
+Diagnosis of an arm tied to another moving machine: first the ties (springs), then other causes.
 
-The places of possible ties are known. All ties are identified together, with a model of the
-noise of angles, as by ``armid exo``. A single tie resembles other ties and half of the catalogue,
-and least squares underestimate its stiffness. Other causes are searched in the remaining residual.
+The segments that may be tied are known. All ties are identified together, with a model of the
+noise of angles, as by ``armid exo``. Least squares would underestimate their stiffness, and a
+single tie resembles other ties and half of the catalogue. Other causes are searched in the
+remaining residual.
 
 """
 
@@ -16,14 +17,14 @@ from dataclasses import dataclass, replace
 
 from armid_ros.arm import ArmModel
 from armid_ros.arm.memoized_arm import memoized_arm
-from armid_ros.diagnosis.data.days import Rows
 from armid_ros.diagnosis.data.evidence import Evidence, noise_floor
+from armid_ros.diagnosis.data.rows import Rows
 from armid_ros.diagnosis.search.cause import NamedEffect
-from armid_ros.diagnosis.search.comparison import settings_alone
+from armid_ros.diagnosis.search.comparison import grid_without_baseline
 from armid_ros.diagnosis.search.explainer import Explainer
-from armid_ros.diagnosis.search.explanation import at_floor, explain, Explanation, survey
-from armid_ros.diagnosis.search.posterior import Fitted, JointFit, patched_arm, places
-from armid_ros.diagnosis.search.trial import Trial
+from armid_ros.diagnosis.search.explanation import explain, Explanation, has_no_gap, survey
+from armid_ros.diagnosis.search.joint_fit import Fitted, JointFit, patched_arm, places
+from armid_ros.diagnosis.search.ranking import CauseResult
 from armid_ros.effects.tied import Partner, Tied, TiedInteraction, TiedSlack
 from armid_ros.errors import IdentificationError
 from armid_ros.estimate import Estimate
@@ -46,12 +47,12 @@ def diagnose_ties(
     explainer: Explainer, recordings: Sequence[Recording], partner: Partner
 ) -> Explanation | None:
     """
-    Explain a gap by springs to another machine (ties), and the remaining residual by other causes.
+    Explain a residual by springs to another machine (ties), and its remainder by other causes.
 
     Returns
     -------
     Explanation or None
-        The explanation with the ties as its first names; without names if the residual is noise;
+        The explanation with the ties as its first causes; without causes if the residual is noise;
         None if there is a gap and no tie.
 
     """
@@ -64,7 +65,7 @@ def diagnose_ties(
         problem = JointFit.over_noise(arm, evidence, explainer.rng).as_described()
         described = problem.fit()
         found = Explanation(arm, described, described, (), evidence, problem)
-        return found if at_floor(found, settings) else None
+        return found if has_no_gap(found, settings) else None
     for _ in range(2):  # the noise of spring angles is estimated only with fitted ties
         problem = JointFit.over_noise(arm, evidence, explainer.rng)
         fitted = problem.fit(named)
@@ -73,10 +74,10 @@ def diagnose_ties(
     candidates, invisible = _as_one_cause(explainer, evidence, partner, fitted)
     steps = candidates[:1] * len(named)
     found = Explanation(arm, fitted, problem.fit(), steps, evidence, problem)
-    if not at_floor(found, replace(settings, material=0.0)):
+    if not has_no_gap(found, replace(settings, material=0.0)):
         rest = replace(explainer, arm=memoized_arm(fitted.arm))
-        free = [one for one in settings_alone() if one.body]
-        result = rest.comparison(Rows.over_noise(evidence), free).found()
+        free = [one for one in grid_without_baseline() if one.body]
+        result = rest.comparison(Rows.over_noise(evidence), free).select()
         found = explain(problem, evidence, result, settings, known=(fitted, steps))
     found = replace(found, candidates=candidates, invisible=invisible)
     return ties.without_bias(found)
@@ -85,7 +86,7 @@ def diagnose_ties(
 @dataclass(frozen=True)
 class _Ties:
     """
-    Regression of the ties between an arm and another machine.
+    Regression problem of the ties between an arm and another machine.
 
     Attributes
     ----------
@@ -103,7 +104,7 @@ class _Ties:
     partner: Partner
 
     def significant(self) -> list[NamedEffect]:
-        """Return significant ties with their values; ties with a common slack become straps."""
+        """Return the significant ties with their stiffness; ties with slack become straps."""
         arm = self.explainer.arm
         tried: list[tuple[float, InteractionProblem, Interaction]] = []
         for slack in (0.0, *TiedSlack.shapes[0].grid):
@@ -135,7 +136,7 @@ class _Ties:
 
     def without_bias(self, found: Explanation) -> Explanation:
         """
-        Give the springs of an explanation the values of the regression without bias.
+        Replace the stiffness of each tie by its estimate without the bias of noisy angles.
 
         The described links are kept if they explain the torques as well as fitted links.
 
@@ -162,7 +163,7 @@ class _Ties:
         return replace(found, fitted=_with_springs(found, springs))
 
     def _springs(self, bare: ArmModel, inertias: Inertias, joints: set[str]) -> Interaction | None:
-        """Identify the springs of some joints; other effects of the arm are subtracted."""
+        """Identify the ties of these joints without bias, or return None if that is impossible."""
         try:
             problem = self._problem(bare, inertias)
             kept = [k for k, joint in enumerate(problem.spring_joints) if joint in joints]
@@ -173,7 +174,7 @@ class _Ties:
     def _problem(
         self, bare: ArmModel, inertias: Inertias, slack: float = 0.0
     ) -> InteractionProblem:
-        """Return the regression of all ties; other effects of the arm are subtracted."""
+        """Return the regression problem of all ties, with other effects of the arm subtracted."""
 
         def rest(motion: Motion) -> FloatArray:
             return np.asarray(bare.torque(motion) - inverse_dynamics(bare.robot, motion))
@@ -200,9 +201,9 @@ class _Ties:
 
 def _with_springs(explanation: Explanation, found: Interaction) -> Fitted:
     """
-    Return the fitted arm with given springs, and with base parameters refitted.
+    Return the fitted arm with the stiffness of ties replaced, and base parameters refitted.
 
-    If other effects were fitted jointly, the standard deviations of the springs are the larger
+    If other effects were fitted jointly, the standard deviations of the stiffness are the larger
     ones of both fits.
 
     """
@@ -223,7 +224,7 @@ def _with_springs(explanation: Explanation, found: Interaction) -> Fitted:
         replaced[list(own.kept)] = values[list(place[0])]
         named.append(replace(own, values=replaced))
     nuisance = problem.with_model(patched_arm(problem.arm, named))
-    means = nuisance.means(nuisance.marginal(problem.setting, problem.recordings))
+    means = nuisance.means(nuisance.posterior(problem.hyperparameters, problem.recordings))
     return replace(
         fitted,
         arm=problem.arm_at(named, means),
@@ -234,12 +235,12 @@ def _with_springs(explanation: Explanation, found: Interaction) -> Fitted:
 
 def _as_one_cause(
     explainer: Explainer, evidence: Evidence, partner: Partner, fitted: Fitted
-) -> tuple[tuple[Trial, ...], tuple[tuple[str, tuple[str, ...]], ...]]:
-    """Compare all ties, as one cause, with the catalogue; return the `survey`, ties first."""
+) -> tuple[tuple[CauseResult, ...], tuple[tuple[str, tuple[str, ...]], ...]]:
+    """Compare all ties, as one cause, with other causes; return the results as `survey` does."""
     settings, robot = explainer.settings, explainer.arm.robot
-    free = [one for one in settings_alone() if one.body]
+    free = [one for one in grid_without_baseline() if one.body]
     comparison = explainer.comparison(Rows.over_noise(evidence), free)
-    result = comparison.first()
+    result = comparison.initial()
     loose = any(own.effect.shapes for own in fitted.named)
     whole = partner.tied(robot, [own.effect.joints[0] for own in fitted.named], slack=loose)
     if loose:
@@ -248,11 +249,15 @@ def _as_one_cause(
     kept = tuple(range(0, each * len(whole.joints), each))
     arm, nuisance = memoized_arm(explainer.arm), comparison.nuisance
     columns = [part.columns(arm, whole)[:, :, list(kept)] for part in nuisance.rows.data]
-    cause = comparison.catalogue.made(whole, kept, columns)
+    cause = comparison.catalogue.candidate_cause(whole, kept, columns)
     assert cause is not None
-    one = comparison.ranked(cause, nuisance)
-    look, material = result.first, settings.material
-    rivals = [look.trial(other, material) for other in look.ranking if other.data >= one.data]
+    one = comparison.rank(cause, nuisance)
+    ranking, material = result.first, settings.material
+    rivals = [
+        ranking.tested(other, material)
+        for other in ranking.ranked
+        if other.log_bayes_factor >= one.log_bayes_factor
+    ]
     candidates, invisible = survey(result, settings)
-    trial = replace(look.trial(one, material), probability=1.0 / (1.0 + len(rivals)))
+    trial = replace(ranking.tested(one, material), probability=1.0 / (1.0 + len(rivals)))
     return (replace(trial, rivals=tuple(rivals)), *candidates), invisible

@@ -7,9 +7,14 @@ from dataclasses import replace
 from armid_ros.diagnosis.data.evidence import Evidence, noise_floor
 from armid_ros.diagnosis.search.cause import NamedEffect
 from armid_ros.diagnosis.search.explanation import Explanation
-from armid_ros.diagnosis.search.posterior import JointFit
+from armid_ros.diagnosis.search.joint_fit import JointFit
 from armid_ros.diagnosis.settings import DiagnosisSettings
-from armid_ros.diagnosis.verdict.attribution import Attribution, headline, left_out, predicted
+from armid_ros.diagnosis.verdict.attribution import (
+    Attribution,
+    cross_validated,
+    headline,
+    held_out_gains,
+)
 from armid_ros.effects import CATALOGUE
 import numpy as np
 import pytest
@@ -61,5 +66,5 @@ def test_a_cause_that_predicts_nothing_of_other_data_is_minor(bench, sprung):
 
 
 def test_folds_that_were_not_fitted_show_it_as_well(sprung):
-    folds, whole = left_out(sprung), predicted(sprung, [0], sprung.evidence)
+    folds, whole = cross_validated(sprung), held_out_gains(sprung, [0], sprung.evidence)
     assert folds.share([0]) == pytest.approx(whole.share([0]), abs=0.01)

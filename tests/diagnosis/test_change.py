@@ -3,11 +3,13 @@
 """Between two days only what differs is named: not what was there, nor what the body can do."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis import diagnose, known_misfit
 from armid_ros.diagnosis.verdict.finding import Finding
-from armid_ros.diagnosis.verdict.remarks import doubt_of_names
+from armid_ros.diagnosis.verdict.remarks import with_doubt
+from armid_ros.diagnosis.verdict.words import Verdict
 from armid_ros.effects import make_effect
 from armid_ros.identification import identify
 from armid_ros.model import inverse_dynamics
@@ -180,7 +182,8 @@ def test_recordings_with_more_noise_than_the_baseline_have_a_floor_of_their_own(
 @pytest.mark.parametrize(('name', 'doubted'), [('link_inertia', True), ('payload', False)])
 def test_a_link_that_is_named_between_two_days_is_doubted(name, doubted):
     found = Finding(name, ('elbow',), (), (), (), 0.9, (0.8, 1.0), 0.0)
-    assert ('exchanged' in doubt_of_names([found])) == doubted
+    _, warning = with_doubt(Verdict('named', ''), '', [found], None, SimpleNamespace())
+    assert ('exchanged' in warning) == doubted
 
 
 def test_what_slow_motion_does_not_tell_of_a_body_is_no_change(bench):

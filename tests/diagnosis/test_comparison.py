@@ -4,19 +4,19 @@
 
 from types import SimpleNamespace
 
-from armid_ros.diagnosis.data.days import Rows
+from armid_ros.diagnosis.data.rows import Rows
 from armid_ros.diagnosis.data.trajectory import trajectories
 from armid_ros.diagnosis.search.candidates import Causes, value_unit
 from armid_ros.diagnosis.search.comparison import CauseComparison
+from armid_ros.diagnosis.search.hyperparameters import Hyperparameters
 from armid_ros.diagnosis.search.nuisance import Nuisance
 from armid_ros.diagnosis.search.odds import (
-    allowed,
     CauseFit,
-    EQUAL,
+    log_probability_in_bounds,
+    marginalised,
+    NO_SPREAD,
     odds,
-    without,
 )
-from armid_ros.diagnosis.search.setting import Setting
 from armid_ros.diagnosis.settings import DiagnosisSettings, SIZES, THERE
 from armid_ros.effects import CATALOGUE
 from armid_ros.identification.rows.signals import Conditioning
@@ -37,7 +37,7 @@ def nuisance(bench):
     return Nuisance.of(rows, bench.arm, np.random.default_rng(0))
 
 
-def covariance(nuisance, setting, more=()):
+def covariance(nuisance, hyperparameters, more=()):
     """Return the covariance of all informative rows, and which these are."""
     blocks, use = [], [np.any(x != 0.0, axis=2).ravel() for x in nuisance.columns]
     flat = [x.reshape(-1, x.shape[2]) for x in nuisance.columns]
@@ -45,12 +45,12 @@ def covariance(nuisance, setting, more=()):
     body = np.linalg.inv(nuisance.prior_precision)
     unit = np.repeat(MISFIT, functions)
     whole = np.concatenate(flat)
-    reach = nuisance.reach.ravel()
-    shared = linalg.block_diag(body, np.diag((setting.shared * unit * reach) ** 2))
+    reach = nuisance.unvisited_factor.ravel()
+    shared = linalg.block_diag(body, np.diag((hyperparameters.shared * unit * reach) ** 2))
     total = whole @ shared @ whole.T
     for x in flat:
-        own = x[:, rank:] * setting.own * unit
-        blocks.append(own @ own.T + setting.noise**2 * np.eye(len(x)))
+        own = x[:, rank:] * hyperparameters.own * unit
+        blocks.append(own @ own.T + hyperparameters.noise**2 * np.eye(len(x)))
     total += linalg.block_diag(*blocks)
     for columns, size in more:
         total += size**2 * columns @ columns.T
@@ -58,9 +58,9 @@ def covariance(nuisance, setting, more=()):
     return total[np.ix_(told, told)], told
 
 
-def density(nuisance, setting, more=()):
+def density(nuisance, hyperparameters, more=()):
     """Return the log density of the residual."""
-    total, told = covariance(nuisance, setting, more)
+    total, told = covariance(nuisance, hyperparameters, more)
     y = np.concatenate([rest.ravel() for rest in nuisance.residual])[told]
     return stats.multivariate_normal(np.zeros(len(y)), total).logpdf(y)
 
@@ -76,47 +76,50 @@ def columns_of(cause, nuisance):
 
 
 def test_settings_are_compared_by_the_density_of_the_data(nuisance):
-    settings = [Setting(1.0, 0.4, 0.3, 0.7, 1.0), Setting(True, 1.2, 0.8, 0.4, 1.0)]
-    one, other = (nuisance.marginal(setting).evidence for setting in settings)
-    first, second = (density(nuisance, setting) for setting in settings)
+    settings = [
+        Hyperparameters(1.0, 0.4, 0.3, 0.7, 1.0),
+        Hyperparameters(True, 1.2, 0.8, 0.4, 1.0),
+    ]
+    one, other = (nuisance.posterior(hyperparameters).evidence for hyperparameters in settings)
+    first, second = (density(nuisance, hyperparameters) for hyperparameters in settings)
     assert one - other == pytest.approx(first - second, rel=1e-4, abs=1e-3)
 
 
-def causes_of(nuisance, under, *names):
+def causes_of(nuisance, posterior, *names):
     kinds = tuple(CATALOGUE[name] for name in names)
-    return Causes(kinds, nuisance, True, frozenset()).causes(nuisance, under)
+    return Causes(kinds, nuisance, True, frozenset()).causes(nuisance, posterior)
 
 
 def test_the_factor_of_a_cause_is_the_ratio_of_densities(nuisance):
-    setting = Setting(1.0, 0.4, 0.3, 0.7, 1.0)
-    under = nuisance.marginal(setting)
-    for cause in causes_of(nuisance, under, 'torque_offset', 'viscous_friction'):
+    hyperparameters = Hyperparameters(1.0, 0.4, 0.3, 0.7, 1.0)
+    posterior = nuisance.posterior(hyperparameters)
+    for cause in causes_of(nuisance, posterior, 'torque_offset', 'viscous_friction'):
         parts = columns_of(cause, nuisance)
         there = np.concatenate(parts)
         today = np.concatenate([*(0.0 * x for x in parts[:2]), parts[2]])
-        nothing = density(nuisance, setting, [(there, THERE)])
-        each = [density(nuisance, setting, [(there, THERE), (today, s)]) for s in SIZES]
+        nothing = density(nuisance, hyperparameters, [(there, THERE)])
+        each = [density(nuisance, hyperparameters, [(there, THERE), (today, s)]) for s in SIZES]
         expected = np.logaddexp.reduce(each) - np.log(len(SIZES)) - nothing
-        fit = odds(cause, nuisance, under, 0.0, EQUAL)
+        fit = odds(cause, nuisance, posterior, 0.0, NO_SPREAD)
         assert fit.factor == pytest.approx(expected, rel=1e-3, abs=1e-2)
 
 
 def test_an_accepted_cause_is_explained_as_if_it_were_data_of_the_model(nuisance):
     """Beside itself a cause has nothing left to explain."""
-    setting = Setting(1.0, 0.4, 0.3, 0.7, 1.0)
-    under = nuisance.marginal(setting)
-    first, _ = causes_of(nuisance, under, 'torque_offset')
+    hyperparameters = Hyperparameters(1.0, 0.4, 0.3, 0.7, 1.0)
+    posterior = nuisance.posterior(hyperparameters)
+    first, _ = causes_of(nuisance, posterior, 'torque_offset')
     beside = nuisance.and_cause(first, 1.0)
-    again = odds(first, beside, beside.marginal(setting))
+    again = odds(first, beside, beside.posterior(hyperparameters))
     assert again.explained < 0.5
-    assert beside.without(0).accepted == ()
+    assert beside.without_cause(0).accepted == ()
 
 
 def test_what_is_integrated_out_is_what_a_normal_distribution_leaves():
     rng = np.random.default_rng(0)
     rows, root = rng.normal(size=(40, 5)), rng.normal(size=(5, 3))
     y = rng.normal(size=40)
-    square, aim, gained = without(rows.T @ rows, rows.T @ y, root)
+    square, aim, gained = marginalised(rows.T @ rows, rows.T @ y, root)
     total = np.eye(40) + rows @ root @ root.T @ rows.T
     inverse = np.linalg.inv(total)
     np.testing.assert_allclose(square, rows.T @ inverse @ rows, atol=1e-9)
@@ -137,13 +140,13 @@ def test_a_family_has_the_joints_of_the_largest_evidence(upright, joints):
     misfit = np.full(3, 0.05)
     rows = Rows(tuple(data), (misfit,) * 6, 3, (misfit,) * 6)
     nuisance = Nuisance.of(rows, upright.arm, np.random.default_rng(0))
-    under = nuisance.marginal(Setting(1.0, 0.4, 0.3, 0.7, 1.0))
-    causes = causes_of(nuisance, under, 'viscous_friction')
+    posterior = nuisance.posterior(Hyperparameters(1.0, 0.4, 0.3, 0.7, 1.0))
+    causes = causes_of(nuisance, posterior, 'viscous_friction')
     families = [one for one in causes if len(one.effect.joints) > 1]
     wanted = tuple(upright.robot.joints[k] for k in joints)
     assert [one.effect.joints for one in families] == ([wanted] if len(joints) > 1 else [])
     for one in families:
-        assert odds(one, nuisance, under).values == pytest.approx(size[joints], abs=0.02)
+        assert odds(one, nuisance, posterior).values == pytest.approx(size[joints], abs=0.02)
 
 
 def test_every_value_of_a_cause_has_to_be_possible(upright):
@@ -154,19 +157,19 @@ def test_every_value_of_a_cause_has_to_be_possible(upright):
     for value, possible in ((-0.2, True), (-0.6, False)):
         values = np.array([0.5, 0.3, value])
         fit = CauseFit(0.0, 0.0, 1.0, values, np.full(3, 0.01), np.ones(3))
-        assert (allowed(cause, fit, nuisance) > -10.0) == possible
+        assert (log_probability_in_bounds(cause, fit, nuisance) > -10.0) == possible
 
 
 def test_earlier_causes_without_significance_are_dropped(nuisance):
-    setting = Setting(1.0, 0.4, 0.3, 0.7, 1.0)
-    under = nuisance.marginal(setting)
-    first, last = causes_of(nuisance, under, 'torque_offset')
+    hyperparameters = Hyperparameters(1.0, 0.4, 0.3, 0.7, 1.0)
+    posterior = nuisance.posterior(hyperparameters)
+    first, last = causes_of(nuisance, posterior, 'torque_offset')
     for order in ((first, last), (last, first)):
         both = nuisance
         for cause in order:
             both = both.and_cause(cause, 1.0)
-        comparison = CauseComparison(both, None, DiagnosisSettings(), (setting,))
-        accepted, left = comparison._pruned(list(order), both)
+        comparison = CauseComparison(both, None, DiagnosisSettings(), (hyperparameters,))
+        accepted, left = comparison._drop_redundant(list(order), both)
         assert accepted == [order[1]] and len(left.accepted) == 1
 
 
@@ -174,5 +177,5 @@ def test_a_value_that_motion_hardly_shows_has_a_possible_size(nuisance):
     """Gravity almost along an axis: an encoder offset of a million turns would explain a gap."""
     effect = CATALOGUE['encoder_offset'].on(nuisance.arm.robot, ('elbow',))
     columns = [np.full((*part.unsure.shape, 1), 1e-6) for part in nuisance.rows.data]
-    unit = value_unit(nuisance, effect, (0,), nuisance.rows.rms_today(columns))
+    unit = value_unit(nuisance, effect, (0,), nuisance.rows.rms_of_diagnosed(columns))
     assert unit.item() == effect.quantities[0].largest('elbow', nuisance.arm.robot) < np.pi

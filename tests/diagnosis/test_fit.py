@@ -8,7 +8,7 @@ from armid_ros.diagnosis.data.evidence import Evidence, noise_floor
 from armid_ros.diagnosis.data.trajectory import trajectories
 from armid_ros.diagnosis.search.candidates import without_measurement
 from armid_ros.diagnosis.search.cause import NamedEffect
-from armid_ros.diagnosis.search.posterior import JointFit, patch_columns
+from armid_ros.diagnosis.search.joint_fit import JointFit, patch_columns
 from armid_ros.effects import CATALOGUE
 from armid_ros.identification.rows.signals import Conditioning
 import numpy as np
@@ -48,11 +48,11 @@ def test_columns_of_a_shape_are_the_derivative_of_the_torque(bench, name, shape,
     columns = patch_columns(bench.arm, [named], part)[0][:, :, len(values) :]
     for index in range(len(shape)):
         step = 1e-3 * max(abs(shape[index]), 0.01) * np.eye(len(shape))[index]
-        ahead, behind = (
+        log_odds_over, behind = (
             part.residual(bench.arm.with_effect(effect.with_shape(shape + change), values))
             for change in (step, -step)
         )
-        slope = (behind - ahead) / (2.0 * step[index])
+        slope = (behind - log_odds_over) / (2.0 * step[index])
         np.testing.assert_allclose(columns[:, :, index], slope, atol=2e-3 * np.abs(slope).max())
         assert np.any(slope)
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis import diagnose, DiagnosisSettings
 from armid_ros.diagnosis.data.trajectory import trajectories
-from armid_ros.diagnosis.prepare import mended
+from armid_ros.diagnosis.prepare import repaired
 from armid_ros.errors import IdentificationError
 from armid_ros.identification import identify
 from armid_ros.identification.assess.data_faults import check_data
@@ -216,7 +216,7 @@ def test_a_joint_that_nobody_drives_is_not_dead(bench):
 def test_a_recording_in_two_roles_is_said(bench):
     recordings = bench.recordings()
     new, before = bench.recordings(seed=5)[:1], recordings[:1]
-    *_, notes = mended(recordings, new, before, DiagnosisSettings())
+    *_, notes = repaired(recordings, new, before, DiagnosisSettings())
     (note,) = [note for note in notes if 'two roles' in note]
     assert recordings[0].source in note
 

@@ -9,7 +9,7 @@ from armid_ros.diagnosis.data.baseline import described_precision
 from armid_ros.diagnosis.data.evidence import Evidence
 from armid_ros.diagnosis.data.trajectory import trajectories
 from armid_ros.diagnosis.search.cause import NamedEffect
-from armid_ros.diagnosis.search.posterior import JointFit
+from armid_ros.diagnosis.search.joint_fit import JointFit
 from armid_ros.effects import CATALOGUE
 from armid_ros.identification import identify, SignalSettings
 from armid_ros.identification.output import identification_document

@@ -10,7 +10,7 @@ from armid_ros.diagnosis import diagnose, next_run
 from armid_ros.diagnosis.data.evidence import Evidence, noise_floor
 from armid_ros.diagnosis.next_run.separation import Load, separation
 from armid_ros.diagnosis.search.cause import NamedEffect
-from armid_ros.diagnosis.search.posterior import JointFit
+from armid_ros.diagnosis.search.joint_fit import JointFit
 from armid_ros.effects import CATALOGUE
 from armid_ros.errors import TrajectoryError
 from armid_ros.excitation import (

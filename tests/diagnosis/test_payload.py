@@ -7,7 +7,7 @@ from types import SimpleNamespace
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis import diagnose
 from armid_ros.diagnosis.search.explanation import Explanation
-from armid_ros.diagnosis.search.trial import Trial
+from armid_ros.diagnosis.search.ranking import CauseResult
 from armid_ros.diagnosis.verdict.bodies import is_same_body, on_outer_link
 from armid_ros.effects.load import PayloadChange
 from armid_ros.identification import identify
@@ -52,7 +52,7 @@ def load_on(joint, first_moments, rivals=()):
     cause = PayloadChange((joint,)), tuple(range(10))
     values = np.array([0.7, *first_moments, *(6 * [0.01])])
     each = np.full(10, 1e-3)
-    return Trial(*cause, values, each, each, each, 1.0, 9.0, 9.0, 1.0, 1, 0.45, rivals)
+    return CauseResult(*cause, values, each, each, each, 1.0, 9.0, 9.0, 1.0, 1, 0.45, rivals)
 
 
 @pytest.mark.parametrize(

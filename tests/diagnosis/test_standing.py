@@ -124,6 +124,6 @@ def test_a_joint_that_never_moves_is_said_not_to_be_checked(bench, baseline):
     assert any(step.startswith('Move elbow') for step in steps)
     assert not any(step.startswith('Use') for step in steps)
     moved = replace(found, data=())
-    doubted = replace(moved, doubt='It is poor.')
-    assert [tone_of(one) for one in (found, moved, doubted)] == ['fair', 'good', 'fair']
+    with_doubt = replace(moved, doubt='It is poor.')
+    assert [tone_of(one) for one in (found, moved, with_doubt)] == ['fair', 'good', 'fair']
     assert tone_of(replace(found, verdict='unknown')) == 'bad'

@@ -10,12 +10,12 @@ The data and the library are the same for both; what differs is the one step tha
 from dataclasses import dataclass, replace
 
 from armid_ros.diagnosis import diagnose, DiagnosisSettings
-from armid_ros.diagnosis.data.days import Rows
 from armid_ros.diagnosis.data.evidence import Evidence, noise_floor
+from armid_ros.diagnosis.data.rows import Rows
 from armid_ros.diagnosis.search.candidates import Causes
+from armid_ros.diagnosis.search.hyperparameters import Hyperparameters
 from armid_ros.diagnosis.search.nuisance import Nuisance
 from armid_ros.diagnosis.search.odds import CauseInformation
-from armid_ros.diagnosis.search.setting import Setting
 from armid_ros.effects import Action, CATALOGUE, Effect, Quantity
 import numpy as np
 import pytest
@@ -48,12 +48,12 @@ def significant(arm, data, sigma, names):
     nuisance = Nuisance.of(
         Rows.over_noise(Evidence.over_noise(data, sigma)), arm, np.random.default_rng(0)
     )
-    under = nuisance.marginal(Setting(1.0, 0.0, 0.0, 1.0, 1.0))
+    posterior = nuisance.posterior(Hyperparameters(1.0, 0.0, 0.0, 1.0, 1.0))
     kinds = tuple(CATALOGUE[name] for name in names)
-    causes = Causes(kinds, nuisance, False, frozenset()).causes(nuisance, under)
+    causes = Causes(kinds, nuisance, False, frozenset()).causes(nuisance, posterior)
     p = {}
     for cause in causes:
-        known = CauseInformation.of([cause], nuisance, under, by_day=True)
+        known = CauseInformation.of([cause], nuisance, posterior, by_day=True)
         matrix, vector = known.matrix[0], known.vector[0]
         gain = float(vector @ np.linalg.lstsq(matrix, vector, rcond=1e-6)[0])
         name = cause.effect.name

@@ -4,7 +4,7 @@
 
 from dataclasses import replace
 
-from armid_ros.diagnosis.data.evidence import NoiseFloor, not_repeating
+from armid_ros.diagnosis.data.evidence import joints_that_do_not_repeat, NoiseFloor
 from armid_ros.diagnosis.settings import Thresholds
 from armid_ros.diagnosis.verdict.finding import Finding, Rival
 from armid_ros.diagnosis.verdict.where import Excess
@@ -175,7 +175,8 @@ def test_what_does_not_repeat_has_to_matter(bench):
 
     def word(least):
         different = [
-            bench.robot.joints[k] for k in not_repeating([floor] * 3, Thresholds(), least * one)
+            bench.robot.joints[k]
+            for k in joints_that_do_not_repeat([floor] * 3, Thresholds(), least * one)
         ]
         return decide((), different, [closed], bench.arm, FLOOR)
 

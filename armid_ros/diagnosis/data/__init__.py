@@ -1,3 +1,3 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""From recordings to weighted rows: filters, noise, and the unit of the gap."""
+"""Filtered and decimated recordings, their torque noise, and the misfit of the model in them."""

@@ -1,12 +1,12 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Prior knowledge of an arm: from recordings of a baseline, and from its description.
+The misfit of a model in baseline recordings, and the prior that the description gives.
 
-The misfit is the residual of a model in recordings from a time when it was right. No model
+The misfit is the residual of a model in recordings from a time when the model was right. No model
 describes a real arm to within the noise. The residual is smaller in the recordings of the
-identification. Each fold is therefore also predicted with parameters fitted to the other folds.
-The description is the prior of parameters that the other folds do not determine: a joint may have
+identification, so each fold is also predicted with parameters fitted to the other folds. The
+description is the prior of parameters that the other folds do not determine: a joint may have
 moved in one recording only.
 
 """
@@ -37,7 +37,7 @@ import scipy.linalg
 def excited(
     arm: ArmModel, theory: BaseParameters, data: Sequence[Trajectory]
 ) -> tuple[BaseParameters, list[FloatArray]]:
-    """Return the base parameters that the motion excites, and their regressor columns."""
+    """Return the base parameters that are identifiable in the data, and their columns."""
     columns = [part.base_columns(arm, arm.effects, theory.independent) for part in data]
     stacked = np.concatenate([block.reshape(-1, theory.rank) for block in columns])
     names = tuple(theory.standard[column] for column in theory.independent)
@@ -57,17 +57,17 @@ def described_precision(
     base: BaseParameters, arm: ArmModel, known: FloatArray | None = None
 ) -> FloatArray:
     """
-    Return the precision of the prior that the description gives for the base parameters, (r, r).
+    Return the prior precision of base parameters that the description gives, shape (r, r).
 
-    The prior standard deviation is about the described value: data change the parameters that
-    they determine; the others keep values that predict other motions well. The standard
-    deviation of an effect with value zero is its largest expected value. A parameter of infinite
-    variance gives zero precision along its column of the grouping.
+    The prior standard deviation of a parameter is about its described value; that of an effect
+    with value zero is its largest expected value. Data change the parameters that they determine;
+    the others keep values that predict other motions well. A parameter of infinite variance gives
+    zero precision along its column of the grouping.
 
     Parameters
     ----------
     base : BaseParameters
-        The parameters.
+        The base parameters.
     arm : ArmModel
         The arm as described.
     known : ndarray, shape (P, P), optional
@@ -95,7 +95,7 @@ def described_precision(
 def refitted(
     arm: ArmModel, base: BaseParameters, data: Sequence[Trajectory], sigma: Sequence[FloatArray]
 ) -> ArmModel:
-    """Return an arm with base parameters fitted to trajectories with noise (n,) [N m] each."""
+    """Return the arm with base parameters fitted to trajectories of noise sigma (n,) [N m]."""
     columns = [part.base_columns(arm, arm.effects, base.independent) for part in data]
     weight = row_weights(data, sigma)
     x = (np.concatenate(columns) * weight[:, :, np.newaxis]).reshape(-1, base.rank)
@@ -109,14 +109,14 @@ def refitted(
 @dataclass(frozen=True)
 class Baseline:
     """
-    Recordings from a time when the model was right.
+    Recordings from a time when the model was right, with the misfit of the model.
 
     Attributes
     ----------
     data : tuple of Trajectory
         The recordings.
     residual : tuple of ndarray, each (M, n)
-        Residual of the model [N m].
+        Residual of the model in each trajectory [N m].
     misfit : ndarray, shape (n,)
         Geometric mean of two rms residuals: of the model as given, and of folds predicted from
         the other folds [N m].
@@ -133,7 +133,7 @@ class Baseline:
 
     @classmethod
     def of(cls, arm: ArmModel, data: Sequence[Trajectory], rng: np.random.Generator) -> Baseline:
-        """Measure the misfit of a model in recordings of a baseline."""
+        """Measure the misfit of a model in baseline recordings, by cross-validation."""
         residuals = [part.residual(arm) for part in data]
         base, columns = excited(arm, arm.base_parameters(rng), data)
         prior = described_precision(base, arm)
@@ -165,7 +165,7 @@ class Baseline:
     @property
     def errors(self) -> tuple[float, FloatArray]:
         """
-        Return the relative rms error of the model: of the whole arm, and of each joint, (n,).
+        Return rms residual over rms torque for all joints together, and for each joint, (n,).
 
         Only rows in which a joint moves are used: at rest, friction can have any torque.
 
@@ -184,7 +184,7 @@ def known_misfit(
     held_out: Sequence[Recording] = (),
 ) -> Misfit:
     """
-    Measure the misfit of a model in recordings in which nothing is wrong, for later diagnoses.
+    Measure the rms residual of a model in sound recordings, as reference of later diagnoses.
 
     Rows in which a joint rests or reverses are not used, as in a diagnosis: friction there is
     the largest error of a model.

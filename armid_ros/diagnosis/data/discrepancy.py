@@ -1,13 +1,13 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Model discrepancy: the part of a misfit that is the same in every motion.
+Regression columns of the model discrepancy: torque over position and velocity that a model lacks.
 
-Measured torque is the sum of the torque of the model, a function of the state that the model
-lacks, and noise (Kennedy and O'Hagan, Bayesian calibration of computer models, 2001). The function
-belongs to the arm and does not change. Other motions visit other states and have another misfit,
-although nothing has changed. In each joint it is a function of position, plus one of velocity,
-plus load-dependent friction, fitted to the recordings of both days together with each cause.
+Measured torque is the sum of the torque of the model, the model discrepancy, and noise (Kennedy
+and O'Hagan, Bayesian calibration of computer models, 2001). The discrepancy is a fixed function of
+the arm. A new motion visits other states, so its residual differs although nothing has changed. In
+each joint, the discrepancy is a function of position, plus one of velocity, plus load-dependent
+friction. It is fitted to baseline and diagnosed recordings, together with each candidate cause.
 
 """
 
@@ -30,7 +30,7 @@ _SPEED_KNOTS = (0.03, 0.25, 1.0)
 
 def discrepancy_columns(data: Sequence[Trajectory], arm: Arm) -> list[FloatArray]:
     """
-    Return the columns of the discrepancy functions of each joint.
+    Return the regression columns of the model discrepancy of each joint.
 
     Functions of position and velocity are linear between knots and constant beyond them, with a
     unit torque at a knot; friction has a root mean square torque of one.
@@ -38,14 +38,14 @@ def discrepancy_columns(data: Sequence[Trajectory], arm: Arm) -> list[FloatArray
     Parameters
     ----------
     data : sequence of Trajectory
-        The recordings of both days, whose motions give the knots.
+        All recordings, whose motions give the knots.
     arm : Arm
-        Arm whose load the load-dependent friction is proportional to.
+        Model that computes the load of the load-dependent friction.
 
     Returns
     -------
     list of ndarray, each (M, n, n f)
-        Columns of each trajectory: the f functions of one joint after the other.
+        Columns of each trajectory: f basis functions of the first joint, then of the next ones.
 
     """
     motions = [part.at_rows for part in data]
@@ -67,8 +67,8 @@ def discrepancy_columns(data: Sequence[Trajectory], arm: Arm) -> list[FloatArray
         for joint in range(motion.n_joints):
             columns[:, joint, joint * count : (joint + 1) * count] = np.column_stack(
                 [
-                    *hats(link.q[:, joint], positions[:, joint]),
-                    *hats(link.dq[:, joint], velocities[:, joint]),
+                    *hat_functions(link.q[:, joint], positions[:, joint]),
+                    *hat_functions(link.dq[:, joint], velocities[:, joint]),
                     own[:, joint],
                 ]
             )
@@ -76,6 +76,6 @@ def discrepancy_columns(data: Sequence[Trajectory], arm: Arm) -> list[FloatArray
     return found
 
 
-def hats(x: FloatArray, knots: FloatArray) -> list[FloatArray]:
+def hat_functions(x: FloatArray, knots: FloatArray) -> list[FloatArray]:
     """Return the linear B-spline (hat) basis at x, one array of the shape of x per knot."""
     return [np.interp(x, knots, row) for row in np.eye(len(knots))]

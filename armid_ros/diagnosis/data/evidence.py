@@ -1,12 +1,13 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Data in units of the noise, or of the misfit of the model.
+Torque noise of recordings, and residuals weighted by this noise or by the misfit of the model.
 
 The noise is the difference between the residuals of two equal periods of one trajectory. Each
 residual is evaluated at the positions measured in its period, so the difference includes encoder
 noise that propagates through the model. Torques that depend on the motion alone cancel. Without
-equal periods, noise is assumed from differences of neighbouring rows, and the result states so.
+equal periods, the noise is estimated from second differences of neighbouring rows, and the result
+states so.
 
 """
 
@@ -25,7 +26,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy import signal, stats
 
-#: Smallest number of informative rows; with fewer, all rows are used.
+#: Smallest number of rows in motion from which noise is measured; with fewer, all rows are used.
 _MIN_ROWS = 20
 #: Ratio of the noise of torques, which is coloured, to white noise with the same second
 #: differences: at most this value in 95 % of the joints of 48 recordings with two equal periods.
@@ -38,16 +39,16 @@ _LOW_HZ, _HIGH_HZ = 4.0, (6.0, 12.0)
 @dataclass(frozen=True)
 class Evidence:
     """
-    Data of a diagnosis, and the unit in which their gap is measured.
+    Recordings, with the standard deviation by which the residual of each joint is divided.
 
     Attributes
     ----------
     data : tuple of Trajectory
-        The data.
+        The recordings.
     sigma : tuple of ndarray, each (n,)
-        Unit of each trajectory: the larger of its noise and the misfit of the model [N m].
+        That deviation for each trajectory: its noise, or the misfit of the model if larger [N m].
     noise : tuple of ndarray, each (n,)
-        The noise of each trajectory [N m].
+        Standard deviation of the torque noise of each trajectory [N m].
     varies : ndarray, shape (n,), or None
         Factor by which the squared misfit varies from motion to motion; None counts as one.
 
@@ -60,53 +61,53 @@ class Evidence:
 
     @classmethod
     def over_noise(cls, data: Sequence[Trajectory], noise: Sequence[FloatArray]) -> Evidence:
-        """Return data whose gap is measured in units of their noise, each (n,) [N m]."""
+        """Divide the residuals of trajectories by their noise alone, (n,) each [N m]."""
         return cls(tuple(data), tuple(noise), tuple(noise))
 
     @cached_property
     def count(self) -> FloatArray:
-        """Return the number of informative rows of each joint, shape (n,)."""
+        """Return the number of rows in which each joint moves, shape (n,)."""
         parts = [part.informative.sum(axis=0) for part in self.data]
         return np.asarray(np.sum(parts, axis=0, dtype=float))
 
     @cached_property
     def torque_rms(self) -> FloatArray:
-        """Root mean square of the measured torque of each joint, shape (n,) [N m]."""
+        """Root mean square measured torque of each joint while it moves, shape (n,) [N m]."""
         return np.sqrt(self.power([part.torque for part in self.data]))
 
     def chi2_per_row(self, residual: Sequence[FloatArray]) -> FloatArray:
-        """Return the loss of each joint: its mean squared weighted residual, shape (n,)."""
+        """Return the mean square of residual over `sigma` for each joint, shape (n,)."""
         return self.power([rows / s for rows, s in zip(residual, self.sigma, strict=True)])
 
     def relative_errors(self, residual: Sequence[FloatArray]) -> FloatArray:
-        """Return rms residuals, each (M, n), divided by the rms torque of each joint, (n,)."""
+        """Return the rms residual of each joint, divided by its rms torque, shape (n,)."""
         torque = np.maximum(self.torque_rms**2, 1e-300)
         return np.asarray(np.sqrt(self.power(residual) / torque))
 
     def power(self, torque: Sequence[FloatArray]) -> FloatArray:
-        """Return the mean square of torques (M, n) over each joint's informative rows, (n,)."""
+        """Return the mean square of torques (M, n) over the rows in which a joint moves, (n,)."""
         squares = np.zeros_like(self.count)
         for part, rows in zip(self.data, torque, strict=True):
             squares += np.sum(rows**2, axis=0, where=part.informative)
         return np.asarray(squares / np.maximum(self.count, 1.0))
 
     def residuals(self, arm: ArmModel) -> list[FloatArray]:
-        """Return measured torques minus the torques of an arm, each (M, n) [N m]."""
+        """Return measured torque minus the torque of a model, (M, n) per trajectory [N m]."""
         return [part.residual(arm) for part in self.data]
 
     def block_squares(self, residual: Sequence[FloatArray]) -> FloatArray:
-        """Return the sum of squares of the weighted residual in each block and joint, (B, n)."""
+        """Return the sum of squared weighted residuals of each time block and joint, (B, n)."""
         block, _ = block_rows(self.data)
         rows = np.concatenate(residual) * row_weights(self.data, self.sigma)
         return np.column_stack([np.bincount(block, column) for column in rows.T**2])
 
     def limits(self, residual: Sequence[FloatArray], settings: DiagnosisSettings) -> FloatArray:
         """
-        Return the largest mean squared weighted residual that is not a gap, for each joint, (n,).
+        Return the largest `chi2_per_row` that noise and misfit explain, for each joint, (n,).
 
-        The noise and the residual each have one degree of freedom per independent row, so the
-        ratio of their squares has an F distribution. A misfit, or assumed noise, may be larger by
-        the factor `same_fit` from motion to motion. The loss of an immaterial residual is added.
+        Noise and residual have one degree of freedom per independent row each, so the ratio of
+        their squares has an F distribution. A misfit, or estimated noise, may be larger by the
+        factor `same_fit` in another motion. The square of an immaterial residual is added.
 
         """
         thresholds = settings.thresholds
@@ -114,24 +115,24 @@ class Evidence:
         freedom = np.maximum(count / self._correlation_length(residual), 4.0)
         each = 1.0 - (1.0 - thresholds.confidence) / len(count)
         noise = stats.f.ppf(each, freedom, freedom)
-        if any(part.period is None for part in self.data):  # its noise is assumed
+        if any(part.period is None for part in self.data):  # its noise is estimated
             noise = noise * thresholds.same_fit
         share = np.mean(np.square(self.noise), axis=0) / np.mean(np.square(self.sigma), axis=0)
         misfit = share < 1.0 / thresholds.same_fit
         return np.where(misfit, self.misfit_limit(settings), noise) + self.material_loss(settings)
 
     def misfit_limit(self, settings: DiagnosisSettings) -> FloatArray:
-        """Return the largest loss that a known misfit causes in another motion, (n,)."""
+        """Return the largest `chi2_per_row` of a known misfit in another motion, (n,)."""
         varies = np.ones_like(self.count) if self.varies is None else self.varies
         return np.asarray(settings.thresholds.same_fit * np.maximum(varies, 1.0))
 
     def material_loss(self, settings: DiagnosisSettings) -> FloatArray:
-        """Return the loss of each joint at which a residual begins to be material, shape (n,)."""
+        """Return the `chi2_per_row` of the smallest material residual of each joint, (n,)."""
         unit = np.mean(np.square(self.sigma), axis=0)
         return np.asarray((settings.material * self.torque_rms) ** 2 / unit)
 
     def _correlation_length(self, residual: Sequence[FloatArray]) -> FloatArray:
-        """Return the correlation length of the squared residual, shape (n,) [rows]."""
+        """Return the number of neighbouring rows with correlated squared residuals, (n,)."""
         products = np.zeros((21, len(self.count)))  # correlated over 20 rows at most
         for part, own in zip(self.data, residual, strict=True):
             rows = np.where(part.informative, own, 0.0)
@@ -142,7 +143,7 @@ class Evidence:
 
 
 def torque_rms(data: Sequence[Trajectory]) -> FloatArray:
-    """Return the root mean square torque of each joint over its informative rows, (n,) [N m]."""
+    """Return the root mean square torque of each joint while it moves, shape (n,) [N m]."""
     unit = [np.ones(part.motion.n_joints) for part in data]
     return Evidence.over_noise(data, unit).torque_rms
 
@@ -150,20 +151,20 @@ def torque_rms(data: Sequence[Trajectory]) -> FloatArray:
 @dataclass(frozen=True)
 class NoiseFloor:
     """
-    Torque noise of each joint in one trajectory: in total, slow, and from row to row.
+    Torque noise of each joint in one trajectory: all of it, its slow part, and its fast part.
 
     Attributes
     ----------
     sigma : ndarray, shape (n,)
         Standard deviation of a row of each joint [N m].
     period : float or None
-        Length of the repeated period [s]; None where nothing repeats.
+        Length of the repeated period of the motion [s]; None if the motion has none.
     structure : ndarray, shape (n,)
         Power of the difference of two periods at low frequency over that at high frequency.
     slow : ndarray, shape (n,)
-        Standard deviation of one period at low frequency [N m]; zero where nothing repeats.
+        Standard deviation of the noise at low frequency [N m]; zero without a repeated period.
     rough : ndarray, shape (n,)
-        Upper estimate of noise that differs from row to row [N m].
+        Upper limit of the noise, from second differences of neighbouring rows [N m].
 
     """
 
@@ -176,14 +177,14 @@ class NoiseFloor:
 
 def noise_floor(trajectory: Trajectory, arm: ArmModel) -> NoiseFloor:
     """
-    Measure the noise of a trajectory in the residual of a model.
+    Measure the torque noise of a trajectory as the difference of two equal periods.
 
     Parameters
     ----------
     trajectory : Trajectory
-        The data.
+        The trajectory.
     arm : ArmModel
-        A model close to the data; effects that it lacks cancel in the difference of periods.
+        Model whose residual is used; effects that it lacks cancel in the difference of periods.
 
     """
     motion = trajectory.motion
@@ -193,8 +194,11 @@ def noise_floor(trajectory: Trajectory, arm: ArmModel) -> NoiseFloor:
     half = (len(taps) - 1) // 2
     smooth = signal.fftconvolve(residual, taps[:, np.newaxis], mode='same', axes=0)
     found = trajectory.period
-    least = _least(trajectory, arm)
-    rough = np.maximum(_assumed(trajectory, smooth), least)
+    size = np.sqrt(np.mean(motion.tau**2, axis=0))
+    least = np.maximum(TORQUE_RESOLUTION * np.maximum(size, 1e-2 * size.max()), 1e-12)
+    if trajectory.sensors is not None:
+        least = np.maximum(least, trajectory.sensors.floor(arm))
+    rough = np.maximum(_noise_of_second_differences(trajectory, smooth), least)
     if found is None:
         one, zero = np.ones(motion.n_joints), np.zeros(motion.n_joints)
         return NoiseFloor(rough, None, one, zero, rough)
@@ -225,32 +229,34 @@ def noise_floor(trajectory: Trajectory, arm: ArmModel) -> NoiseFloor:
     return NoiseFloor(sigma, period, structure, slow, rough)
 
 
-def not_repeating(
+def joints_that_do_not_repeat(
     floors: Sequence[NoiseFloor], thresholds: Thresholds, least: FloatArray
 ) -> list[int]:
     """
-    Return the joints whose equal periods differ slowly and materially.
+    Return the indices of joints whose torque differs between two equal periods of the motion.
+
+    The difference is at low frequency and material, such as that of a contact in one period.
 
     Parameters
     ----------
     floors : sequence of NoiseFloor
-        Noise of the recordings.
+        Noise of each trajectory.
     thresholds : Thresholds
         Power ratios (low over high frequency) above which periods do not repeat.
     least : ndarray, shape (n,)
         Smallest material torque of each joint [N m].
 
     """
-    known = [
+    ratios = [
         np.where(floor.slow > least, floor.structure, 1.0)
         for floor in floors
         if floor.period is not None
     ]
-    if not known:
+    if not ratios:
         return []
-    often = np.sum(np.array(known) >= thresholds.one_period, axis=0) >= max(1, len(known) / 2)
-    if len(known) >= 3:
-        mean = np.exp(np.mean(np.log(known), axis=0))
+    often = np.sum(np.array(ratios) >= thresholds.one_period, axis=0) >= max(1, len(ratios) / 2)
+    if len(ratios) >= 3:
+        mean = np.exp(np.mean(np.log(ratios), axis=0))
         often |= mean > thresholds.one_period_on_average
     return np.flatnonzero(often).tolist()
 
@@ -259,10 +265,9 @@ def _difference(
     trajectory: Trajectory, residual: FloatArray, first: npt.NDArray[np.intp], lag: int, joint: int
 ) -> tuple[FloatArray, npt.NDArray[np.bool_]]:
     """
-    Return the difference of two equal periods in one joint, and its informative samples.
+    Return the difference of two equal periods in one joint, and the samples in which it moves.
 
-    A drift of offset or viscous friction over time is regressed out, because it is an effect and
-    no noise.
+    Linear drifts of offset and viscous friction are regressed out, because they are effects.
 
     """
     motion = trajectory.motion
@@ -282,17 +287,17 @@ def _difference(
 def _in_informative_rows(
     trajectory: Trajectory, samples: npt.NDArray[np.intp], joint: int
 ) -> npt.NDArray[np.bool_]:
-    """Return whether the row nearest to each sample is informative for a joint, (K,)."""
+    """Return whether the joint moves in the row nearest to each of K samples, (K,)."""
     rows = trajectory.rows
     nearest = np.searchsorted((rows[1:] + rows[:-1]) / 2, samples)
     return np.asarray(trajectory.informative[nearest, joint])
 
 
-def _assumed(trajectory: Trajectory, smooth: FloatArray) -> FloatArray:
+def _noise_of_second_differences(trajectory: Trajectory, smooth: FloatArray) -> FloatArray:
     """
-    Return an upper limit of the noise, from second differences of rows, shape (n,) [N m].
+    Return an upper limit of the torque noise, from second differences of the residual, (n,) [N m].
 
-    The noise is taken as white in the band of the rows. The torque that a model lacks changes
+    The noise is assumed to be white in the band of the rows. Torque that a model lacks changes
     little from row to row, except for friction at reversals; rows next to reversals are not used.
 
     """
@@ -306,12 +311,3 @@ def _assumed(trajectory: Trajectory, smooth: FloatArray) -> FloatArray:
     return np.asarray(
         _COLOURED_OVER_WHITE * np.sqrt(power / np.mean((2.0 - 2.0 * np.cos(phase)) ** 2))
     )
-
-
-def _least(trajectory: Trajectory, arm: ArmModel) -> FloatArray:
-    """Return the smallest noise that each torque can have, shape (n,) [N m]."""
-    assert trajectory.motion.tau is not None
-    size = np.sqrt(np.mean(trajectory.motion.tau**2, axis=0))
-    least = np.maximum(TORQUE_RESOLUTION * np.maximum(size, 1e-2 * size.max()), 1e-12)
-    sensors = trajectory.sensors
-    return np.asarray(least if sensors is None else np.maximum(least, sensors.floor(arm)))

@@ -1,10 +1,10 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Recordings as rows: measured torques and model columns with the same filter and decimation.
+Measured torques and model columns of a recording, with the same filter and decimation.
 
-A trajectory is one unbroken stretch of a recording. Columns are computed at the higher rate of its
-motion; torques and columns are compared in decimated rows.
+A trajectory is one part of a recording without missing samples. Columns are computed at the sample
+rate of its motion, and filtered and decimated to matrix rows like the measured torques.
 
 """
 
@@ -40,34 +40,34 @@ _REST_SPEED, REST_TIME = 0.02, 0.2
 #: The sign of a velocity, and with it dry friction, is uncertain below this share of the top
 #: speed, or this number of standard deviations of its noise.
 _REVERSAL_SPEED, _REVERSAL_NOISE = 0.004, 3.0
-#: Smallest limit of the share of an informative row with an uncertain sign of velocity; the three
-#: rows next to a reversal exceed it.
+#: Smallest limit of the share of a row with an uncertain sign of velocity, if the row is used; the
+#: three rows next to a reversal exceed it.
 MAX_UNCERTAIN_SHARE = 0.003
 
 
 @dataclass(frozen=True)
 class Trajectory:
     """
-    One unbroken stretch of a recording.
+    One part of a recording without missing samples, filtered and decimated to matrix rows.
 
     Attributes
     ----------
     source : str
-        The recording.
+        Name of the recording.
     fold : int
-        Number of the recording; `fold_rows` divides each recording into folds.
+        Number of the recording.
     motion : Motion
         Filtered motion with the measured torque, N samples.
     used : Conditioning
-        Filter and decimation from the motion to rows.
+        Filter and decimation from samples to rows.
     rows : ndarray of int, shape (M,)
-        Samples of the motion at which the rows are.
+        Index of the sample at the centre of each row.
     unsure : ndarray, shape (M, n)
         Share of each row in which the sign of the velocity is uncertain; infinite at rest.
     allowed : ndarray, shape (n,)
-        The largest such share of an informative row.
+        Largest such share of a row that is used (informative).
     sensors : SensorNoise or None
-        Effect of sensor noise on an arm tied to another machine; None for an arm alone.
+        Sensor noise of an arm that is tied to another machine; None for a single arm.
 
     """
 
@@ -82,7 +82,7 @@ class Trajectory:
 
     @cached_property
     def informative(self) -> npt.NDArray[np.bool_]:
-        """Return a mask: False where a joint rests or reverses with unknown friction, (M, n)."""
+        """Return False for rows in which a joint rests or reverses, otherwise True, (M, n)."""
         return np.asarray(self.unsure <= self.allowed)
 
     def reduce(self, values: FloatArray) -> FloatArray:
@@ -96,27 +96,27 @@ class Trajectory:
 
     @property
     def stretch(self) -> Stretch:
-        """Return the rows in the form that the data checks need."""
+        """Return motion and torque at the rows, for the checks of the data."""
         return Stretch(self.source, self.at_rows.with_torque(self.torque), self.informative)
 
     @cached_property
     def period(self) -> tuple[int, slice] | None:
-        """Return the repeated period of the motion; see `find_period`."""
+        """Return the lag of the repeated period and its samples, or None; see `find_period`."""
         return find_period(self.motion.t, self.motion.q)
 
     @property
     def torque(self) -> FloatArray:
-        """Measured torque in rows, shape (M, n) [N m]."""
+        """Filtered measured torque in the rows, shape (M, n) [N m]."""
         assert self.motion.tau is not None
         return self.reduce(self.motion.tau)
 
     def residual(self, arm: ArmModel) -> FloatArray:
-        """Return measured torque minus torque of a model, in rows, shape (M, n) [N m]."""
+        """Return measured torque minus the torque of a model in the rows, (M, n) [N m]."""
         assert self.motion.tau is not None
         return self.reduce(self.motion.tau - arm.torque(self.motion))
 
     def columns(self, arm: ArmModel, effect: Effect) -> FloatArray:
-        """Return the columns of one effect of an arm in the rows of the trajectory, (M, n, P)."""
+        """Return torque per unit of each of P values of an effect, in the rows, (M, n, P)."""
         if effect.smooth:
             return arm.columns_of(effect, self.at_rows)
         return self.reduce(arm.columns_of(effect, self.motion))
@@ -125,16 +125,16 @@ class Trajectory:
         self, arm: ArmModel, effects: Sequence[Effect], chosen: npt.NDArray[np.intp]
     ) -> FloatArray:
         """
-        Return columns of some rigid parameters and of effects in the rows, shape (M, n, r).
+        Return the regressor of chosen rigid parameters and effect values in the rows, (M, n, r).
 
         Parameters
         ----------
         arm : ArmModel
-            Arm whose columns are computed.
+            The model.
         effects : sequence of Effect
-            Effects whose parameters come after the rigid ones.
+            Effects whose values come after the rigid parameters.
         chosen : ndarray of int, shape (r,)
-            The parameters.
+            Indices of the chosen parameters.
 
         """
         rigid = len(arm.robot.rigid_parameters)
@@ -151,7 +151,7 @@ class Trajectory:
 
     @property
     def t(self) -> FloatArray:
-        """Time of the rows [s]."""
+        """Time of each row, shape (M,) [s]."""
         return self.motion.t[self.rows]
 
 
@@ -162,16 +162,23 @@ def trajectories(
     allowed: FloatArray | None = None,
 ) -> list[Trajectory]:
     """
-    Cut recordings into unbroken stretches with the same filters.
+    Filter recordings, and divide them where samples are missing.
 
-    The largest uncertain share of an informative row is `allowed`, (n,); see `Trajectory`.
-
-    If another machine was recorded with the arm, the effect of its sensor noise is included.
+    Parameters
+    ----------
+    recordings : sequence of Recording
+        The recordings; `fold` of a trajectory is the index of its recording.
+    used : Conditioning
+        Filters and decimation.
+    arm : ArmModel, optional
+        Model for the sensor noise of another machine that was recorded with the arm.
+    allowed : ndarray, shape (n,), optional
+        See `Trajectory`.
 
     Raises
     ------
     IdentificationError
-        If a recording has no stretch that is long enough.
+        If a recording has no part that is long enough for the filters.
 
     """
     result = []
@@ -196,7 +203,7 @@ def trajectories(
 
 def thinnable(used: Conditioning) -> Conditioning:
     """
-    Reduce the decimation of rows so that it is a multiple of the decimation of columns.
+    Reduce the decimation of rows to a multiple of the decimation of columns.
 
     Each row then spans a whole number of column samples; rows increase by at most an eighth.
 
@@ -207,10 +214,9 @@ def thinnable(used: Conditioning) -> Conditioning:
 
 def _widest(used: Conditioning) -> int:
     """
-    Return the largest decimation that a motion permits before its columns are computed.
+    Return the largest decimation of samples that keeps the rate above four times the cut-off.
 
-    Columns contain squares of velocities, whose band is twice the cut-off: the rate has to be four
-    times the cut-off.
+    Columns contain squares of velocities, whose band is twice the cut-off.
 
     """
     fast_enough = int(used.rate_hz / (4.0 * used.cutoff_hz))
@@ -219,7 +225,7 @@ def _widest(used: Conditioning) -> int:
 
 
 def _thinned(motion: Motion, used: Conditioning) -> tuple[Motion, Conditioning]:
-    """Decimate a motion to the rate of its columns; return it and the decimation to rows."""
+    """Return a motion at the sample rate of its columns, and the decimation from it to rows."""
     thin = max(d for d in range(1, _widest(used) + 1) if used.decimation % d == 0)
     if thin == 1:
         return motion, used
@@ -231,7 +237,7 @@ def _thinned(motion: Motion, used: Conditioning) -> tuple[Motion, Conditioning]:
 
 
 def _uncertain_share(motion: Motion, used: Conditioning, slowest: FloatArray) -> FloatArray:
-    """Return which share of a sample has an uncertain sign of velocity, inf at rest, (N, n)."""
+    """Return the share of uncertain velocity signs around each sample, inf at rest, (N, n)."""
     speed = np.abs(motion.dq)
     slow = speed < np.maximum(_REVERSAL_SPEED * speed.max(axis=0), slowest)
     slow[1:] |= np.diff(np.sign(motion.dq), axis=0) != 0
@@ -250,7 +256,7 @@ def _uncertain_share(motion: Motion, used: Conditioning, slowest: FloatArray) ->
 def block_rows(
     data: Sequence[Trajectory],
 ) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]:
-    """Return the block to which every row belongs, and the fold to which every block belongs."""
+    """Return the time block of each row, (R,), and the recording of each time block, (B,)."""
     fold = fold_rows(data)
     block = np.empty(len(fold), dtype=np.intp)
     owner: list[int] = []
@@ -265,7 +271,7 @@ def block_rows(
 
 
 def row_weights(data: Sequence[Trajectory], sigma: Sequence[FloatArray]) -> FloatArray:
-    """Return 1 / sigma of all rows, zero where uninformative, (R, n) [1/(N m)]."""
+    """Return 1 / sigma in the rows in which a joint moves, else zero, (R, n) [1/(N m)]."""
     return np.concatenate([part.informative / s for part, s in zip(data, sigma, strict=True)])
 
 
@@ -274,8 +280,8 @@ def count_recordings(data: Sequence[Trajectory]) -> int:
     return len({part.fold for part in data})
 
 
-def not_shown(data: Sequence[Trajectory], joints: Sequence[str]) -> tuple[str, ...]:
-    """Return the joints that the data do not check: at rest, or without informative rows."""
+def unchecked_joints(data: Sequence[Trajectory], joints: Sequence[str]) -> tuple[str, ...]:
+    """Return the joints that rest in all trajectories, or reverse in every row."""
     if not data:
         return ()
     shown = moving(part.motion for part in data)
@@ -285,10 +291,10 @@ def not_shown(data: Sequence[Trajectory], joints: Sequence[str]) -> tuple[str, .
 
 def fold_rows(data: Sequence[Trajectory]) -> npt.NDArray[np.intp]:
     """
-    Return the number of the fold of every row; a fold is a stretch of one recording.
+    Return the number of the cross-validation fold of each row, shape (R,).
 
-    All data have six folds or more. Each recording has two or more, so an effect in a single fast
-    recording is fitted to one half of it and predicted in the other.
+    A fold is a stretch of time of one recording. There are at least six folds, and two in each
+    recording: an effect in a single fast recording is fitted to one half and predicts the other.
 
     """
     pieces = max(2, -(-6 // max(count_recordings(data), 1)))

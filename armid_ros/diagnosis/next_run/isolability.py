@@ -1,10 +1,11 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Isolability: effects that a planned motion makes detectable, and distinguishable.
+Isolability: the effects that a planned motion makes detectable, and distinguishable.
 
-The model of the arm is taken as exact. Columns of effects are divided by the noise; two effects
-are distinguishable if the angle between their columns is large (Basseville and Nikiforov 1993).
+The model of the arm is assumed to be exact. Columns of effects are divided by the noise; two
+effects are distinguishable if the angle between their columns is large (Basseville and Nikiforov
+1993).
 
 """
 
@@ -23,22 +24,22 @@ from armid_ros.motion import FloatArray, Motion
 import numpy as np
 import numpy.typing as npt
 
-#: Smallest share of an effect's torque that a distinguishable effect cannot reproduce. The
-#: difference is then detectable if the effect has ten times its detectable size.
+#: Two effects are distinguishable if at least this share of the torque of one cannot be reproduced
+#: by the other. The difference is then detectable at ten times the detectable size.
 DISTINCT = 0.1
 
 
 @dataclass(frozen=True)
 class Isolability:
     """
-    Smallest effects that a motion makes detectable, and how well it distinguishes them.
+    Smallest detectable size of E effects in a planned motion, and how well it separates them.
 
     Attributes
     ----------
     effects : tuple of Detectable
-        Every effect of the catalogue in every place.
+        Each effect of the catalogue, on each joint, pair or the whole arm.
     apart : ndarray, shape (E, E)
-        Share of the torque (rms) of the first effect that the second cannot reproduce, 0 to 1.
+        Share of the rms torque of the first effect that the second cannot reproduce, 0 to 1.
 
     """
 
@@ -47,11 +48,11 @@ class Isolability:
 
     @property
     def seen(self) -> npt.NDArray[np.bool_]:
-        """Whether the motion makes each effect visible at a possible size, shape (E,)."""
+        """Whether the motion makes each effect detectable at a possible size, shape (E,)."""
         return np.array([np.isfinite(one.size) for one in self.effects])
 
     def rivals(self, k: int) -> list[Detectable]:
-        """Return the visible effects that resemble this one too much, most similar first."""
+        """Return the detectable effects that resemble effect k too much, most similar first."""
         order = np.argsort(self.apart[k])
         near = [j for j in order if j != k and self.seen[j] and self.apart[k, j] < DISTINCT]
         return [self.effects[j] for j in near]
@@ -63,7 +64,7 @@ class Isolability:
         total = len({one.name for one in self.effects})
         return (
             f'{len(kinds)} of {total} effects are detectable, {alone} of them distinguishable '
-            'from all others wherever they act'
+            'from all other effects on any joint'
         )
 
     def document(self) -> list[dict[str, Any]]:
@@ -83,7 +84,7 @@ class Isolability:
         ]
 
     def of_kinds(self) -> tuple[tuple[str, ...], FloatArray]:
-        """Return visible effects by name, and the smallest `apart` of two names, (K, K)."""
+        """Return the names of detectable effects, and the smallest `apart` of each two, (K, K)."""
         names = [one.name for one in self.effects]
         kinds = tuple(dict.fromkeys(np.array(names)[self.seen].tolist()))
         places = [np.flatnonzero(self.seen & (np.array(names) == kind)) for kind in kinds]
@@ -126,7 +127,7 @@ def isolability(arm: ArmModel, motion: Motion, noise: FloatArray, samples: float
 
 
 def _detectable(effect: Effect, columns: FloatArray, arm: ArmModel) -> Detectable:
-    """Return the smallest detectable size of the first visible parameter of an effect."""
+    """Return the smallest detectable size of the first detectable parameter of an effect."""
     for k, parameter in enumerate(effect.parameters(arm.robot)):
         others = basis_of(np.delete(columns, k, axis=1))
         own = columns[:, k] - others @ (others.T @ columns[:, k])

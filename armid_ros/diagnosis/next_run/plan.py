@@ -1,11 +1,11 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-The next run: the motion that best separates named effects from rivals.
+Planning of the next run: the motion that best separates named effects from their rivals.
 
-T-optimality (Atkinson and Fedorov 1975): the value of a motion is the squared torque of the named
-effect, over the unit of the gap, that the rival, fitted jointly with the nuisance parameters,
-cannot explain.
+The criterion is T-optimality (Atkinson and Fedorov 1975): the sum of squared torques of the named
+effect, over the floor of the gap, that the rival cannot reproduce. The rival and the nuisance
+parameters are fitted to this torque.
 
 The motions are slow and fast motion of all joints, motion of single joints, reversals so small
 that dry friction does not break away, and shaking. Each motion is also tried with a known
@@ -46,7 +46,7 @@ _SUFFICIENT_Z = 5.0
 @dataclass(frozen=True)
 class NextRun:
     """
-    The motion that the user should run next.
+    Planned motion that separates named effects from their rivals.
 
     Attributes
     ----------
@@ -57,7 +57,7 @@ class NextRun:
     load : Load or None
         Load to fix to the last link in a second run of the same motion; None if one run suffices.
     separations : tuple of Separation
-        Separation of each pair of names.
+        Predicted separation of each pair of effects.
 
     """
 
@@ -68,12 +68,12 @@ class NextRun:
 
     @property
     def expected_z(self) -> float:
-        """Return the z-score of the least separated pair."""
+        """Return the smallest z-score of all pairs of effects."""
         return min(pair.z for pair in self.separations)
 
     @property
     def sentence(self) -> str:
-        """Describe the run and the pairs that it separates, the least separated pair first."""
+        """Describe the motion and the pairs of effects that it separates, in one sentence."""
         separated = sorted((s for s in self.separations if s.distinct), key=lambda one: one.z)
         most = 3  # pairs in a sentence
         parts = []
@@ -81,7 +81,7 @@ class NextRun:
             times = f'{one.z:.0f}' if one.z < 30.0 else 'more than 30'
             parts.append(f'{one.name} from {one.rival} by {times} standard deviations')
         if len(separated) > most:
-            parts.append(f'{len(separated) - most} more pairs of names by more')
+            parts.append(f'{len(separated) - most} more pairs of effects by more')
         again = ''
         if self.load is not None:
             again = f', then again with {self.load.mass:g} kg fixed to {self.load.frame}'
@@ -107,7 +107,7 @@ class NextRun:
 
 
 class _Candidate(NamedTuple):
-    """A motion that may be run, a load for a second run, and its separation of pairs of names."""
+    """A possible motion, the load of its second run, and the separation of pairs of effects."""
 
     template: Template
     trajectory: FourierTrajectory
@@ -122,7 +122,7 @@ def next_run(
     collision: CollisionModel | None = None,
 ) -> NextRun | None:
     """
-    Choose a motion that separates named effects from their rivals.
+    Plan a motion that separates named effects from their rivals.
 
     Parameters
     ----------
@@ -131,17 +131,17 @@ def next_run(
     rng : numpy.random.Generator
         Draws the motions.
     collision : CollisionModel, optional
-        Bodies to keep apart; those of the description by default.
+        Bodies that must not collide; those of the description by default.
 
     Returns
     -------
     NextRun or None
-        None if no name is in doubt, or the arm is tied to a machine whose motion is not planned.
+        None if no effect has a rival, or the arm is tied to another machine.
 
     Raises
     ------
     TrajectoryError
-        If the arm cannot make any of the motions, or none separates any names; gives the reason.
+        If the arm cannot make any of the motions, or none separates any pair of effects.
 
     """
     pairs = _pairs(diagnosis)
@@ -181,14 +181,15 @@ def next_run(
             refused.append(str(error))
             continue
         return NextRun(excitation, kind.name, load, separations)
-    raise TrajectoryError(f'no motion for the next run was found: {refused[-1]}')
+    reason = refused[-1]
+    raise TrajectoryError(f'no motion for the next run was found: {reason}')
 
 
 def _in_order(candidates: Sequence[_Candidate]) -> list[_Candidate]:
     """
-    Sort motions by the sum of log(1 + D_T) over pairs, the best first.
+    Sort motions by the sum of log(1 + z^2) over pairs of effects, the best first.
 
-    Motions with a payload come last if a motion without one separates all pairs sufficiently.
+    Motions with a payload come last if a motion without payload separates all pairs sufficiently.
 
     """
     z = np.array([[pair.z for pair in one.separations] for one in candidates])
@@ -201,7 +202,7 @@ def _in_order(candidates: Sequence[_Candidate]) -> list[_Candidate]:
 
 
 def _pairs(diagnosis: Diagnosis) -> list[tuple[Effect, Effect]]:
-    """Return the pairs of a named effect and a rival, one for each pair of names."""
+    """Return each pair of a named effect and a rival, once for two names."""
     explanation = diagnosis.explanation
     if explanation is None:
         return []

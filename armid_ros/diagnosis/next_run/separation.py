@@ -1,12 +1,12 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-The separation of a named effect from a rival by a motion.
+Predicted separation of a named effect from a rival by a motion, as a z-score.
 
-    D_T = min over the rival's values of |f_A - f_B|^2 / sigma^2
+    z^2 = min over the rival's values of |f_A - f_B|^2 / sigma^2
 
-with f_A the torque of the patched model and f_B that of the model with the rival, fitted jointly
-with the nuisance parameters. The square root is the number of standard deviations between the two.
+where f_A is the torque of the patched model, and f_B that of the model with the rival, fitted
+jointly with the nuisance parameters.
 
 """
 
@@ -33,14 +33,14 @@ _MAX_TORQUE_SHARE = 0.15
 @dataclass(frozen=True)
 class Load:
     """
-    Known mass for a second run of the same motion.
+    Known mass that is fixed to the last link for a second run of the same motion.
 
     Attributes
     ----------
     mass : float
         Mass of the load [kg].
     frame : str
-        Frame of the last link that is farthest from the last joint; the load is fixed there.
+        Frame at which it is fixed: that of the last link farthest from the last joint.
 
     """
 
@@ -49,7 +49,7 @@ class Load:
 
     @staticmethod
     def along(arm: ArmModel, trajectory: FourierTrajectory) -> Load:
-        """Return a load whose torque the drives of all joints can bear in a motion."""
+        """Return the largest load, to one digit, that the drives can bear in a motion."""
         robot = arm.robot
         motion = trajectory.one_period(int(trajectory.period * _RATE))
         last = robot.model.getJointId(robot.tip)
@@ -64,20 +64,20 @@ class Load:
         return Load(float(np.floor(mass / digit) * digit), str(frame))
 
     def on(self, arm: ArmModel) -> ArmModel:
-        """Return the arm with the load."""
+        """Return the arm whose last link carries the load."""
         parameters = arm.robot.rigid_parameters.copy()
         parameters[_of_last_link(arm.robot)] += self.mass * _point_mass(arm.robot, self.frame)
         return replace(arm, robot=arm.robot.with_inertias(parameters))
 
 
 def _of_last_link(robot: Robot) -> slice:
-    """Return the indices of the rigid parameters of the last link."""
+    """Return the slice of the rigid parameters of the last link."""
     last = robot.moving.index(robot.tip)
     return slice(10 * last, 10 * last + 10)
 
 
 def _point_mass(robot: Robot, frame: str) -> FloatArray:
-    """Return the parameters of 1 kg at a frame, or at the centre of mass if it is at the joint."""
+    """Return the inertial parameters of 1 kg at a frame of the last link, shape (10,)."""
     place = robot.model.frames[robot.model.getFrameId(frame)].placement.translation
     if np.linalg.norm(place) < 0.01:  # m: no lever arm
         place = robot.model.inertias[robot.model.getJointId(robot.tip)].lever
@@ -94,7 +94,7 @@ class Separation:
     name, rival : str
         Names of the two effects.
     z : float
-        z-score of their difference, the square root of D_T.
+        z-score of the difference of their torques.
 
     """
 
@@ -104,7 +104,7 @@ class Separation:
 
     @property
     def distinct(self) -> bool:
-        """Whether the run separates the two effects, by at least one standard deviation."""
+        """Whether the motion separates the two effects by at least one standard deviation."""
         return self.z >= 1.0
 
 
@@ -116,12 +116,12 @@ def separation(
     load: Load | None = None,
 ) -> Separation:
     """
-    Predict the separation of a named effect from a rival by a run.
+    Predict the separation of a named effect from a rival by a motion.
 
     Parameters
     ----------
     diagnosis : Diagnosis
-        Diagnosis with the arm, its nuisance parameters, and the unit of its gap.
+        Diagnosis with the patched arm, its nuisance parameters, and the floor of the gap.
     named, rival : Effect
         The two effects.
     trajectory : FourierTrajectory
@@ -157,7 +157,7 @@ def separation(
 
 def informative_weight(motion: Motion, rows: float, sigma: FloatArray) -> FloatArray:
     """
-    Return sqrt(rows per sample) / sigma where a joint moves, and zero elsewhere, (N, n).
+    Return the weight of each sample: sqrt(rows) / sigma where a joint moves, else zero, (N, n).
 
     The noise is white over rows: a higher rate of samples adds no information. Below 2 % of its
     top speed a joint is not informative, as its dry friction is arbitrary.
@@ -170,7 +170,7 @@ def informative_weight(motion: Motion, rows: float, sigma: FloatArray) -> FloatA
 def _nuisance_columns(
     diagnosis: Diagnosis, arm: ArmModel, named: Effect, motion: Motion
 ) -> FloatArray:
-    """Return the columns that are fitted with either of two effects, shape (N, n, f)."""
+    """Return the columns of the nuisance parameters in a motion, shape (N, n, f)."""
     assert diagnosis.explanation is not None
     given = diagnosis.explanation.given
     known = zip(given.effects, given.values, strict=True)
@@ -184,7 +184,7 @@ def _nuisance_columns(
 
 
 def basis_of(columns: FloatArray) -> FloatArray:
-    """Return an orthonormal basis of columns (R, p), which are scaled to equal length first."""
+    """Return an orthonormal basis of the span of columns (R, p), without rounding errors."""
     length = np.linalg.norm(columns, axis=0)
     columns = columns[:, length > 0.0] / length[length > 0.0]
     if not columns.shape[1]:

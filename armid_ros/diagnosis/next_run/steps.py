@@ -1,11 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""
-Next steps after a diagnosis: inspect the robot, then record motion that separates rivals.
-
-An experiment is advised only for effects that the planned run does not separate.
-
-"""
+"""Advice to the user after a diagnosis: parts to inspect, and motions to record."""
 
 from __future__ import annotations
 
@@ -19,7 +14,7 @@ from armid_ros.effects import CATALOGUE
 from armid_ros.estimate import name_in_words
 from armid_ros.identification.fitting.identifiability import excludes_zero, HALF_WIDTH
 
-#: Location of the patched model, for the report.
+#: Location of the patched model, in words.
 MODEL = 'model.yaml in the folder of this diagnosis'
 
 
@@ -32,7 +27,7 @@ def next_steps(
     learned: bool = False,
 ) -> list[str]:
     """
-    Return sentences on the next steps of the user, in order.
+    Return sentences that advise the user what to inspect, record or run next, in order.
 
     Parameters
     ----------
@@ -41,7 +36,7 @@ def next_steps(
     run : NextRun or None
         The planned run.
     no_run : str
-        Reason why no run was planned, if one was requested.
+        Reason why no run was planned; empty if none was requested.
     model : str
         Location of the patched model, in words.
     worse : sequence of str
@@ -51,7 +46,7 @@ def next_steps(
 
     """
     findings, verdict = diagnosis.findings, diagnosis.verdict
-    looks = [text for finding in findings for text in _looks(finding, diagnosis)]
+    looks = [text for finding in findings for text in _inspections(finding, diagnosis)]
     steps = list(dict.fromkeys(looks))
     if steps and verdict != 'ambiguous':
         head, _, what = steps[0].rpartition(':')
@@ -82,7 +77,9 @@ def next_steps(
     steps += _use_of_model(diagnosis, model, worse)
     if diagnosis.not_visible:
         hidden = ', '.join(name_in_words(name) for name in diagnosis.not_visible)
-        steps.append(f'These data cannot show: {hidden}. Other motions, or known values, can.')
+        steps.append(
+            f'These data cannot show {hidden}. Record other motions, or give their known values.'
+        )
     return steps
 
 
@@ -104,8 +101,8 @@ def _use_of_model(diagnosis: Diagnosis, model: str, worse: Sequence[str]) -> lis
     return [f'Use {model}, {which}, for simulation and control; keep these bags as a baseline.']
 
 
-def _looks(finding: Finding, diagnosis: Diagnosis) -> list[str]:
-    """Return sentences on the parts of a robot to inspect, for a cause and for its rivals."""
+def _inspections(finding: Finding, diagnosis: Diagnosis) -> list[str]:
+    """Return sentences on the parts of the robot to inspect for a finding and its rivals."""
     steps = []
     own = Rival(finding.name, finding.joints)
     for one in (own, *finding.other_causes):
@@ -123,7 +120,7 @@ def _looks(finding: Finding, diagnosis: Diagnosis) -> list[str]:
 
 
 def _centre(finding: Finding) -> str:
-    """Describe the centre of mass of a load; empty where the data do not determine it."""
+    """Return a sentence with the centre of mass of a load; empty if it is not determined."""
     rows = list(zip(finding.parameters, finding.values, finding.std, strict=True))
     mass = [row for row in rows if row[0].unit == 'kg']
     moments = [row for row in rows if row[0].unit == 'kg m']
@@ -138,10 +135,10 @@ def _centre(finding: Finding) -> str:
 
 def _look_at(name: str, diagnosis: Diagnosis) -> str:
     """
-    Return the part of the robot to inspect for an effect of the catalogue or of a plug-in.
+    Return the part of the robot to inspect for an effect, in words.
 
-    The text is empty for a usual effect that the given model lacks: missing friction of a model
-    is no fault of the robot.
+    It is empty for a usual effect that the given model lacks, such as friction: that is no fault
+    of the robot.
 
     """
     if name not in CATALOGUE:

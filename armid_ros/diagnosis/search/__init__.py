@@ -1,3 +1,3 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Search for the causes of a gap: comparison of all candidates, with priors and rivals."""
+"""Bayesian selection of the effects that cause a residual, and the fit of their values."""

@@ -1,10 +1,10 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-All candidate causes: each effect of the catalogue, per joint, pair or whole arm.
+Generation of the candidate causes: each effect of the catalogue, per joint, pair or whole arm.
 
-An effect with shape parameters is a family of causes on a grid; the best cause is refined later.
-The columns of an effect are computed for all joints at once and divided among its causes.
+An effect with shapes gives one cause per point of a grid of shapes; the shape of the best cause is
+optimised later. The columns of an effect are computed for all joints at once.
 
 """
 
@@ -21,9 +21,9 @@ from types import MappingProxyType
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.data.trajectory import Trajectory
 from armid_ros.diagnosis.search.cause import Cause
+from armid_ros.diagnosis.search.hyperparameters import NuisancePosterior
 from armid_ros.diagnosis.search.nuisance import Nuisance
-from armid_ros.diagnosis.search.odds import CauseInformation, posteriors
-from armid_ros.diagnosis.search.setting import Marginal
+from armid_ros.diagnosis.search.odds import cause_fits, CauseInformation
 from armid_ros.diagnosis.settings import HOW_OFTEN, log_prior
 from armid_ros.effects import Effect, Shape
 from armid_ros.effects.base import Unexplained
@@ -46,20 +46,20 @@ _BODY_SIZES = np.array([1.0, *3 * [0.1], *6 * [0.01]])
 @dataclass(frozen=True)
 class Causes:
     """
-    The causes that a diagnosis may name, with their columns.
+    Candidate causes of a diagnosis, with their regression columns.
 
     Attributes
     ----------
     kinds : tuple of type of Effect
         Classes of effects that may be named.
     nuisance : Nuisance
-        Data and nuisance columns, without accepted causes.
+        Regression problem without accepted causes.
     changed : bool
         Whether causes are changes since a baseline, and not permanent errors of the model.
     fitted : frozenset of (str, tuple of str)
-        Names and joints of the effects among the nuisance parameters.
+        Names and joints of the effects that are nuisance parameters.
     prior : mapping of str to str
-        Frequency of effects, chosen by the user; see `HOW_OFTEN`.
+        Frequency of effects by name, chosen by the user; see `HOW_OFTEN`.
     reference : mapping of str to float
         Reference temperatures of the joints [degC].
 
@@ -75,18 +75,18 @@ class Causes:
         default_factory=dict, compare=False
     )
 
-    def causes(self, nuisance: Nuisance, under: Marginal) -> list[Cause]:
-        """Return the causes that are not accepted yet, one for each starting shape."""
+    def causes(self, nuisance: Nuisance, posterior: NuisancePosterior) -> list[Cause]:
+        """Return all causes that are not accepted, one for each starting shape."""
         arm, result, families = nuisance.arm, list[Cause](), list[Cause]()
         there = [one.effect for one in nuisance.accepted]
         taken = {(one.name, place) for one in there for place in (one.joints, *zip(one.joints))}
         bodies = {one.adds_to(arm.robot) for one in there} - {()}
-        unexplained = _unexplained(nuisance, under)
+        unexplained = _unexplained(nuisance, posterior)
         for whole, members in candidate_effects(arm.robot, self.kinds, self.reference):
-            for effect, singles in shaped(whole, members, arm, unexplained):
+            for effect, singles in with_starting_shapes(whole, members, arm, unexplained):
                 singly = [
                     cause
-                    for cause in self._divided(effect, singles)
+                    for cause in self._single_causes(effect, singles)
                     if (cause.effect.name, cause.effect.joints) not in taken | self.fitted
                     and cause.effect.adds_to(arm.robot) not in bodies
                 ]
@@ -95,16 +95,16 @@ class Causes:
                 # (Bittencourt and Gunnarsson 2012).
                 common = effect.traits.usual or effect.lasting
                 if effect.traits.friction and common and len(singly) > 1:
-                    families += self._family(singly, nuisance, under)
+                    families += self._family(singly, nuisance, posterior)
         counts = Counter(cause.key for cause in result)
         result = [replace(cause, shapes=counts[cause.key]) for cause in result]
         return [*result, *families]
 
     def _family(
-        self, singles: Sequence[Cause], nuisance: Nuisance, under: Marginal
+        self, singles: Sequence[Cause], nuisance: Nuisance, posterior: NuisancePosterior
     ) -> Iterator[Cause]:
         """
-        Yield a friction law on the joints that maximise its evidence, if at least two.
+        Yield a friction law on the set of two or more joints that maximises its Bayes factor.
 
         Values of joints are independent, with one prior; all numbers of joints are equally likely.
 
@@ -112,14 +112,14 @@ class Causes:
         first, count = singles[0].effect, len(singles)
         size = len(first.quantities)
         whole = replace(first, joints=tuple(one.effect.joints[0] for one in singles))
-        (every,) = self._divided(whole, [whole])
-        known = CauseInformation.of([every], nuisance, under, by_day=True)
+        (every,) = self._single_causes(whole, [whole])
+        known = CauseInformation.of([every], nuisance, posterior, by_day=True)
 
         def among(members: tuple[int, ...]) -> tuple[float, Cause]:
             values = np.add.outer(size * np.array(members), np.arange(size)).ravel()
             effect = replace(first, joints=tuple(whole.joints[k] for k in members))
             cause = every.among(effect, values, comb(count, len(members)))
-            (fit,) = posteriors([cause], nuisance, known.among(values))
+            (fit,) = cause_fits([cause], nuisance, known.among(values))
             return fit.factor + cause.prior, cause
 
         chosen = tuple(range(count))
@@ -135,12 +135,12 @@ class Causes:
 
     @property
     def effects(self) -> Iterator[Effect]:
-        """Yield every candidate effect."""
+        """Yield the effects of all candidate causes, on each joint, pair or the whole arm."""
         for _, members in candidate_effects(self.nuisance.arm.robot, self.kinds):
             yield from (one for one in members if (one.name, one.joints) not in self.fitted)
 
-    def _divided(self, effect: Effect, singles: Sequence[Effect]) -> Iterator[Cause]:
-        """Yield a cause for each single effect; columns of all effects are computed at once."""
+    def _single_causes(self, effect: Effect, singles: Sequence[Effect]) -> Iterator[Cause]:
+        """Yield a cause for each effect of `singles`; `effect` is the same law on all joints."""
         robot, start = self.nuisance.arm.robot, 0
         places: list[tuple[Effect, tuple[int, ...], list[int]]] = []
         for one in singles:
@@ -155,44 +155,49 @@ class Causes:
             except ModelError:
                 return
             for key, (one, kept, span) in zip(keys, places, strict=True):
-                self._known[key] = self.made(one, kept, [x[:, :, span] for x in columns])
+                self._known[key] = self.candidate_cause(
+                    one, kept, [x[:, :, span] for x in columns]
+                )
         yield from filter(None, (self._known[key] for key in keys))
 
     @cached_property
     def _predicted(self) -> list[Trajectory]:
-        """Return the trajectories with the torque of the model in place of the measured one."""
+        """Return the trajectories with the model's torque in place of the measured torque."""
         arm = self.nuisance.arm
         return [without_measurement(part, arm) for part in self.nuisance.rows.data]
 
     def _columns(self, effect: Effect) -> list[FloatArray]:
-        """Return the columns of an effect in each trajectory, (M, n, p)."""
+        """Return the regression columns of an effect in each trajectory, (M, n, p)."""
         return [part.columns(self.nuisance.arm, effect) for part in self._predicted]
 
     def reshaped(self, cause: Cause, shape: FloatArray) -> Cause | None:
-        """Return a cause with another shape; None if the shape is impossible or has no torque."""
+        """Return the cause with another shape, or None if that is impossible or has no torque."""
         try:
             effect = cause.effect.with_shape(shape)
             columns = self._columns(effect)
         except ModelError:
             return None
-        other = self.made(effect, cause.kept, [x[:, :, list(cause.kept)] for x in columns])
+        other = self.candidate_cause(
+            effect, cause.kept, [x[:, :, list(cause.kept)] for x in columns]
+        )
         if other is None or other.kept != cause.kept:
             return None
         return replace(other, shapes=cause.shapes)
 
-    def made(
+    def candidate_cause(
         self, effect: Effect, kept: tuple[int, ...], columns: Sequence[FloatArray]
     ) -> Cause | None:
         """
-        Make a cause from its columns (M, n, p).
+        Return the cause with given columns (M, n, p), or None if they are zero.
 
-        None if all are zero on the diagnosed day, or if an effect that rests never does.
+        Columns are zero in diagnosed recordings without any torque of the effect. None as well for
+        a strap that is taut in all samples: it equals a spring.
 
         """
         rows, robot = self.nuisance.rows, self.nuisance.arm.robot
-        torque = rows.rms_today(columns)
+        torque = rows.rms_of_diagnosed(columns)
         seen = torque.any(axis=0)
-        resting = [~columns[k].any(axis=(1, 2)) for k in rows.today_parts]
+        resting = [~columns[k].any(axis=(1, 2)) for k in rows.diagnosed_parts]
         taut = float(np.mean(np.concatenate(resting))) < _MIN_SHARE_AT_REST
         if not seen.any() or (effect.traits.rests and taut):
             return None
@@ -212,9 +217,10 @@ def value_unit(
     nuisance: Nuisance, effect: Effect, kept: Sequence[int], torque: FloatArray
 ) -> FloatArray:
     """
-    Return values whose torque equals that of the joint, limited to plausible values, (p,).
+    Return the scale of each value of an effect, at which its torque equals the joint torque, (p,).
 
-    The torque per unit is the root mean square on the diagnosed day, (n, p) [N m].
+    A scale is at most the largest plausible value. The torque per unit value is the root mean
+    square in the diagnosed recordings, (n, p) [N m].
 
     """
     rows, robot = nuisance.rows, nuisance.arm.robot
@@ -239,24 +245,24 @@ def cause_of(
     torque: FloatArray | None = None,
 ) -> Cause:
     """
-    Return a cause with the products of its columns and the nuisance columns.
+    Weight the columns of an effect, and compute their inner products with the nuisance columns.
 
     Parameters
     ----------
     nuisance : Nuisance
-        The data.
+        Regression problem with rows and nuisance columns.
     effect : Effect
         The effect, with its joints and shape.
     kept : tuple of int
-        Its parameters that are fitted.
+        Indices of its parameters that are fitted.
     columns : sequence of ndarray, each (M, n, p)
         Columns in each trajectory.
     unit : ndarray, shape (p,)
-        Unit of each value.
+        Scale of each value.
     prior : float
-        Log odds before any data.
+        Prior log odds.
     torque : ndarray, shape (n, p), optional
-        Torque per unit of each value on the diagnosed day [N m].
+        Torque per unit value in the diagnosed recordings [N m].
 
     """
     joints = np.flatnonzero(np.any([x.any(axis=(0, 2)) for x in columns], axis=0)).tolist()
@@ -285,10 +291,10 @@ def cause_of(
     )
 
 
-def _unexplained(nuisance: Nuisance, under: Marginal) -> Unexplained:
-    """Return the residual of the diagnosed day, from which shapes are initialised."""
+def _unexplained(nuisance: Nuisance, posterior: NuisancePosterior) -> Unexplained:
+    """Return motion, residual and nuisance columns, from which effects guess their shapes."""
     rows = nuisance.rows
-    values = nuisance.means(under)
+    values = nuisance.means(posterior)
     motions = [part.motion for part in rows.data]
     arrays = (
         np.concatenate([getattr(motion, name) for motion in motions])
@@ -297,10 +303,10 @@ def _unexplained(nuisance: Nuisance, under: Marginal) -> Unexplained:
     weight = np.concatenate(rows.weight)
     scale = np.where(weight > 0.0, weight, 1.0)
     residual = np.concatenate(
-        [nuisance.residual_at(values, k) for k in range(len(rows.today))], axis=1
+        [nuisance.residual_at(values, k) for k in range(len(rows.diagnosed))], axis=1
     ).T
     columns = np.concatenate([x[:, :, : nuisance.rank] for x in nuisance.columns], axis=1)
-    asked = np.concatenate([np.full(len(p.rows), rows.today[p.fold]) for p in rows.data])
+    asked = np.concatenate([np.full(len(p.rows), rows.diagnosed[p.fold]) for p in rows.data])
     return Unexplained(
         Motion(motions[0].joints, *arrays),
         np.concatenate([part.at_rows.q for part in rows.data]),
@@ -313,7 +319,7 @@ def _unexplained(nuisance: Nuisance, under: Marginal) -> Unexplained:
 def candidate_effects(
     robot: Robot, kinds: Sequence[type[Effect]], reference: Mapping[str, float] = _NO_REFERENCE
 ) -> Iterator[tuple[Effect, list[Effect]]]:
-    """Yield each effect on all joints, with its candidates on single joints."""
+    """Yield each effect on all joints, with the same effect on each joint, pair or whole arm."""
     for kind in with_exact_vector(kinds):
         try:
             places = kind.places(robot)
@@ -330,10 +336,10 @@ def candidate_effects(
             yield whole, members
 
 
-def shaped(
+def with_starting_shapes(
     effect: Effect, members: list[Effect], arm: ArmModel, unexplained: Unexplained
 ) -> Iterator[tuple[Effect, list[Effect]]]:
-    """Yield an effect and its candidates for each starting shape; once if it has no shape."""
+    """Yield an effect and its single-joint effects for each starting shape, or once without."""
     if not effect.shapes:
         yield effect, members
         return
@@ -354,7 +360,7 @@ def shaped(
 def line_search(
     gain: Callable[[FloatArray], float], shape: FloatArray, index: int, kind: Shape
 ) -> FloatArray:
-    """Search one shape near its present value; positive ones by their logarithm (Brent 1973)."""
+    """Return the shape values with one of them moved to the maximum of a function (Brent 1973)."""
     value = float(shape[index])
     positive = kind.lower > 0.0 and value > 0.0 and kind.near is None and kind.unit != '1/rev'
 
@@ -388,9 +394,9 @@ def line_search(
 
 def without_measurement(part: Trajectory, arm: ArmModel) -> Trajectory:
     """
-    Replace the measured torque of a trajectory by that of a model.
+    Return a trajectory with the torque of a model in place of the measured torque.
 
-    A prediction that contains the measurement would explain everything.
+    Columns that contain the measured torque would explain any residual.
 
     """
     return replace(part, motion=part.motion.with_torque(arm.torque(part.motion)))

@@ -1,10 +1,9 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""A candidate cause: an effect with a shape on certain joints, its columns and its bounds."""
+"""A candidate cause of a residual: an effect on certain joints, with its regression columns."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from armid_ros.arm import ArmModel
@@ -18,33 +17,34 @@ import numpy.typing as npt
 @dataclass(frozen=True)
 class Cause:
     """
-    An effect on certain joints with one shape.
+    A candidate cause: an effect on certain joints with one shape, and its regression columns.
 
     Attributes
     ----------
     effect : Effect
         The effect, with its joints and shape.
     kept : tuple of int
-        Its parameters that are fitted; the others are zero.
+        Indices of its parameters that are fitted; the others are zero.
     unit : ndarray, shape (p,)
-        Unit of each value: has the torque of the joint, or is the largest plausible value if less.
+        Scale of each value: its torque equals that of the joint, or it is the largest plausible
+        value if that is smaller.
     prior : float
-        Log odds before any data.
+        Prior log odds.
     joints : tuple of int
-        The t joints on which the cause acts.
+        Indices of the t joints on which the cause acts.
     columns : tuple of ndarray, each (t, M, p)
-        Weighted columns in each recording.
+        Weighted regression columns in each recording.
     products, own, aim : ndarray, shape (K, q, p), (K, p, p), (K, p)
-        Products of `columns` with the nuisance columns, with themselves, and with the residual, in
-        each of K recordings.
+        Inner products of `columns` with the nuisance columns, with themselves, and with the
+        residual, in each of K recordings.
     torque : ndarray, shape (n, p)
-        Root mean square torque per unit of each value on the diagnosed day [N m].
+        Root mean square torque per unit value in the diagnosed recordings [N m].
     shapes : int
         Number of shapes that were tried.
     size : float
-        Standard deviation of the prior of its values, over their unit, once it is accepted.
+        Prior standard deviation of the values over `unit`, for an accepted cause.
     always : bool
-        Whether it acts on both days, once it is accepted.
+        Whether an accepted cause acts in baseline and diagnosed recordings.
 
     """
 
@@ -64,21 +64,21 @@ class Cause:
 
     @property
     def key(self) -> tuple[str, tuple[str, ...], tuple[int, ...]]:
-        """Identity of the cause without its shape: name, joints and quantities."""
+        """Name, joints and parameter indices, which identify the cause in any shape."""
         return self.effect.name, self.effect.joints, self.kept
 
     def acts(self, today: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
-        """Return in which recordings or groups the cause acts: today, or on both days."""
+        """Return whether the cause acts in each recording, given which are diagnosed, (K,)."""
         return np.ones_like(today) if self.always or self.effect.lasting else today
 
     def at(self, values: FloatArray, robot: Robot) -> NamedEffect:
-        """Return the effect with the fitted values of the cause; other parameters are zero."""
+        """Return the effect with these values of its fitted parameters; the others are zero."""
         whole = np.zeros(len(self.effect.parameters(robot)))
         whole[list(self.kept)] = values
         return NamedEffect(self.effect, self.kept, whole)
 
     def among(self, effect: Effect, values: npt.NDArray[np.intp], shapes: int) -> Cause:
-        """Return the cause with some of its values only, for an effect on fewer joints."""
+        """Return a cause with a subset of the columns, for the same effect on fewer joints."""
         return replace(
             self,
             effect=effect,
@@ -93,15 +93,8 @@ class Cause:
             shapes=shapes,
         )
 
-    def aimed_at(self, residual: Sequence[FloatArray]) -> Cause:
-        """Return the cause with `aim` recomputed for another residual, (n, M) per recording."""
-        joints = list(self.joints)
-        pairs = zip(self.columns, residual, strict=True)
-        aim = [np.einsum('tmp,tm->p', x, y[joints]) for x, y in pairs]
-        return replace(self, aim=np.array(aim))
-
     def products_with(self, other: Cause) -> FloatArray:
-        """Return products of the columns with those of another cause, (K, p, p')."""
+        """Return inner products of the columns with those of another cause, (K, p, p')."""
         total = np.zeros((len(self.columns), len(self.unit), len(other.unit)))
         for k, joint in enumerate(self.joints):
             if joint in other.joints:
@@ -114,14 +107,14 @@ class Cause:
 @dataclass(frozen=True)
 class NamedEffect:
     """
-    A named effect with its values.
+    An effect with values for its parameters.
 
     Attributes
     ----------
     effect : Effect
-        Joints and shape.
+        The effect, with its joints and shape.
     kept : tuple of int
-        Its parameters that are fitted; the others are zero.
+        Indices of its parameters that are fitted; the others are zero.
     values : ndarray, shape (P,)
         Values of all its parameters.
 
@@ -132,8 +125,8 @@ class NamedEffect:
     values: FloatArray
 
 
-def room(effect: Effect, arm: ArmModel) -> tuple[FloatArray, FloatArray]:
-    """Return the bounds of a change of the arm's values within the bounds of the effect, (P,)."""
+def bounds_of_change(effect: Effect, arm: ArmModel) -> tuple[FloatArray, FloatArray]:
+    """Return the smallest and largest change that keeps an effect's values in bounds, (P,)."""
     lower, upper = effect.bounds()
     there = {
         name: value

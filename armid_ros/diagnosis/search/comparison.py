@@ -1,10 +1,11 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-The comparison of causes: the best cause is accepted repeatedly, until no cause is significant.
+Forward selection of causes by their Bayes factors, until no further cause is significant.
 
-The spread of values between recordings decides whether a change is significant. The explained
-torque decides between causes. A lead of 2 % excludes no rival, as laws are inexact.
+A cause is significant if its values exceed their spread between recordings. Among significant
+causes, the explained torque decides. A lead of less than 2 % rejects no other cause, because
+torque laws are inexact.
 
 """
 
@@ -18,106 +19,113 @@ import math
 
 from armid_ros.diagnosis.search.candidates import Causes, line_search
 from armid_ros.diagnosis.search.cause import Cause
+from armid_ros.diagnosis.search.hyperparameters import (
+    CORRELATED_ROWS,
+    Hyperparameters,
+    NuisancePosterior,
+)
 from armid_ros.diagnosis.search.nuisance import Nuisance
 from armid_ros.diagnosis.search.odds import (
-    all_odds,
+    cause_fits,
+    CauseInformation,
     IMPOSSIBLE,
     odds,
     OWN_SPREADS,
-    usual_spread,
+    typical_spread_of,
 )
-from armid_ros.diagnosis.search.setting import LASTING, Marginal, Setting
-from armid_ros.diagnosis.search.trial import Look, Ranked, Trial
+from armid_ros.diagnosis.search.ranking import CauseResult, RankedCause, Ranking
 from armid_ros.diagnosis.settings import DiagnosisSettings, UNLISTED
 from armid_ros.effects import Effect
 from armid_ros.motion import FloatArray
 import numpy as np
 
-#: Candidate amplitudes of the discrepancies d0 and d_k with a baseline, over the misfit.
+#: Candidate standard deviations of d0 and d_k with a baseline, over the misfit.
 _SHARED, _OWN = (0.1, 0.2, 0.4, 0.8, 1.6, 3.2, 6.4), (0.2, 0.4, 0.8)
-#: Candidate amplitudes of the noise with a baseline, over the misfit, which contains noise.
+#: Candidate standard deviations of the noise with a baseline, over the misfit, which contains it.
 _NOISE = (0.15, 0.3, 0.5, 0.8, 1.1)
-#: Candidate amplitudes of d0 and d_k without a baseline, over the torque; log prior odds.
+#: Candidate standard deviations of d0 and d_k without a baseline, over the rms torque; log prior.
 _SHARES = ((0.0, 0.0), (0.02, -1.0), (0.06, -2.0), (0.15, -3.0))
 #: Candidate errors of the described links without a baseline, as shares of the largest expected
 #: errors: none, a tenth (masses off by 10 %, centres of mass by 1 cm), and all.
 _BODIES = (0.0, 0.1, 1.0)
-#: Amplitudes of the noise without a baseline, over that of two equal periods; log prior odds.
+#: Standard deviations of the noise without a baseline, over that of equal periods; log prior.
 _FACTORS = ((1.0, 0.0), (1.3, -1.0), (2.0, -3.0), (4.0, -5.0))
 #: Number of causes with refined shapes, of causes in the final comparison, and of accepted causes.
 _REFINED, _COMPARED, _MOST = 5, 14, 5
-#: Every eighth cause is used to estimate the usual spread.
+#: Every eighth cause is used to estimate the typical spread.
 _SAMPLED = 8
 
 
 @dataclass(frozen=True)
 class Result:
     """
-    Result of a comparison of causes.
+    Result of the forward selection of causes.
 
     Attributes
     ----------
-    accepted : tuple of Trial
+    accepted : tuple of CauseResult
         The accepted causes with their rivals, in the order in which they were found.
     nuisance : Nuisance
-        Nuisance parameters, and the accepted causes among them, in the same order.
-    under : Marginal
-        Fit of the nuisance parameters under the likeliest setting.
-    first : Look
-        Comparison of all causes before any was accepted.
+        Regression problem that includes the accepted causes, in the same order.
+    posterior : NuisancePosterior
+        Its posterior for the likeliest hyperparameters.
+    first : Ranking
+        Ranking of all causes before any was accepted.
     effects : tuple of Effect
-        Every candidate effect in every place.
+        All candidate effects on all joints.
 
     """
 
-    accepted: tuple[Trial, ...]
+    accepted: tuple[CauseResult, ...]
     nuisance: Nuisance
-    under: Marginal
-    first: Look
+    posterior: NuisancePosterior
+    first: Ranking
     effects: tuple[Effect, ...]
 
 
 @dataclass(frozen=True)
 class CauseComparison:
     """
-    Bayesian comparison of the causes of a residual.
+    Forward selection of the causes of a residual by their Bayes factors.
 
     Attributes
     ----------
     nuisance : Nuisance
-        The data and the nuisance columns.
+        Regression problem without accepted causes.
     catalogue : Causes
-        The causes.
+        The candidate causes.
     settings : DiagnosisSettings
-        Odds that decide, and the share of a torque that is material.
-    grid : tuple of Setting
-        Amplitudes of discrepancy and noise; see `settings_of_baseline`.
+        Thresholds of the log odds, and the share of a torque that is material.
+    grid : tuple of Hyperparameters
+        Hyperparameters to average over; see `hyperparameters_of_baseline`.
 
     """
 
     nuisance: Nuisance
     catalogue: Causes
     settings: DiagnosisSettings
-    grid: tuple[Setting, ...]
-    _marginals: dict[int, tuple[Nuisance, list[Marginal]]] = field(
+    grid: tuple[Hyperparameters, ...]
+    _posteriors: dict[int, tuple[Nuisance, list[NuisancePosterior]]] = field(
         default_factory=dict, compare=False
     )
     _causes: dict[int, list[Cause]] = field(default_factory=dict, compare=False)
 
     @cached_property
-    def usual(self) -> float:
-        """Return how much values usually vary between recordings."""
-        under = self._likeliest(self.nuisance)
-        return usual_spread(self._causes_of(self.nuisance)[::_SAMPLED], self.nuisance, under)
+    def typical_spread(self) -> float:
+        """Return the typical variance of fitted values between recordings; see `odds`."""
+        posterior = self._likeliest(self.nuisance)
+        return typical_spread_of(
+            self._causes_of(self.nuisance)[::_SAMPLED], self.nuisance, posterior
+        )
 
-    def first(self) -> Result:
-        """Compare all causes, but accept none."""
-        look = self.look(self.nuisance)
+    def initial(self) -> Result:
+        """Return the ranking of all causes, with none accepted."""
+        ranking = self.rank_all(self.nuisance)
         effects = tuple(self.catalogue.effects)
-        return Result((), self.nuisance, look.under, look, effects)
+        return Result((), self.nuisance, ranking.posterior, ranking, effects)
 
-    def begun(self, before: Result) -> Result:
-        """Return another comparison's causes that act on the whole arm, refitted here."""
+    def refit_whole_arm_causes(self, before: Result) -> Result:
+        """Accept the whole-arm causes of another selection, and refit them to this problem."""
         accepted = tuple(trial for trial in before.accepted if not trial.effect.joints)
         nuisance = self.nuisance
         for one in before.nuisance.accepted:
@@ -125,94 +133,105 @@ class CauseComparison:
                 cause = self.catalogue.reshaped(one, np.array(one.effect.shape))
                 assert cause is not None  # it had torques in the other gravity as well
                 nuisance = nuisance.and_cause(cause, one.size)
-        under = self._likeliest(nuisance)
-        return replace(before, accepted=accepted, nuisance=nuisance, under=under)
+        posterior = self._likeliest(nuisance)
+        return replace(before, accepted=accepted, nuisance=nuisance, posterior=posterior)
 
-    def found(self, begun: Result | None = None) -> Result:
+    def select(self, begun: Result | None = None) -> Result:
         """
         Accept the best cause until none is significant; drop causes that became redundant.
 
         Parameters
         ----------
         begun : Result, optional
-            Causes that are accepted already.
+            Selection whose accepted causes are kept.
 
         """
-        result = begun or self.first()
+        result = begun or self.initial()
         accepted = list(result.accepted)
-        look = self.look(result.nuisance) if accepted else result.first
-        accepted, nuisance = self._exchanged(*self._extended(accepted, look))
-        under = self._likeliest(nuisance)
-        return replace(result, accepted=tuple(accepted), nuisance=nuisance, under=under)
+        ranking = self.rank_all(result.nuisance) if accepted else result.first
+        accepted, nuisance = self._exchange_causes(*self._add_causes(accepted, ranking))
+        posterior = self._likeliest(nuisance)
+        return replace(result, accepted=tuple(accepted), nuisance=nuisance, posterior=posterior)
 
-    def _extended(self, accepted: list[Trial], look: Look) -> tuple[list[Trial], Nuisance]:
-        """Accept the best cause until none is significant."""
-        nuisance = look.nuisance
+    def _add_causes(
+        self, accepted: list[CauseResult], ranking: Ranking
+    ) -> tuple[list[CauseResult], Nuisance]:
+        """Add the best cause to the accepted ones until no further cause is significant."""
+        nuisance = ranking.nuisance
         while len(accepted) < _MOST:
-            best = self.best(look, accepted)
+            best = self.best(ranking, accepted)
             if best is None:
                 break
             winner, trial = best
             nuisance = nuisance.and_cause(winner.cause, winner.fit.size)
-            accepted, nuisance = self._pruned([*accepted, trial], nuisance)
-            look = self.look(nuisance)
+            accepted, nuisance = self._drop_redundant([*accepted, trial], nuisance)
+            ranking = self.rank_all(nuisance)
         return accepted, nuisance
 
-    def _exchanged(
-        self, accepted: list[Trial], nuisance: Nuisance
-    ) -> tuple[list[Trial], Nuisance]:
-        """Replace a cause that resembles several others if these explain more without it."""
+    def _exchange_causes(
+        self, accepted: list[CauseResult], nuisance: Nuisance
+    ) -> tuple[list[CauseResult], Nuisance]:
+        """Replace a cause that resembles several others by these if they are likelier."""
         # the last cause was selected with all others in the model
         for k, one in enumerate(accepted[:-1]):
-            look = self.look(nuisance.without(k))
+            ranking = self.rank_all(nuisance.without_cause(k))
             others = [*accepted[:k], *accepted[k + 1 :]]
-            best = self.best(look, others)
+            best = self.best(ranking, others)
             if best is None or best[1].key == one.key:
                 continue
-            found = self._extended(others, look)
-            if self._worth(found[1]) > self._worth(nuisance) + self.settings.thresholds.tie:
-                return self._exchanged(*found)
+            found = self._add_causes(others, ranking)
+            if (
+                self._log_posterior(found[1])
+                > self._log_posterior(nuisance) + self.settings.thresholds.tie
+            ):
+                return self._exchange_causes(*found)
         return accepted, nuisance
 
-    def _worth(self, nuisance: Nuisance) -> float:
+    def _log_posterior(self, nuisance: Nuisance) -> float:
         """Return the log posterior probability of the accepted causes, up to a constant."""
         prior = sum(one.prior for one in nuisance.accepted)
         return self._likeliest(nuisance).evidence + prior
 
-    def best(self, look: Look, accepted: Sequence[Trial]) -> tuple[Ranked, Trial] | None:
+    def best(
+        self, ranking: Ranking, accepted: Sequence[CauseResult]
+    ) -> tuple[RankedCause, CauseResult] | None:
         """
-        Return the best cause of a comparison, also as a trial with its rivals.
+        Return the best cause of a ranking, and its result with probability and rivals.
 
-        None if no cause is significant beside the accepted ones.
+        None if no cause is significant in addition to the accepted ones.
 
         """
         levels, explained = self.settings.thresholds, sum(max(x.gain, 0.0) for x in accepted) / 2.0
         telling = [
             one
-            for one in look.ranking
-            if look.nuisance.rows.unseen
-            or one.data > min(levels.inexact * explained, (levels.same_fit - 1.0) * one.left)
+            for one in ranking.ranked
+            if ranking.nuisance.rows.misfit_only
+            or one.log_bayes_factor
+            > min(levels.inexact * explained, (levels.same_fit - 1.0) * one.remaining_loss)
         ]
         able = [one for one in telling if one.odds > levels.alone]
         if not able or max(one.odds for one in able) < levels.alarm:
             return None
         first = able[0]
+        name, joints = first.cause.effect.name, set(first.cause.effect.joints)
         # the same law on some of the joints, unless the lead of all is more than laws are inexact;
         # or the same law by a more usual name
         parts = [
             one
             for one in able
             if one is first
-            or one.is_part_of(first)
+            or (one.cause.effect.name == name and set(one.cause.effect.joints) < joints)
             or (one.cause.prior > first.cause.prior and one.is_same_law(first, levels.inexact))
         ]
-        winner = min(parts, key=lambda one: first.ahead(one, levels))
+        winner = min(parts, key=lambda one: first.log_odds_over(one, levels))
         others = [one for one in able if one is not winner]
         # The log odds of a rival are the larger ones of those with and without a small lead.
-        leads = [-math.inf if x is first else x.worth - winner.worth for x in others]
+        leads = [
+            -math.inf if x is first else x.log_posterior - winner.log_posterior for x in others
+        ]
         behind = np.array(
             [
-                min(max(-winner.ahead(x, levels), lead), 0.0)
+                min(max(-winner.log_odds_over(x, levels), lead), 0.0)
                 for x, lead in zip(others, leads, strict=True)
             ]
         )
@@ -220,79 +239,88 @@ class CauseComparison:
         total -= np.log1p(-UNLISTED)
         material = self.settings.material
         rivals = [
-            replace(look.trial(one, material), probability=float(np.exp(odds_to_winner - total)))
+            replace(
+                ranking.tested(one, material), probability=float(np.exp(odds_to_winner - total))
+            )
             for one, odds_to_winner in zip(others, behind, strict=True)
             if odds_to_winner > -levels.tie
         ]
-        trial = look.trial(winner, material)
+        trial = ranking.tested(winner, material)
         found = replace(trial, probability=float(np.exp(-total)), rivals=tuple(rivals))
         return winner, found
 
-    def _settings(self, nuisance: Nuisance) -> list[Marginal]:
-        """Return the fit of the nuisance parameters under each setting."""
-        if id(nuisance) not in self._marginals:
-            self._marginals[id(nuisance)] = nuisance, [nuisance.marginal(x) for x in self.grid]
-        return self._marginals[id(nuisance)][1]
+    def _all_posteriors(self, nuisance: Nuisance) -> list[NuisancePosterior]:
+        """Return the posterior of the nuisance parameters for each set of hyperparameters."""
+        if id(nuisance) not in self._posteriors:
+            self._posteriors[id(nuisance)] = nuisance, [nuisance.posterior(x) for x in self.grid]
+        return self._posteriors[id(nuisance)][1]
 
-    def _likeliest(self, nuisance: Nuisance) -> Marginal:
-        return max(self._settings(nuisance), key=lambda one: one.evidence)
+    def _likeliest(self, nuisance: Nuisance) -> NuisancePosterior:
+        return max(self._all_posteriors(nuisance), key=lambda one: one.evidence)
 
     def _causes_of(self, nuisance: Nuisance) -> list[Cause]:
-        """Return the causes to compare."""
+        """Return the causes that are not accepted in a regression problem, computed once."""
         if id(nuisance) not in self._causes:
             likeliest = self._likeliest(nuisance)
             self._causes[id(nuisance)] = self.catalogue.causes(nuisance, likeliest)
         return self._causes[id(nuisance)]
 
-    def look(self, nuisance: Nuisance) -> Look:
-        """Compare every cause that is not accepted yet, and refine the shapes of the best."""
-        settings, likeliest = self._settings(nuisance), self._likeliest(nuisance)
-        tried = list[Marginal]()  # the best one, and noise only, of each size of link errors
-        for body in dict.fromkeys(one.setting.body for one in settings):
-            own = [one for one in settings if one.setting.body == body]
+    def rank_all(self, nuisance: Nuisance) -> Ranking:
+        """Rank the causes that are not accepted yet, and optimise the shapes of the best ones."""
+        settings, likeliest = self._all_posteriors(nuisance), self._likeliest(nuisance)
+        tried = list[
+            NuisancePosterior
+        ]()  # the best one, and noise only, of each size of link errors
+        for body in dict.fromkeys(one.hyperparameters.body for one in settings):
+            own = [one for one in settings if one.hyperparameters.body == body]
             best = max(own, key=lambda one: one.evidence)
             tried += [best] if best is own[0] else [best, own[0]]
-        causes = self._causes_of(nuisance)
-        first: dict[object, tuple[float, Cause, Marginal]] = {}
-        for one in tried:
-            for cause, fit in all_odds(causes, nuisance, one):
-                worth = fit.factor + one.evidence + cause.prior
-                if cause.key not in first or worth > first[cause.key][0]:
-                    first[cause.key] = worth, cause, one
+        groups: dict[tuple[int, bool], list[Cause]] = {}  # of causes with columns of equal shape
+        for cause in self._causes_of(nuisance):
+            groups.setdefault((len(cause.unit), cause.effect.lasting), []).append(cause)
+        first: dict[object, tuple[float, Cause, NuisancePosterior]] = {}
+        for one, group in product(tried, groups.values()):
+            information = CauseInformation.of(group, nuisance, one, by_day=True)
+            for cause, fit in zip(group, cause_fits(group, nuisance, information), strict=True):
+                log_posterior = fit.factor + one.evidence + cause.prior
+                if cause.key not in first or log_posterior > first[cause.key][0]:
+                    first[cause.key] = log_posterior, cause, one
         order = sorted(first.values(), key=lambda one: -one[0])
         result = []
-        for n, (_, cause, under) in enumerate(order[:_COMPARED]):
+        for n, (_, cause, posterior) in enumerate(order[:_COMPARED]):
             if n < _REFINED and cause.effect.shapes:
-                cause = self._in_best_shape(cause, nuisance, under)
-            result.append(self.ranked(cause, nuisance))
-        ranking = tuple(sorted(result, key=lambda one: -one.worth))
+                cause = self._with_best_shape(cause, nuisance, posterior)
+            result.append(self.rank(cause, nuisance))
+        ranked = tuple(sorted(result, key=lambda one: -one.log_posterior))
         others = tuple(cause for _, cause, _ in order[_COMPARED:])
-        return Look(ranking, others, nuisance, likeliest, self.usual)
+        return Ranking(ranked, others, nuisance, likeliest, self.typical_spread)
 
-    def ranked(self, cause: Cause, nuisance: Nuisance) -> Ranked:
-        """Return the evidence of a cause, averaged over the amplitudes of errors and noise."""
-        settings = self._settings(nuisance)
+    def rank(self, cause: Cause, nuisance: Nuisance) -> RankedCause:
+        """Return the Bayes factor of a cause, averaged over the hyperparameters."""
+        settings = self._all_posteriors(nuisance)
         fits = [(odds(cause, nuisance, one), one) for one in settings]
-        nothing = np.logaddexp.reduce([under.evidence for _, under in fits])
-        total = np.logaddexp.reduce([fit.factor + under.evidence for fit, under in fits])
-        fit, under = max(fits, key=lambda pair: pair[0].factor + pair[1].evidence)
+        nothing = np.logaddexp.reduce([posterior.evidence for _, posterior in fits])
+        total = np.logaddexp.reduce([fit.factor + posterior.evidence for fit, posterior in fits])
+        fit, posterior = max(fits, key=lambda pair: pair[0].factor + pair[1].evidence)
         data = float(total - nothing)
         there = data + cause.prior
         if nuisance.rows.repeated:
             places = max(len(cause.effect.places(nuisance.arm.robot)), 1)
-            surely = odds(cause, nuisance, settings[0], self.usual, OWN_SPREADS).factor
+            surely = odds(cause, nuisance, settings[0], self.typical_spread, OWN_SPREADS).factor
             there = surely - float(np.log(cause.shapes * places))
-        return Ranked(cause, fit, data, there, under)
+        return RankedCause(cause, fit, data, there, posterior)
 
-    def _in_best_shape(self, cause: Cause, nuisance: Nuisance, under: Marginal) -> Cause:
-        """Refine the shape of a cause to maximise its evidence."""
-        best = [(odds(cause, nuisance, under).factor, cause)]
+    def _with_best_shape(
+        self, cause: Cause, nuisance: Nuisance, posterior: NuisancePosterior
+    ) -> Cause:
+        """Return a cause with the shape that maximises its Bayes factor."""
+        best = [(odds(cause, nuisance, posterior).factor, cause)]
 
         def gain(shape: FloatArray) -> float:
             other = self.catalogue.reshaped(cause, shape)
             if other is None:
                 return IMPOSSIBLE
-            best.append((odds(other, nuisance, under).factor, other))
+            best.append((odds(other, nuisance, posterior).factor, other))
             return best[-1][0]
 
         shape = np.array(cause.effect.shape)
@@ -300,50 +328,55 @@ class CauseComparison:
             shape = line_search(gain, shape, k, kind)
         return max(best, key=lambda one: one[0])[1]
 
-    def _pruned(self, accepted: list[Trial], nuisance: Nuisance) -> tuple[list[Trial], Nuisance]:
-        """Drop causes whose posterior includes zero, except the last one."""
+    def _drop_redundant(
+        self, accepted: list[CauseResult], nuisance: Nuisance
+    ) -> tuple[list[CauseResult], Nuisance]:
+        """Drop accepted causes whose log odds fell below the alarm, except the last cause."""
         while len(accepted) > 1:
-            values, covariance = nuisance.whole(self._likeliest(nuisance))
-            worth = []
-            for one, span in zip(nuisance.accepted, nuisance.spans, strict=True):
+            values, covariance = nuisance.moments(self._likeliest(nuisance))
+            log_posterior = []
+            for one, span in zip(nuisance.accepted, nuisance.value_slices, strict=True):
                 mean, own = values[span], covariance[span, span]
                 gain = float(mean @ np.linalg.solve(own, mean)) + np.linalg.slogdet(own)[1]
                 gain -= 2.0 * float(np.sum(np.log(one.size * one.unit)))
-                worth.append(0.5 * gain + one.prior)
-            least = int(np.argmin(worth[:-1]))
-            if worth[least] > self.settings.thresholds.alarm:
+                log_posterior.append(0.5 * gain + one.prior)
+            least = int(np.argmin(log_posterior[:-1]))
+            if log_posterior[least] > self.settings.thresholds.alarm:
                 break
             accepted = [*accepted[:least], *accepted[least + 1 :]]
-            nuisance = nuisance.without(least)
+            nuisance = nuisance.without_cause(least)
         return accepted, nuisance
 
 
-def settings_of_baseline(nuisance: Nuisance) -> tuple[Setting, ...]:
-    """Return the one setting that maximises the evidence of the baseline, as a tuple."""
-    before = np.flatnonzero(~nuisance.rows.today).tolist()
-    lasting = 1.0
+def hyperparameters_of_baseline(nuisance: Nuisance) -> tuple[Hyperparameters, ...]:
+    """Return the one set of hyperparameters that maximises the evidence of the baseline."""
+    before = np.flatnonzero(~nuisance.rows.diagnosed).tolist()
+    correlated_rows = 1.0
     for _ in range(2):
-        tried = list[Marginal]()
+        tried = list[NuisancePosterior]()
         for own, noise in product(_OWN, _NOISE):
-            grid = [Setting(1.0, shared, own, noise, lasting) for shared in _SHARED]
-            tried += nuisance.marginals(grid, before)
+            grid = [
+                Hyperparameters(1.0, shared, own, noise, correlated_rows) for shared in _SHARED
+            ]
+            tried += nuisance.posteriors(grid, before)
         found = max(tried, key=lambda one: one.evidence)
-        lasting = nuisance.lasting(found, before, LASTING)
-    return (replace(found.setting, lasting=lasting),)
+        correlated_rows = nuisance.correlation_length(found, before, CORRELATED_ROWS)
+    return (replace(found.hyperparameters, correlated_rows=correlated_rows),)
 
 
-def settings_alone() -> tuple[Setting, ...]:
-    """Return the settings to compare without a baseline, with fixed and with free bodies."""
+def grid_without_baseline() -> tuple[Hyperparameters, ...]:
+    """Return hyperparameters to average over without a baseline, for exact and inexact links."""
     return tuple(
-        Setting(body, share, share, factor, LASTING, odds + more)
+        Hyperparameters(body, share, share, factor, CORRELATED_ROWS, odds + more)
         for body in _BODIES
         for share, odds in _SHARES
         for factor, more in _FACTORS
     )
 
 
-def settings_of_misfit(body: float) -> tuple[Setting, ...]:
-    """Return the settings to compare if only the size of the misfit is known."""
+def grid_of_misfit(body: float) -> tuple[Hyperparameters, ...]:
+    """Return hyperparameters to average over if only the size of the misfit is known."""
     return tuple(
-        Setting(body, share, share, noise, LASTING) for share, noise in product(_OWN, (0.5, 1.1))
+        Hyperparameters(body, share, share, noise, CORRELATED_ROWS)
+        for share, noise in product(_OWN, (0.5, 1.1))
     )

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""An explanation of a gap: the material causes of a comparison, and the arm with their values."""
+"""Explanation of a residual: the accepted causes that are material, and the arm with them."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from armid_ros.arm.memoized_arm import plain_arm
 from armid_ros.diagnosis.data.evidence import Evidence
 from armid_ros.diagnosis.search.cause import NamedEffect
 from armid_ros.diagnosis.search.comparison import Result
-from armid_ros.diagnosis.search.posterior import Fitted, JointFit
-from armid_ros.diagnosis.search.trial import Key, Look, Trial
+from armid_ros.diagnosis.search.joint_fit import Fitted, JointFit
+from armid_ros.diagnosis.search.ranking import CauseResult, Key, Ranking
 from armid_ros.diagnosis.settings import DiagnosisSettings, HOW_OFTEN, SIZES
 from armid_ros.effects import Effect
 from armid_ros.motion import FloatArray
 import numpy as np
 
-#: Floors of a gap: noise, or the misfit of the model: estimated, of a baseline, or of model.yaml.
+#: Floors of a gap in words: noise, or the misfit: estimated, of a baseline, or of model.yaml.
 NOISE, ESTIMATED = 'noise', 'an estimate of the error of such a model'
 OWN_MISFIT = 'the error in the recordings from before'
 WRITTEN_MISFIT = 'the error of the model when it was identified'
@@ -29,7 +29,7 @@ WRITTEN_MISFIT = 'the error of the model when it was identified'
 @dataclass(frozen=True)
 class Explanation:
     """
-    The named causes with their values, and the unit of the gap.
+    Named causes of a residual with their fitted values, and the floor of the gap.
 
     Attributes
     ----------
@@ -37,24 +37,24 @@ class Explanation:
         The arm as given.
     fitted, reference : Fitted
         The arm with all named effects, and without them.
-    steps : tuple of Trial
+    steps : tuple of CauseResult
         The named causes, in the order of ``fitted``.
     evidence : Evidence
-        The data in the unit of the gap.
+        The recordings, with the floor of the gap as deviation.
     problem : JointFit or None
-        Data and model in which the values are fitted; None in a finished diagnosis.
-    minor : tuple of Trial
+        Least-squares problem of the values; None in a finished diagnosis.
+    minor : tuple of CauseResult
         Causes that are significant and not material.
-    candidates : tuple of Trial
-        All visible causes in the comparison before any was accepted; the named causes come first.
+    candidates : tuple of CauseResult
+        All visible causes, before any was accepted; the named causes come first.
     invisible : tuple of (str, tuple of str)
         Names and joints of the causes that the nuisance columns can reproduce.
-    look : Look or None
-        That comparison; None in a finished diagnosis.
+    ranking : Ranking or None
+        Ranking of all causes before any was accepted; None in a finished diagnosis.
     floor : str
         Floor of the gap, in words.
     misfit : ndarray, shape (n,), or float
-        Misfit that the unit of the gap contains; zero if the unit is noise alone [N m].
+        Misfit that the floor contains; zero if the floor is noise alone [N m].
     notes : tuple of str
         Notes for the reader of the report.
     untested : str
@@ -66,13 +66,13 @@ class Explanation:
     given: ArmModel
     fitted: Fitted
     reference: Fitted
-    steps: tuple[Trial, ...]
+    steps: tuple[CauseResult, ...]
     evidence: Evidence
     problem: JointFit | None
-    minor: tuple[Trial, ...] = ()
-    candidates: tuple[Trial, ...] = ()
+    minor: tuple[CauseResult, ...] = ()
+    candidates: tuple[CauseResult, ...] = ()
     invisible: tuple[tuple[str, tuple[str, ...]], ...] = ()
-    look: Look | None = None
+    ranking: Ranking | None = None
     floor: str = NOISE
     misfit: FloatArray | float = 0.0
     notes: tuple[str, ...] = ()
@@ -89,40 +89,40 @@ class Explanation:
         return self.problem is not None and self.problem.refits_body
 
     def without(self, *names: int) -> Explanation:
-        """Return the explanation without some of its causes; the other causes are refitted."""
+        """Move causes with these indices to the minor causes, and refit the other causes."""
         fewer = self.only([k for k in range(len(self.steps)) if k not in names])
         return replace(fewer, minor=(*self.minor, *(self.steps[k] for k in names)))
 
     def only(self, keep: Sequence[int]) -> Explanation:
-        """Return the explanation with some of its causes, refitted, in the given order."""
+        """Return the explanation with a subset of its causes, refitted, in the given order."""
         assert self.problem is not None
         fitted = self.problem.fit([self.fitted.named[k] for k in keep])
         return replace(self, fitted=fitted, steps=tuple(self.steps[k] for k in keep))
 
-    def forgetting(self) -> Explanation:
-        """Return the explanation without the data and caches that were needed to compute it."""
+    def without_data(self) -> Explanation:
+        """Return the explanation without regression problem, ranking and caches."""
         return replace(
             self,
             given=plain_arm(self.given),
             fitted=replace(self.fitted, arm=plain_arm(self.fitted.arm)),
             reference=replace(self.reference, arm=plain_arm(self.reference.arm)),
             problem=None,
-            look=None,
+            ranking=None,
         )
 
     @cached_property
     def residual(self) -> list[FloatArray]:
-        """Residual of the arm with the named effects, (M, n) of each trajectory [N m]."""
+        """Residual of the arm with the named effects, (M, n) per trajectory [N m]."""
         return self.evidence.residuals(self.fitted.arm)
 
     @property
     def chi2_per_row(self) -> FloatArray:
-        """Mean weighted square of the residual of the patched model, shape (n,)."""
+        """Mean squared weighted residual of the arm with the named effects, shape (n,)."""
         return self.evidence.chi2_per_row(self.residual)
 
 
-def at_floor(explanation: Explanation, settings: DiagnosisSettings) -> bool:
-    """Return whether an explanation leaves no gap in any joint."""
+def has_no_gap(explanation: Explanation, settings: DiagnosisSettings) -> bool:
+    """Return whether the residual with the named effects is within its limit in all joints."""
     limits = explanation.evidence.limits(explanation.residual, settings)
     return bool(np.all(explanation.chi2_per_row <= limits))
 
@@ -133,33 +133,35 @@ def explain(
     result: Result,
     settings: DiagnosisSettings,
     unknown: Sequence[Effect] = (),
-    known: tuple[Fitted, Sequence[Trial]] | None = None,
+    known: tuple[Fitted, Sequence[CauseResult]] | None = None,
 ) -> Explanation:
     """
-    Fit the material causes.
+    Fit the values of the accepted causes that are material.
 
     Parameters
     ----------
     problem : JointFit
-        Data and model in which the values are fitted.
+        Least-squares problem of the values.
     evidence : Evidence
-        The data in the unit of the gap.
+        The recordings, with the floor of the gap as deviation.
     result : Result
-        Result of the comparison of causes.
+        The accepted causes.
     settings : DiagnosisSettings
         Thresholds, and the share of a torque that is material.
     unknown : sequence of Effect
         Friction and offsets without given values, which are named if significant.
-    known : (Fitted, sequence of Trial), optional
+    known : (Fitted, sequence of CauseResult), optional
         Causes that were named before, with their values.
 
     """
     robot, material, alarm = problem.arm.robot, settings.material, settings.thresholds.alarm
     fitted, steps = known or (None, ())
     named = list(fitted.named) if fitted else []
-    steps, small = list(steps), list[Trial]()
-    means = result.nuisance.means(result.under)
-    causes = zip(result.accepted, result.nuisance.accepted, result.nuisance.spans, strict=True)
+    steps, small = list(steps), list[CauseResult]()
+    means = result.nuisance.means(result.posterior)
+    causes = zip(
+        result.accepted, result.nuisance.accepted, result.nuisance.value_slices, strict=True
+    )
     for trial, cause, span in causes:
         torque = np.max(np.abs(means[span]) * cause.torque, axis=1)
         if not np.any(torque >= material * result.nuisance.rows.torque):
@@ -191,9 +193,9 @@ def explain(
 
 def _unset(
     result: Result, unknown: Sequence[Effect], settings: DiagnosisSettings
-) -> Iterator[Trial]:
+) -> Iterator[CauseResult]:
     """
-    Yield friction and offsets whose values are not given; they are fitted with every cause.
+    Yield the result of each friction and offset that is fitted because the model lacks its value.
 
     The prior of a value is the one of every other effect: a mixture of normal distributions with
     standard deviations `SIZES`, times the value whose torque is that of the joint. Most joints
@@ -201,9 +203,9 @@ def _unset(
 
     """
     nuisance = result.nuisance
-    means, covariance = nuisance.whole(result.under)
-    today, joints = np.flatnonzero(nuisance.rows.today).tolist(), nuisance.arm.robot.joints
-    residual = nuisance.squares_of_today(result.under)
+    means, covariance = nuisance.moments(result.posterior)
+    today, joints = np.flatnonzero(nuisance.rows.diagnosed).tolist(), nuisance.arm.robot.joints
+    residual = nuisance.squares_of_diagnosed(result.posterior)
     names = [(one.name, one.joint) for one in nuisance.base.parameters]
     for effect in unknown:
         parameter = effect.parameters(nuisance.arm.robot)[0]
@@ -224,7 +226,7 @@ def _unset(
         odds += HOW_OFTEN[settings.prior.get(effect.name, 'often')]
         precision = float(nuisance.prior_precision[k, k])
         resolution = float(np.clip(1.0 - variance * precision, 0.0, 1.0))
-        yield Trial(
+        yield CauseResult(
             effect,
             (0,),
             means[k : k + 1],
@@ -244,16 +246,16 @@ def survey(
     settings: DiagnosisSettings,
     unknown: Sequence[Effect] = (),
     named: Collection[Key] = (),
-) -> tuple[tuple[Trial, ...], tuple[tuple[str, tuple[str, ...]], ...]]:
-    """Return visible causes of the first comparison, named ones first, and the invisible ones."""
-    look, material = result.first, settings.material
-    # The likeliest setting without the causes may hide other causes.
-    under = look.nuisance.marginal(result.under.setting)
-    look = replace(look, under=under)
-    ranking = sorted(look.ranking, key=lambda one: one.cause.key not in named)
+) -> tuple[tuple[CauseResult, ...], tuple[tuple[str, tuple[str, ...]], ...]]:
+    """Return results of all visible causes, named causes first, and names of invisible causes."""
+    ranking, material = result.first, settings.material
+    # The likeliest hyperparameters without the accepted causes may hide other causes.
+    posterior = ranking.nuisance.posterior(result.posterior.hyperparameters)
+    ranking = replace(ranking, posterior=posterior)
+    ranked = sorted(ranking.ranked, key=lambda one: one.cause.key not in named)
     every = [
-        *(look.trial(replace(one, under=under), material) for one in ranking),
-        *(look.trial(one, material) for one in look.others),
+        *(ranking.tested(replace(one, posterior=posterior), material) for one in ranked),
+        *(ranking.tested(one, material) for one in ranking.others),
         *_unset(result, unknown, settings),
     ]
     seen = tuple(one for one in every if one.visible >= settings.thresholds.least_visible)

@@ -1,16 +1,17 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-The nuisance parameters of a comparison: body, friction, and the discrepancy of the model.
+The nuisance parameters that are fitted with each cause: rigid body, friction, model discrepancy.
 
-For recording k, in weighted rows, in each joint
+The residual of recording k, in weighted rows of each joint, is
 
-    y_k = X_k b + B_k (d0 + d_k) + Z_k (g0 + [k is of the diagnosed day] g + u_k) + e_k
+    y_k = X_k b + B_k (d0 + d_k) + Z_k (g0 + [k is diagnosed] g + u_k) + e_k
 
-with the body b (prior: the description), the discrepancy d0 that all recordings share and d_k of
-one motion (Kennedy and O'Hagan, Bayesian calibration of computer models, 2001), and the values g
-of a cause. For given amplitudes of d0, d_k and e_k, all variables are Gaussian. Each d_k is
-therefore integrated out of the normal equations of its recording.
+where b are base parameters (prior: the description), d0 is the model discrepancy of all recordings
+and d_k that of one recording (Kennedy and O'Hagan, Bayesian calibration of computer models, 2001),
+g are the values of a cause, g0 its values in the baseline, u_k their differences between
+recordings, and e_k is noise. For given standard deviations of d0, d_k and e_k, all of these are
+Gaussian. Each d_k is therefore integrated out of the normal equations of its recording.
 
 """
 
@@ -22,17 +23,21 @@ from functools import cached_property
 
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.data.baseline import described_precision, excited
-from armid_ros.diagnosis.data.days import Rows
 from armid_ros.diagnosis.data.discrepancy import discrepancy_columns
+from armid_ros.diagnosis.data.rows import Rows
 from armid_ros.diagnosis.search.cause import Cause
-from armid_ros.diagnosis.search.setting import Marginal, MotionDiscrepancy, Setting
+from armid_ros.diagnosis.search.hyperparameters import (
+    Hyperparameters,
+    MotionDiscrepancies,
+    NuisancePosterior,
+)
 from armid_ros.model import BaseParameters
 from armid_ros.motion import FloatArray
 import numpy as np
 import numpy.typing as npt
 from scipy import linalg
 
-#: Least prior precision over the squares of a column, so that the equations can be solved.
+#: Least prior precision over the squared norm of a column, so that the equations can be solved.
 _MIN_PRECISION = 1e-12
 #: Relative prior error of a described value of an effect, or of a torque in unvisited states.
 #: Errors of values in the laboratory reach 0.1, and friction of an arm changes by 0.2 in a day.
@@ -42,28 +47,28 @@ _RELATIVE_PRIOR_STD = 0.25
 @dataclass(frozen=True)
 class Nuisance:
     """
-    Regression columns of nuisance parameters: rigid body, friction and discrepancy.
+    Regression problem of the nuisance parameters: rigid body, friction and model discrepancy.
 
     Attributes
     ----------
     rows : Rows
-        The data.
+        The recordings.
     arm : ArmModel
         The model, with friction in all joints, given or not.
     base : BaseParameters
-        The r parameters b of its body and friction.
+        The r base parameters b of its rigid body and friction.
     prior_precision : ndarray, shape (r, r)
         Prior precision of b.
     unset : ndarray of bool, shape (r,)
-        Whether each of b has no given value.
+        Whether each of b is a friction or offset value that the given model lacks.
     columns : tuple of ndarray, each (n, M, q)
-        Weighted columns of each recording: body, and the discrepancy of one joint after the other.
+        Weighted columns of each recording: b, then the model discrepancy of each joint.
     residual : tuple of ndarray, each (n, M)
-        Weighted residual of the model.
+        Weighted residual of the model in each recording.
     column_products : (ndarray, shape (K, q, q), ndarray, shape (K, q))
-        Products of these columns with each other and with the residual, in each recording.
+        Inner products of the columns with each other and with the residual, in each recording.
     accepted : tuple of Cause
-        Accepted causes.
+        Accepted causes, which are fitted as well.
 
     """
 
@@ -83,34 +88,33 @@ class Nuisance:
         rows: Rows,
         arm: ArmModel,
         rng: np.random.Generator,
-        known: FloatArray | None = None,
+        information: FloatArray | None = None,
         constant: Sequence[int] = (),
         gravity: FloatArray | None = None,
     ) -> Nuisance:
         """
-        Compute the nuisance columns of the data.
+        Compute the regression columns of the nuisance parameters.
 
         Parameters
         ----------
         rows : Rows
-            The data.
+            The recordings.
         arm : ArmModel
             The model.
         rng : numpy.random.Generator
             Draws the random states from which base parameters are found.
-        known : ndarray, shape (P, P), optional
-            Information on the first parameters of the arm, added to that of its description.
+        information : ndarray, shape (P, P), optional
+            Fisher information on the first P parameters of the arm from its identification.
         constant : sequence of int
-            Parameters of the arm that are not fitted, as an accepted cause changes them.
+            Indices of parameters of the arm that are not fitted: an accepted cause changes them.
         gravity : ndarray, shape (3,), optional
-            Gravity that acts on errors of the body, if it is another than in the model [m/s^2]:
-            the torque is bilinear in gravity and body.
+            Gravity for the columns of the rigid body, if not that of the model [m/s^2].
 
         """
         free = np.setdiff1d(np.arange(len(arm.parameters)), constant)
         felt = arm if gravity is None else replace(arm, robot=arm.robot.with_gravity(gravity))
         base, columns = excited(felt, felt.base_parameters(rng, free), rows.data)
-        prior_precision = described_precision(base, arm, known)
+        prior_precision = described_precision(base, arm, information)
         rigid = len(arm.robot.rigid_parameters)
         values = arm.theta[base.independent]
         unset = (base.independent >= rigid) & (values == 0.0)  # noqa: RUF069 - no given value
@@ -137,18 +141,18 @@ class Nuisance:
 
     @property
     def rank(self) -> int:
-        """Return the number of columns of the rigid body."""
+        """Return the number of base parameters of rigid body and friction."""
         return self.base.rank
 
     @cached_property
     def discrepancy(self) -> npt.NDArray[np.intp]:
-        """Columns of the discrepancy of each joint, shape (n, f)."""
+        """Indices of the f discrepancy columns of each joint, shape (n, f)."""
         size = self.columns[0].shape[2]
         return np.arange(self.rank, size).reshape(len(self.columns[0]), -1)
 
     @cached_property
     def acting(self) -> list[list[tuple[npt.NDArray[np.intp], FloatArray]]]:
-        """Columns that act on each joint in each recording: their indices, and values (M, c)."""
+        """Nonzero columns of each joint in each recording: their indices, and values (M, c)."""
         body = np.arange(self.rank)
         places = [np.concatenate([body, own]) for own in self.discrepancy]
         return [
@@ -158,13 +162,13 @@ class Nuisance:
 
     @cached_property
     def count(self) -> npt.NDArray[np.intp]:
-        """Return the number of informative entries of each recording, (K,)."""
+        """Return the number of rows of each recording with weight, summed over joints, (K,)."""
         folds = [part.fold for part in self.rows.data]
         return np.bincount(folds, [np.count_nonzero(w) for w in self.rows.weight]).astype(int)
 
     @cached_property
     def square(self) -> FloatArray:
-        """Products of all columns of each recording, (K, q + a, q + a); causes are last."""
+        """Gram matrix of nuisance columns and accepted causes, (K, q + a, q + a)."""
         if not self.accepted:
             return self.column_products[0]
         border = np.concatenate([self._acting(x) * x.products for x in self.accepted], axis=2)
@@ -177,7 +181,7 @@ class Nuisance:
 
     @cached_property
     def cross(self) -> FloatArray:
-        """Products of all columns of each recording with its residual, (K, q + a)."""
+        """Inner products of the residual with nuisance columns and accepted causes, (K, q + a)."""
         aims = [one.aim * self._acting(one)[:, :, 0] for one in self.accepted]
         return np.concatenate([self.column_products[1], *aims], axis=1)
 
@@ -187,58 +191,62 @@ class Nuisance:
         return np.array([np.sum(own**2) for own in self.residual])
 
     def _among_accepted(self, cause: Cause) -> FloatArray:
-        """Return the cross products of accepted causes with a cause, (K, a, p)."""
+        """Return the inner products of accepted causes with another cause, (K, a, p)."""
         parts = [self._acting(one) * one.products_with(cause) for one in self.accepted]
         return np.concatenate(parts, axis=1)
 
     def _acting(self, cause: Cause) -> FloatArray:
         """Return 1 for each recording in which an accepted cause acts, otherwise 0, (K, 1, 1)."""
-        return cause.acts(self.rows.today).astype(float)[:, np.newaxis, np.newaxis]
+        return cause.acts(self.rows.diagnosed).astype(float)[:, np.newaxis, np.newaxis]
 
     def products(self, cause: Cause) -> FloatArray:
-        """Return the cross products of all columns with a cause, (K, q + a, p)."""
+        """Return the inner products of all columns with those of a cause, (K, q + a, p)."""
         if not self.accepted:
             return cause.products
         return np.concatenate([cause.products, self._among_accepted(cause)], axis=1)
 
     def and_cause(self, cause: Cause, size: float = 1.0) -> Nuisance:
-        """Return the nuisance parameters with a cause added, with its deviation in its unit."""
+        """Add an accepted cause, with the prior standard deviation of its values over `unit`."""
         return replace(self, accepted=(*self.accepted, replace(cause, size=size)))
 
-    def without(self, name: int) -> Nuisance:
-        """Return the nuisance parameters without one of the accepted causes."""
-        return replace(self, accepted=(*self.accepted[:name], *self.accepted[name + 1 :]))
+    def without_cause(self, index: int) -> Nuisance:
+        """Return the regression problem without the accepted cause of this index."""
+        return replace(self, accepted=(*self.accepted[:index], *self.accepted[index + 1 :]))
 
     def with_residual(self, residual: Sequence[FloatArray]) -> Nuisance:
-        """Return the nuisance parameters for another weighted residual, (n, M) per recording."""
+        """Return the regression problem of another weighted residual, (n, M) per recording."""
         pairs = zip(self.columns, residual, strict=True)
         aims = np.array([x.reshape(-1, x.shape[2]).T @ y.ravel() for x, y in pairs])
-        accepted = tuple(one.aimed_at(residual) for one in self.accepted)
+        accepted = []
+        for one in self.accepted:
+            own = zip(one.columns, residual, strict=True)
+            aim = [np.einsum('tmp,tm->p', x, y[list(one.joints)]) for x, y in own]
+            accepted.append(replace(one, aim=np.array(aim)))
         return replace(
             self,
             residual=tuple(residual),
             column_products=(self.column_products[0], aims),
-            accepted=accepted,
+            accepted=tuple(accepted),
         )
 
     @property
-    def spans(self) -> list[slice]:
-        """Return the indices of the values of each accepted cause among all parameters."""
+    def value_slices(self) -> list[slice]:
+        """Return the slice of all parameters that holds the values of each accepted cause."""
         size = self.columns[0].shape[2]
         counts = [len(one.unit) for one in self.accepted]
         stops = size + np.cumsum(counts, dtype=int)
         return [slice(s - count, s) for count, s in zip(counts, stops.tolist(), strict=True)]
 
     @cached_property
-    def reach(self) -> FloatArray:
+    def unvisited_factor(self) -> FloatArray:
         """
-        Return the factor of the discrepancy in states that the first day did not reach, (n, f).
+        Return the factor by which states outside the baseline widen the discrepancy prior, (n, f).
 
-        The misfit limits the discrepancy in visited states only. In other states, the
-        discrepancy may be a share of the torque.
+        The misfit of the baseline limits the discrepancy in visited states only. In other states,
+        the discrepancy may be a share of the torque.
 
         """
-        before = self.rows.before
+        before = self.rows.n_baseline
         if not before:
             return np.ones(self.discrepancy.shape)
         then, now = (
@@ -250,61 +258,68 @@ class Nuisance:
             more = np.sqrt(np.where(now > 0.0, now / then, 1.0))
         return np.asarray(np.clip(more, 1.0, most[:, np.newaxis]))
 
-    def prior(self, setting: Setting) -> tuple[npt.NDArray[np.intp], FloatArray]:
-        """Return the indices of the fitted parameters, and the precision of their prior."""
+    def prior(self, hyperparameters: Hyperparameters) -> tuple[npt.NDArray[np.intp], FloatArray]:
+        """Return the indices of the fitted parameters, and their prior precision matrix."""
         unit = self.rows.amplitude[0]
         rigid = self.base.independent < len(self.arm.robot.rigid_parameters)
-        scale = np.where(rigid, setting.body or 1.0, 1.0)
+        scale = np.where(rigid, hyperparameters.body or 1.0, 1.0)
         squares = np.diagonal(self.column_products[0], axis1=1, axis2=2).sum(axis=0)[: self.rank]
         body = self.prior_precision / np.outer(scale, scale)
         body += _MIN_PRECISION * np.diag(np.where(squares > 0.0, squares, 1.0))
-        size = max(setting.shared, _MIN_PRECISION) * unit[:, np.newaxis] * self.reach
+        size = (
+            max(hyperparameters.shared, _MIN_PRECISION)
+            * unit[:, np.newaxis]
+            * self.unvisited_factor
+        )
         of_causes = [one.size * one.unit for one in self.accepted]
         others = np.concatenate([size.ravel(), *of_causes]) ** -2.0
         whole = linalg.block_diag(body, np.diag(others))
         fitted = np.ones(len(whole), dtype=bool)
-        fitted[: self.rank] = (setting.body > 0.0) | self.unset
-        fitted[self.discrepancy.ravel()] = setting.shared > 0.0
+        fitted[: self.rank] = (hyperparameters.body > 0.0) | self.unset
+        fitted[self.discrepancy.ravel()] = hyperparameters.shared > 0.0
         used = np.flatnonzero(fitted)
         return used, whole[np.ix_(used, used)]
 
     def rows_of(self, k: int) -> FloatArray:
-        """Return the weighted columns of all parameters in a recording, (M, n, q + a)."""
+        """Return the weighted columns of all parameters in recording k, (M, n, q + a)."""
         joints, rows, _ = self.columns[k].shape
         blocks = [self.columns[k]]
         for one in self.accepted:
             own = np.zeros((joints, rows, len(one.unit)))
-            if one.acts(self.rows.today)[k]:
+            if one.acts(self.rows.diagnosed)[k]:
                 own[list(one.joints)] = one.columns[k]
             blocks.append(own)
         return np.concatenate(blocks, axis=2).swapaxes(0, 1)
 
-    def marginal(
+    def posterior(
         self,
-        setting: Setting,
+        hyperparameters: Hyperparameters,
         among: Sequence[int] | None = None,
         less: tuple[int, FloatArray, FloatArray] | None = None,
-    ) -> Marginal:
-        """Return the posterior under one setting; see `marginals`."""
-        return self.marginals([setting], among, less)[0]
+    ) -> NuisancePosterior:
+        """Return the posterior of the parameters for one set of hyperparameters."""
+        return self.posteriors([hyperparameters], among, less)[0]
 
-    def marginals(
+    def posteriors(
         self,
-        settings: Sequence[Setting],
+        settings: Sequence[Hyperparameters],
         among: Sequence[int] | None = None,
         less: tuple[int, FloatArray, FloatArray] | None = None,
-    ) -> list[Marginal]:
+    ) -> list[NuisancePosterior]:
         """
-        Integrate out the discrepancies d_k once, and fit the other parameters in each setting.
+        Return the posterior for each set of hyperparameters; all share `own` and `noise`.
+
+        The discrepancies d_k of single recordings are integrated out once, by their Schur
+        complement.
 
         Parameters
         ----------
-        settings : sequence of Setting
-            Amplitudes of discrepancy and noise, which differ in those of the priors alone.
+        settings : sequence of Hyperparameters
+            The sets of hyperparameters.
         among : sequence of int, optional
-            The recordings that are fitted; all by default.
+            Indices of the recordings that are fitted; all by default.
         less : (int, ndarray, shape (S, q + a), ndarray, shape (S,)), optional
-            A recording, with columns and residual of those of its rows that are left out.
+            Held-out rows: the index of their recording, their columns, and their residual.
 
         """
         fitted = list(range(len(self.columns)) if among is None else among)
@@ -317,10 +332,10 @@ class Nuisance:
             count, power = count - len(y), power - float(y @ y)
         priors = [self.prior(one) for one in settings]
         used = priors[0][0]
-        known = square.sum(axis=0)[np.ix_(used, used)] * scale
+        information = square.sum(axis=0)[np.ix_(used, used)] * scale
         vector = cross.sum(axis=0)[used] * scale
         loss, motion = 0.5 * power * scale, None
-        normaliser = -float(count) / settings[0].lasting * np.log(settings[0].noise)
+        normaliser = -float(count) / settings[0].correlated_rows * np.log(settings[0].noise)
         if settings[0].own:
             place, functions = self.discrepancy, self.discrepancy.shape[1]
             size = settings[0].own * np.array(self.rows.amplitude)[fitted]
@@ -331,74 +346,84 @@ class Nuisance:
             regressed = covariance @ border.reshape(*precision.shape[:3], -1)
             regressed = regressed.reshape(border.shape)
             aim = cross[:, place] * scale
-            known -= border.reshape(-1, len(used)).T @ regressed.reshape(-1, len(used))
+            information -= border.reshape(-1, len(used)).T @ regressed.reshape(-1, len(used))
             vector -= aim.ravel() @ regressed.reshape(-1, len(used))
             loss -= 0.5 * float(np.einsum('kjf,kjfg,kjg->', aim, covariance, aim))
             normaliser -= 0.5 * float(np.linalg.slogdet(precision)[1].sum())
             normaliser -= functions * float(np.log(size).sum())
-            motion = MotionDiscrepancy(covariance, aim, regressed)
+            motion = MotionDiscrepancies(covariance, aim, regressed)
         found = []
-        for setting, (_, prior) in zip(settings, priors, strict=True):
-            lower = np.asarray(np.linalg.cholesky(prior + known))
+        for hyperparameters, (_, prior) in zip(settings, priors, strict=True):
+            lower = np.asarray(np.linalg.cholesky(prior + information))
             values = linalg.cho_solve((lower, True), vector)
             left = loss - 0.5 * float(vector @ values)
-            evidence = 0.5 * float(np.linalg.slogdet(prior)[1]) + setting.prior + normaliser - left
+            evidence = (
+                0.5 * float(np.linalg.slogdet(prior)[1])
+                + hyperparameters.prior
+                + normaliser
+                - left
+            )
             evidence -= float(np.sum(np.log(np.diag(lower))))
-            found.append(Marginal(setting, used, lower, values, evidence, left, motion))
+            found.append(
+                NuisancePosterior(hyperparameters, used, lower, values, evidence, left, motion)
+            )
         return found
 
-    def whole(self, under: Marginal) -> tuple[FloatArray, FloatArray]:
-        """Return means and covariance of all parameters; zero for those that are not fitted."""
+    def moments(self, posterior: NuisancePosterior) -> tuple[FloatArray, FloatArray]:
+        """Return mean and covariance of all parameters; zero for those that are not fitted."""
         size = self.cross.shape[1]
         covariance = np.zeros((size, size))
-        covariance[np.ix_(under.used, under.used)] = under.root.T @ under.root
-        return self.means(under), covariance
+        covariance[np.ix_(posterior.used, posterior.used)] = posterior.root.T @ posterior.root
+        return self.means(posterior), covariance
 
-    def means(self, under: Marginal) -> FloatArray:
-        """Return the means of all parameters under a setting; zero where not fitted."""
+    def means(self, posterior: NuisancePosterior) -> FloatArray:
+        """Return the posterior means of all parameters; zero for those that are not fitted."""
         values = np.zeros(self.cross.shape[1])
-        values[under.used] = under.values
+        values[posterior.used] = posterior.values
         return values
 
     def residual_at(self, values: FloatArray, k: int) -> FloatArray:
-        """Return the weighted residual of a recording, which includes d_k, (n, M)."""
+        """Return the weighted residual of recording k for given parameters and d_k = 0, (n, M)."""
         columns = self.columns[k]
         residual = self.residual[k] - columns @ values[: columns.shape[2]]
-        for one, span in zip(self.accepted, self.spans, strict=True):
-            if one.acts(self.rows.today)[k]:
+        for one, span in zip(self.accepted, self.value_slices, strict=True):
+            if one.acts(self.rows.diagnosed)[k]:
                 residual[list(one.joints)] -= one.columns[k] @ values[span]
         return residual
 
-    def squares_of_today(self, under: Marginal) -> float:
-        """Return the sum of squares of the weighted residual of the diagnosed day."""
-        values, today = self.means(under), np.flatnonzero(self.rows.today).tolist()
+    def squares_of_diagnosed(self, posterior: NuisancePosterior) -> float:
+        """Return the sum of squared weighted residuals of the diagnosed recordings."""
+        values, today = self.means(posterior), np.flatnonzero(self.rows.diagnosed).tolist()
         return float(sum(np.sum(self.residual_at(values, k) ** 2) for k in today))
 
-    def noise_at(self, values: FloatArray, setting: Setting, k: int) -> FloatArray:
-        """Return the weighted residual of a recording minus its fitted d_k, (n, M)."""
+    def noise_at(self, values: FloatArray, hyperparameters: Hyperparameters, k: int) -> FloatArray:
+        """Return the weighted residual of recording k for given parameters, d_k fitted, (n, M)."""
         residual = self.residual_at(values, k)
-        if not setting.own:
+        if not hyperparameters.own:
             return residual
-        size = setting.own * self.rows.amplitude[k]
+        size = hyperparameters.own * self.rows.amplitude[k]
         for joint, place in enumerate(self.discrepancy):
             functions = self.columns[k][joint][:, place]
-            precision = setting.precision * functions.T @ functions
+            precision = hyperparameters.precision * functions.T @ functions
             precision += np.eye(len(place)) * size[joint] ** -2.0
-            aim = setting.precision * functions.T @ residual[joint]
+            aim = hyperparameters.precision * functions.T @ residual[joint]
             residual[joint] -= functions @ np.linalg.solve(precision, aim)
         return residual
 
-    def lasting(self, under: Marginal, recordings: Sequence[int], least: float) -> float:
+    def correlation_length(
+        self, posterior: NuisancePosterior, recordings: Sequence[int], least: float
+    ) -> float:
         """
-        Return for how many rows the residual is correlated, the median over joints [rows].
+        Return the number of correlated residual rows that equal one independent row, at least 1.
 
-        It is the sum of the correlations at all lags, up to the first one below 0.05.
+        It is one plus twice the sum of the autocorrelations up to the first one below 0.05, as the
+        median over joints and recordings.
 
         """
         lengths = []
-        values = self.means(under)
+        values = self.means(posterior)
         for k in recordings:
-            for x in self.noise_at(values, under.setting, k):
+            for x in self.noise_at(values, posterior.hyperparameters, k):
                 x = x[np.abs(x) > 0.0]
                 if len(x) >= 60:  # three times the largest lag
                     correlation = np.array([x[lag:] @ x[:-lag] for lag in range(1, 20)]) / (x @ x)

@@ -1,12 +1,12 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-The odds of one cause: the likelihood ratio of the data with and without it.
+Bayes factor of one cause: the ratio of the data's probability density with and without the cause.
 
-A cause may have acted before the change (g0). Its values differ between recordings (u_k),
-because they depend on the misfit. The spread of u_k is estimated for the cause and shrunk
-towards the spread of all causes in the baseline (Smyth, Linear models and empirical Bayes methods,
-2004).
+The notation is that of `nuisance`. A cause may have acted in the baseline (g0). Its values differ
+between recordings (u_k), because they depend on the misfit. The variance of u_k is estimated for
+the cause and shrunk towards that of all causes in the baseline (Smyth, Linear models and empirical
+Bayes methods, 2004).
 
 """
 
@@ -15,43 +15,44 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from armid_ros.diagnosis.search.cause import Cause, room
+from armid_ros.diagnosis.search.cause import bounds_of_change, Cause
+from armid_ros.diagnosis.search.hyperparameters import NuisancePosterior
 from armid_ros.diagnosis.search.nuisance import Nuisance
-from armid_ros.diagnosis.search.setting import Marginal
 from armid_ros.diagnosis.settings import SIZES, THERE
 from armid_ros.motion import FloatArray
 import numpy as np
 import numpy.typing as npt
 from scipy import special
 
-#: Spreads: variances of values between recordings over those for white noise. Equal values,
-#: candidate spreads of a cause, and candidate spreads of all causes in a baseline.
-EQUAL = np.zeros(1)
+#: Spreads: variance of fitted values between recordings over their variance for white noise. No
+#: spread, candidate spreads of one cause, and candidate spreads of all causes in a baseline.
+NO_SPREAD = np.zeros(1)
 OWN_SPREADS = np.array([0.0, 1.0, 3.0, 10.0, 30.0, 100.0])
 _USUAL_SPREADS = np.array([0.0, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0, 128.0])
-#: Usual spread if the baseline has fewer than two recordings: the median of 72 arms.
+#: Typical spread if the baseline has fewer than two recordings: the median of 72 arms.
 POPULATION_SPREAD = 1.0
 #: Log odds of physically impossible values.
 IMPOSSIBLE = -1e6
-#: Relative rounding error of a column's squares, added to its part outside nuisance columns.
+#: Relative rounding error of a column's squared norm, added to its part outside nuisance columns.
 _ROUNDING = 1e-7
 
 
 @dataclass(frozen=True)
 class CauseFit:
     """
-    Posterior of the values of a cause, with its evidence.
+    Log Bayes factor of a cause, and the Gaussian posterior of its values.
 
     Attributes
     ----------
     factor : float
         Log Bayes factor.
     explained : float
-        Part of `factor` from the squares that the values explain; the rest penalises their number.
+        Half of the squared weighted residual that the values explain, a part of `factor`. The
+        other part is the penalty for the number of values.
     size : float
-        Standard deviation of the prior of the values, over their unit.
+        Prior standard deviation of the values, over their unit.
     values, std : ndarray, shape (p,)
-        Values and their standard deviations.
+        Posterior means and standard deviations of the values.
     resolution : ndarray, shape (p,)
         One where the data determine a value, zero where only the prior does (Menke, Geophysical
         Data Analysis, 1989).
@@ -69,41 +70,62 @@ class CauseFit:
 @dataclass(frozen=True)
 class CauseInformation:
     """
-    Information on the values of causes, per group of recordings, in their units.
+    Fisher information on the p values of causes in G groups of recordings.
+
+    The nuisance parameters are integrated out. Values are in the units of their cause.
 
     Attributes
     ----------
     matrix : ndarray, shape (..., G p, G p)
-        Precision of the values in each group; for several causes, one after the other.
+        Fisher information of each cause: precision of its values in all groups.
     vector : ndarray, shape (..., G p)
-        Matrix times mean.
-    today : ndarray of bool, shape (G,)
-        Whether each group is of the diagnosed day.
+        Fisher information times least-squares values.
+    diagnosed : ndarray of bool, shape (G,)
+        Whether each group consists of diagnosed recordings.
     visible : ndarray, shape (...)
-        Share of the length of the columns that the nuisance columns cannot reproduce.
+        Share of the norm of the columns that the nuisance columns cannot reproduce.
 
     """
 
     matrix: FloatArray
     vector: FloatArray
-    today: npt.NDArray[np.bool_]
+    diagnosed: npt.NDArray[np.bool_]
     visible: FloatArray
 
     @classmethod
     def of(
-        cls, causes: Sequence[Cause], nuisance: Nuisance, under: Marginal, by_day: bool = False
+        cls,
+        causes: Sequence[Cause],
+        nuisance: Nuisance,
+        posterior: NuisancePosterior,
+        by_day: bool = False,
     ) -> CauseInformation:
-        """Return the information on C causes with the same number of values."""
-        today, scale = nuisance.rows.today, under.setting.precision
+        """
+        Integrate out the nuisance parameters for causes with equal numbers of values.
+
+        Parameters
+        ----------
+        causes : sequence of Cause
+            The causes.
+        nuisance : Nuisance
+            The regression problem.
+        posterior : NuisancePosterior
+            Posterior of the nuisance parameters without the causes.
+        by_day : bool
+            Whether values are equal in all baseline and in all diagnosed recordings; otherwise
+            each recording is a group.
+
+        """
+        today, scale = nuisance.rows.diagnosed, posterior.hyperparameters.precision
         count, recordings, p = len(causes), len(today), len(causes[0].unit)
-        first = np.unique([0, nuisance.rows.before]) if by_day else np.arange(recordings)
+        first = np.unique([0, nuisance.rows.n_baseline]) if by_day else np.arange(recordings)
         products = np.concatenate([nuisance.products(one) for one in causes], axis=2) * scale
         own = np.array([one.own for one in causes]) * scale
         aim = np.array([one.aim for one in causes]) * scale
         total = np.trace(own, axis1=2, axis2=3).sum(axis=1)
-        border = products[:, under.used]
-        if under.motion is not None:
-            motion, made = under.motion, products[:, nuisance.discrepancy]
+        border = products[:, posterior.used]
+        if posterior.motion is not None:
+            motion, made = posterior.motion, products[:, nuisance.discrepancy]
             flat = made.reshape(recordings, -1, count * p)
             solved = (motion.covariance @ made).reshape(flat.shape)
             border -= motion.regressed.swapaxes(1, 2) @ flat
@@ -118,7 +140,7 @@ class CauseInformation:
         size = len(first) * p
         by_cause = border.reshape(len(first), -1, count, p).transpose(2, 1, 0, 3)
         border = by_cause.reshape(count, -1, size)
-        fitted = under.root @ border
+        fitted = posterior.root @ border
         unit = np.tile([one.unit for one in causes], len(first))
         square = _block_diagonal(own)
         whole = square - fitted.swapaxes(1, 2) @ fitted
@@ -128,44 +150,44 @@ class CauseInformation:
         held = np.eye(size) * (_ROUNDING * length + 1e-12)[:, np.newaxis]
         return cls(
             0.5 * (whole + whole.swapaxes(1, 2)) + held,
-            (aim.reshape(count, size) - under.values @ border) * unit,
+            (aim.reshape(count, size) - posterior.values @ border) * unit,
             today[first],
             np.sqrt(np.clip(seen, 0.0, 1.0)),
         )
 
     @property
     def size(self) -> int:
-        """Return the number of values of a cause."""
-        return int(self.vector.shape[-1]) // len(self.today)
+        """Return the number p of values of a cause."""
+        return int(self.vector.shape[-1]) // len(self.diagnosed)
 
-    def of_day(self, today: bool) -> CauseInformation:
-        """Return the information from the diagnosed day only, or from the baseline only."""
-        of_it = self.today == today
+    def of_day(self, diagnosed: bool) -> CauseInformation:
+        """Return the information of the diagnosed groups only, or of the baseline groups only."""
+        of_it = self.diagnosed == diagnosed
         found = self._at(np.flatnonzero(np.repeat(of_it, self.size)))
-        return replace(found, today=self.today[of_it])
+        return replace(found, diagnosed=self.diagnosed[of_it])
 
     def among(self, values: npt.NDArray[np.intp]) -> CauseInformation:
-        """Return the information on some of the values, while the others are zero."""
-        return self._at(np.add.outer(self.size * np.arange(len(self.today)), values).ravel())
+        """Return the information on a subset of the values, if the other values are zero."""
+        return self._at(np.add.outer(self.size * np.arange(len(self.diagnosed)), values).ravel())
 
     def _at(self, kept: npt.NDArray[np.intp]) -> CauseInformation:
         matrix = self.matrix[..., kept[:, np.newaxis], kept]
         return replace(self, matrix=matrix, vector=self.vector[..., kept])
 
-    def apart(self, spread: float) -> list[FloatArray]:
-        """Return a root of the prior covariance of differences between recordings; or []."""
+    def difference_root(self, spread: float) -> list[FloatArray]:
+        """Return a root R of the prior covariance RR' of the u_k in a list; empty for spread 0."""
         if not spread:
             return []
-        p, groups = self.size, len(self.today)
+        p, groups = self.size, len(self.diagnosed)
         blocks = self.matrix.reshape(*self.matrix.shape[:-2], groups, p, groups, p)
         size, axes = np.linalg.eigh(np.einsum('...gpgq->...pq', blocks) / groups)
         size = np.maximum(size, 1e-9 * np.maximum(size.max(axis=-1, keepdims=True), 1e-300))
         root = axes * np.sqrt(np.minimum(spread / size, THERE**2))[..., np.newaxis, :]
         return [_block_diagonal(np.stack([root] * groups, axis=-3))]
 
-    def there(self) -> FloatArray:
-        """Return a root of the prior covariance of values that are the same on both days (g0)."""
-        return np.tile(THERE * np.eye(self.size), (len(self.today), 1))
+    def baseline_root(self) -> FloatArray:
+        """Return a root R of the prior covariance RR' of g0, which is equal in all groups."""
+        return np.tile(THERE * np.eye(self.size), (len(self.diagnosed), 1))
 
 
 def _block_diagonal(blocks: FloatArray) -> FloatArray:
@@ -180,74 +202,62 @@ def _block_diagonal(blocks: FloatArray) -> FloatArray:
 def odds(
     cause: Cause,
     nuisance: Nuisance,
-    under: Marginal,
-    usual: float = 0.0,
-    spreads: FloatArray = EQUAL,
+    posterior: NuisancePosterior,
+    typical_spread: float = 0.0,
+    spreads: FloatArray = NO_SPREAD,
 ) -> CauseFit:
-    """Return the log Bayes factor of a cause and its posterior values; see `posteriors`."""
-    known = CauseInformation.of([cause], nuisance, under, by_day=not spreads.any())
-    return posteriors([cause], nuisance, known, usual, spreads)[0]
+    """Return the log Bayes factor of a cause and the posterior of its values."""
+    information = CauseInformation.of([cause], nuisance, posterior, by_day=not spreads.any())
+    return cause_fits([cause], nuisance, information, typical_spread, spreads)[0]
 
 
-def all_odds(
-    causes: Sequence[Cause], nuisance: Nuisance, under: Marginal
-) -> list[tuple[Cause, CauseFit]]:
-    """Return causes with their odds for equal values in all recordings."""
-    alike: dict[tuple[int, bool], list[Cause]] = {}
-    for one in causes:
-        alike.setdefault((len(one.unit), one.effect.lasting), []).append(one)
-    found = list[tuple[Cause, CauseFit]]()
-    for group in alike.values():
-        known = CauseInformation.of(group, nuisance, under, by_day=True)
-        found += zip(group, posteriors(group, nuisance, known), strict=True)
-    return found
-
-
-def posteriors(
+def cause_fits(
     causes: Sequence[Cause],
     nuisance: Nuisance,
-    known: CauseInformation,
-    usual: float = 0.0,
-    spreads: FloatArray = EQUAL,
+    information: CauseInformation,
+    typical_spread: float = 0.0,
+    spreads: FloatArray = NO_SPREAD,
 ) -> list[CauseFit]:
     """
-    Return the log Bayes factors of causes and their posterior values.
+    Return the log Bayes factors of causes and the posteriors of their values.
 
-    Physically impossible values count against a cause; see `allowed`.
+    Physically impossible values reduce the factor; see `log_probability_in_bounds`.
 
     Parameters
     ----------
     causes : sequence of Cause
-        Causes with the same number of values, which act on the same days.
+        Causes with the same number of values, which act in the same recordings.
     nuisance : Nuisance
-        Nuisance parameters of the comparison.
-    known : CauseInformation
-        Information on the causes.
-    usual : float
-        The usual spread of values between recordings.
+        Regression problem of the nuisance parameters.
+    information : CauseInformation
+        Fisher information on the values of the causes.
+    typical_spread : float
+        Typical variance of fitted values between recordings, over that for white noise.
     spreads : ndarray, shape (k,)
         Spreads to average over.
 
     """
-    count, p, acts = len(causes), known.size, causes[0].acts(known.today)
-    there = [known.there()] if not np.all(acts) else []
-    if nuisance.rows.unseen:  # the largest values that a misfit of known size allows
+    count, p, acts = len(causes), information.size, causes[0].acts(information.diagnosed)
+    baseline_root = [information.baseline_root()] if not np.all(acts) else []
+    if nuisance.rows.misfit_only:  # the largest values that a misfit of known size allows
         misfit, largest = nuisance.rows.amplitude[-1], np.empty((count, p))
         for k, cause in enumerate(causes):
             joints = list(cause.joints)
             torque = np.maximum(cause.torque[joints] * cause.unit, 1e-300)
             largest[k] = THERE * np.min(misfit[joints, np.newaxis] / torque, axis=0)
-        there = [np.tile(np.eye(p) * largest[:, np.newaxis], (len(known.today), 1))]
+        baseline_root = [
+            np.tile(np.eye(p) * largest[:, np.newaxis], (len(information.diagnosed), 1))
+        ]
     asked = np.kron(acts.astype(float)[:, np.newaxis], np.eye(p))
-    prior = -0.5 * np.log((spreads + 1.0) / (usual + 1.0)) ** 2
+    prior = -0.5 * np.log((spreads + 1.0) / (typical_spread + 1.0)) ** 2
     prior -= np.logaddexp.reduce(prior)
     nothing, changed = np.tile(prior, (2, count, 1))
     squares = SIZES[:, np.newaxis] ** 2
     tried = list[tuple[FloatArray, ...]]()
     for n, spread in enumerate(spreads.tolist()):
-        square, aim = known.matrix, known.vector
-        for root in [*known.apart(spread), *there]:
-            square, aim, more = without(square, aim, root)
+        square, aim = information.matrix, information.vector
+        for root in [*information.difference_root(spread), *baseline_root]:
+            square, aim, more = marginalised(square, aim, root)
             nothing[:, n] += more
         own, to = asked.T @ square @ asked, aim @ asked
         value, axes = np.linalg.eigh(own)
@@ -276,19 +286,19 @@ def posteriors(
     arrays = zip(numbers, values, std, resolution, strict=True)
     fits = [CauseFit(*three, *rest) for three, *rest in arrays]
     return [
-        replace(fit, factor=fit.factor + allowed(cause, fit, nuisance))
+        replace(fit, factor=fit.factor + log_probability_in_bounds(cause, fit, nuisance))
         for cause, fit in zip(causes, fits, strict=True)
     ]
 
 
-def allowed(cause: Cause, fit: CauseFit, nuisance: Nuisance) -> float:
-    """Return the log of posterior over prior probability within the bounds, for each value."""
+def log_probability_in_bounds(cause: Cause, fit: CauseFit, nuisance: Nuisance) -> float:
+    """Return the log of posterior over prior probability that all values are within bounds."""
     arm, kept = nuisance.arm, list(cause.kept)
     whole, std = np.zeros((2, len(cause.effect.parameters(arm.robot))))
     whole[kept], std[kept] = fit.values, fit.std
     if not cause.effect.plausible(whole, std, arm):
         return IMPOSSIBLE
-    lower, upper = (bound[kept] for bound in room(cause.effect, arm))
+    lower, upper = (bound[kept] for bound in bounds_of_change(cause.effect, arm))
     found, prior = (
         special.ndtr((upper - mean) / wide) - special.ndtr((lower - mean) / wide)
         for mean, wide in ((fit.values, fit.std), (0.0, fit.size * cause.unit))
@@ -297,38 +307,47 @@ def allowed(cause: Cause, fit: CauseFit, nuisance: Nuisance) -> float:
     return float(np.sum(ratio))
 
 
-def usual_spread(causes: Sequence[Cause], nuisance: Nuisance, under: Marginal) -> float:
+def typical_spread_of(
+    causes: Sequence[Cause], nuisance: Nuisance, posterior: NuisancePosterior
+) -> float:
     """
-    Return the spread of values between recordings of the baseline: the geometric mean of causes.
+    Return the typical spread of fitted values between baseline recordings: a mean over causes.
 
-    With fewer than two recordings it is `POPULATION_SPREAD`.
+    The mean is geometric. With fewer than two recordings it is `POPULATION_SPREAD`.
 
     """
-    if nuisance.rows.before < 2:
+    if nuisance.rows.n_baseline < 2:
         return POPULATION_SPREAD
     logs = []
     for cause in causes:
         if cause.effect.traits.external:
             continue
-        known = CauseInformation.of([cause], nuisance, under).of_day(today=False)
+        information = CauseInformation.of([cause], nuisance, posterior).of_day(diagnosed=False)
         found = []
         for spread in _USUAL_SPREADS:
-            square, aim, total = known.matrix, known.vector, 0.0
-            for root in [*known.apart(spread), known.there()]:
-                square, aim, more = without(square, aim, root)
+            square, aim, total = information.matrix, information.vector, 0.0
+            for root in [*information.difference_root(spread), information.baseline_root()]:
+                square, aim, more = marginalised(square, aim, root)
                 total += float(more[0])
-            found.append(total / known.size)
+            found.append(total / information.size)
         logs.append(np.log(_USUAL_SPREADS[int(np.argmax(found))] + 1.0))
     return float(np.exp(np.mean(logs)) - 1.0) if logs else POPULATION_SPREAD
 
 
-def without(
+def marginalised(
     square: FloatArray, aim: FloatArray, root: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """
-    Marginalise values of covariance R R'; return the reduced equations and log evidence.
+    Integrate random values with prior covariance R R' out of normal equations.
 
     Equations of several causes, (..., Gp, Gp) and (..., Gp), are reduced together.
+
+    Returns
+    -------
+    square, aim : ndarray, shape (..., Gp, Gp), (..., Gp)
+        The reduced equations.
+    gained : ndarray, shape (...)
+        Log evidence of these random values.
 
     """
     border = square @ root

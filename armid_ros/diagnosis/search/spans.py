@@ -3,8 +3,8 @@
 """
 Time spans in which a cause acts, such as a payload that is picked up and put down.
 
-Every cause is fitted with columns that are zero outside a span of each recording. In one
-recording after the other, the pair of change points with the largest evidence is searched.
+Each cause is fitted with columns that are zero outside one span of each recording. The start and
+end with the largest Bayes factor are searched, for one recording after the other.
 
 """
 
@@ -18,8 +18,8 @@ from pathlib import Path
 from typing import TypeAlias
 
 from armid_ros.diagnosis.search.cause import Cause
-from armid_ros.diagnosis.search.odds import CauseInformation, OWN_SPREADS, posteriors
-from armid_ros.diagnosis.search.trial import Look, Ranked
+from armid_ros.diagnosis.search.odds import cause_fits, CauseInformation, OWN_SPREADS
+from armid_ros.diagnosis.search.ranking import RankedCause, Ranking
 from armid_ros.diagnosis.settings import Thresholds
 from armid_ros.motion import FloatArray
 import numpy as np
@@ -29,7 +29,7 @@ import numpy.typing as npt
 _STEP, _SHORTEST = 0.25, 3.0
 #: Number of candidate change points of the first pass, in each recording.
 _COARSE = 9
-#: First and last change point of the span of each recording.
+#: Indices of the first and last change point of the span in each recording.
 Spans: TypeAlias = Mapping[int, tuple[int, int]]
 
 
@@ -41,11 +41,11 @@ class Span:
     Attributes
     ----------
     source : str
-        The recording.
+        Name of the recording.
     start, stop : float
-        Beginning and end of the span [s]; equal if the cause does not act in this recording.
+        Start and end of the span [s]; equal if the cause does not act in this recording.
     whole : bool
-        Whether the cause acts throughout.
+        Whether the cause acts throughout the recording.
 
     """
 
@@ -56,24 +56,24 @@ class Span:
 
 
 @dataclass(frozen=True)
-class _Timed:
-    """A cause with candidate change points (edges) in each recording of the diagnosed day."""
+class _TimedCause:
+    """A cause with candidate change points (edges) in each diagnosed recording."""
 
-    ranked: Ranked
-    look: Look
+    ranked: RankedCause
+    ranking: Ranking
 
     @cached_property
     def times(self) -> dict[int, FloatArray]:
-        """Time of the rows of each recording [s]."""
-        rows = self.look.nuisance.rows
+        """Times of the rows of each diagnosed recording [s]."""
+        rows = self.ranking.nuisance.rows
         return {
             k: np.concatenate([part.t for part in rows.data if part.fold == k])
-            for k in np.flatnonzero(rows.today).tolist()
+            for k in np.flatnonzero(rows.diagnosed).tolist()
         }
 
     @cached_property
     def edges(self) -> dict[int, npt.NDArray[np.intp]]:
-        """Rows of each recording at which a span may begin or end."""
+        """Row indices of each diagnosed recording at which a span may start or end."""
         found = {}
         for k, t in self.times.items():
             points = np.linspace(t[0], t[-1], max(int((t[-1] - t[0]) / _STEP), 1) + 1)
@@ -83,8 +83,8 @@ class _Timed:
 
     @cached_property
     def _sums(self) -> dict[int, list[FloatArray]]:
-        """Products with nuisance columns, columns and residual, summed up to each edge."""
-        nuisance, cause = self.look.nuisance, self.ranked.cause
+        """Inner products with nuisance columns, columns and residual, summed up to each edge."""
+        nuisance, cause = self.ranking.nuisance, self.ranked.cause
         joints = list(cause.joints)
         found = dict[int, list[FloatArray]]()
         for k, edges in self.edges.items():
@@ -99,9 +99,9 @@ class _Timed:
                 found[k].append(np.cumsum([np.zeros_like(parts[0]), *parts], axis=0))
         return found
 
-    def within(self, tried: Sequence[Spans]) -> list[Ranked]:
-        """Return the cause that acts between two edges of each recording, for several spans."""
-        nuisance, cause = self.look.nuisance, self.ranked.cause
+    def within(self, tried: Sequence[Spans]) -> list[RankedCause]:
+        """Return the cause with columns that are zero outside the spans, for each set of spans."""
+        nuisance, cause = self.ranking.nuisance, self.ranked.cause
         causes, choices = list[Cause](), list[float]()
         for spans in tried:
             products, own, aim = (x.copy() for x in (cause.products, cause.own, cause.aim))
@@ -113,15 +113,15 @@ class _Timed:
                     choices[-1] += float(np.log(0.5 * count * (count - 1)))
             causes.append(replace(cause, products=products, own=own, aim=aim))
         # Earlier values act throughout, so that all spans are compared with the same null model.
-        known = CauseInformation.of(causes, nuisance, self.ranked.under, by_day=True)
-        fits = posteriors(causes, nuisance, known.of_day(today=True))
+        information = CauseInformation.of(causes, nuisance, self.ranked.posterior, by_day=True)
+        fits = cause_fits(causes, nuisance, information.of_day(diagnosed=True))
         return [
-            replace(self.ranked, cause=timed, fit=fit, data=fit.factor - choice)
+            replace(self.ranked, cause=timed, fit=fit, log_bayes_factor=fit.factor - choice)
             for timed, choice, fit in zip(causes, choices, fits, strict=True)
         ]
 
     @cached_property
-    def throughout(self) -> Ranked:
+    def throughout(self) -> RankedCause:
         """The cause that acts throughout."""
         return self.within([self._whole])[0]
 
@@ -129,8 +129,8 @@ class _Timed:
     def _whole(self) -> Spans:
         return {k: (0, len(edges) - 1) for k, edges in self.edges.items()}
 
-    def coarse(self) -> tuple[Ranked, Spans]:
-        """Return the likeliest spans on a coarse grid of edges."""
+    def coarse(self) -> tuple[RankedCause, Spans]:
+        """Return the cause with its likeliest spans on a coarse grid of edges."""
         found, spans = self.throughout, self._whole
         for k, edges in self.edges.items():
             coarse = np.unique(np.linspace(0, len(edges) - 1, _COARSE).astype(int)).tolist()
@@ -138,8 +138,8 @@ class _Timed:
             found, spans = self._likeliest_span(found, spans, k, tried)
         return found, spans
 
-    def refined(self, found: Ranked, spans: Spans) -> tuple[Ranked, Spans]:
-        """Return spans after each edge is moved twice to the likeliest change point."""
+    def refined(self, found: RankedCause, spans: Spans) -> tuple[RankedCause, Spans]:
+        """Return the cause after two passes in which each edge moves to its likeliest place."""
         for _ in range(2):
             for k, edges in self.edges.items():
                 near = (len(edges) - 1) // (_COARSE - 1)
@@ -152,12 +152,12 @@ class _Timed:
 
     def _likeliest_span(
         self,
-        found: Ranked,
+        found: RankedCause,
         spans: Spans,
         recording: int,
         tried: Iterable[tuple[int, int]],
-    ) -> tuple[Ranked, Spans]:
-        """Return the likeliest candidate span of one recording."""
+    ) -> tuple[RankedCause, Spans]:
+        """Return the cause with the likeliest of several candidate spans of one recording."""
         last, least = len(self.edges[recording]) - 1, round(_SHORTEST / _STEP)
         others = [
             {**spans, recording: (a, b)}
@@ -165,18 +165,21 @@ class _Timed:
             if 0 <= a <= b <= last and (b - a >= least or a == b == 0)
         ]
         ranked = self.within(others) if others else []
-        pairs: list[tuple[Ranked, Spans]] = [(found, spans), *zip(ranked, others, strict=True)]
-        return max(pairs, key=lambda one: one[0].worth)
+        pairs: list[tuple[RankedCause, Spans]] = [
+            (found, spans),
+            *zip(ranked, others, strict=True),
+        ]
+        return max(pairs, key=lambda one: one[0].log_posterior)
 
 
-def acting_spans(look: Look, thresholds: Thresholds) -> tuple[Span, ...]:
+def acting_spans(ranking: Ranking, thresholds: Thresholds) -> tuple[Span, ...]:
     """
     Return the time spans in which the likeliest cause acts.
 
     Parameters
     ----------
-    look : Look
-        Comparison of causes that act throughout.
+    ranking : Ranking
+        Ranking of causes that act throughout.
     thresholds : Thresholds
         Log odds (`alarm`) required over causes that act throughout, and over mere differences of
         values between recordings.
@@ -184,20 +187,22 @@ def acting_spans(look: Look, thresholds: Thresholds) -> tuple[Span, ...]:
     Returns
     -------
     tuple of Span
-        One for each recording of the diagnosed day; empty if no span reaches these odds.
+        One for each diagnosed recording; empty if no span reaches these odds.
 
     """
-    if not look.ranking:
+    if not ranking.ranked:
         return ()
-    timed = [_Timed(one, look) for one in look.ranking]
-    coarse = sorted(((*one.coarse(), one) for one in timed), key=lambda one: -one[0].worth)
+    timed = [_TimedCause(one, ranking) for one in ranking.ranked]
+    coarse = sorted(((*one.coarse(), one) for one in timed), key=lambda one: -one[0].log_posterior)
     found = [(*own.refined(one, near), own) for one, near, own in coarse[:3]]
-    best, spans, own = max(found, key=lambda one: one[0].worth)
-    throughout = max((one.throughout for one in timed), key=lambda one: one.worth)
-    nuisance = look.nuisance
-    known = CauseInformation.of([best.cause], nuisance, best.under).of_day(today=True)
-    (there,) = posteriors([best.cause], nuisance, known, look.usual, OWN_SPREADS)
-    lead = best.ahead(throughout, thresholds)
+    best, spans, own = max(found, key=lambda one: one[0].log_posterior)
+    throughout = max((one.throughout for one in timed), key=lambda one: one.log_posterior)
+    nuisance = ranking.nuisance
+    information = CauseInformation.of([best.cause], nuisance, best.posterior).of_day(
+        diagnosed=True
+    )
+    (there,) = cause_fits([best.cause], nuisance, information, ranking.typical_spread, OWN_SPREADS)
+    lead = best.log_odds_over(throughout, thresholds)
     if min(lead, there.factor) <= thresholds.alarm:
         return ()
     rows, result = nuisance.rows, []

@@ -1,3 +1,3 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""From an explanation to shares of the gap, a verdict, a sentence and a document."""
+"""Verdict of a diagnosis: shares of the residual, findings, sentences and diagnosis.json."""

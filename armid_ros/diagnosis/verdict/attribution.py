@@ -1,11 +1,11 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Shares of the held-out gap that the causes explain, and the choice of the headline.
+Share of the held-out squared residual that each cause explains, and the causes of the headline.
 
-The gap is the sum of squares of the weighted residual of the model. Causes are added one by one,
-in order of gain; intervals come from resampled blocks (bootstrap). The headline lists the causes
-with a large enough share, the others are minor.
+The gap is the sum of squared weighted residuals of the model. Causes are added one by one, in
+order of their gain (reduction of the gap). Intervals come from resampled time blocks (bootstrap).
+The headline lists the causes with a large enough share; the other causes are minor.
 
 """
 
@@ -17,8 +17,8 @@ from dataclasses import dataclass
 from armid_ros.diagnosis.data.evidence import Evidence
 from armid_ros.diagnosis.data.trajectory import block_rows
 from armid_ros.diagnosis.search.explanation import Explanation
+from armid_ros.diagnosis.search.joint_fit import JointFit
 from armid_ros.diagnosis.search.nuisance import Nuisance
-from armid_ros.diagnosis.search.posterior import JointFit
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.motion import FloatArray
 import numpy as np
@@ -27,16 +27,16 @@ import numpy as np
 @dataclass(frozen=True)
 class Attribution:
     """
-    The gap, and the gain (reduction of the gap) of each named cause, per block of rows.
+    Squared held-out residual per time block, and its reduction by each named cause.
 
     Attributes
     ----------
     order : tuple of int
         Indices of the named causes in the order in which they are added, largest gain first.
     gap : ndarray, shape (B,)
-        Squared held-out residual without named causes.
+        Squared held-out residual of each block without named causes.
     gains : ndarray, shape (K, B)
-        Gain of each named cause, in the order of the explanation.
+        Its reduction by each named cause, in the order of the explanation.
 
     """
 
@@ -45,12 +45,12 @@ class Attribution:
     gains: FloatArray
 
     def share(self, names: Sequence[int]) -> float:
-        """Return the share of the gap that some causes explain together, at most 1."""
+        """Return the share of the gap that these causes explain together, at most 1."""
         share = self.gains[list(names)].sum() / max(float(self.gap.sum()), 1e-300)
         return min(float(share), 1.0)
 
     def interval(self, names: Sequence[int], rng: np.random.Generator) -> tuple[float, float]:
-        """Return the 95 % interval of the share that some causes explain together."""
+        """Return the 95 % interval of the share that these causes explain together."""
         # with 500 resamples, the ends of the interval are accurate to a tenth of its width
         drawn = rng.integers(len(self.gap), size=(500, len(self.gap)))
         gains = self.gains[list(names)].sum(axis=0)[drawn].sum(axis=1)
@@ -63,19 +63,19 @@ def headline(
     explanation: Explanation, unseen: Evidence | None, least: float, settings: DiagnosisSettings
 ) -> tuple[Explanation, Attribution]:
     """
-    Move causes with a small share to the minor causes; return the shares of all others.
+    Move causes with a small share to the minor causes; return the shares of the other causes.
 
-    Shares are cross-validated, and measured on held-out data if there are any. A cause is minor
-    if its larger share is below `least`, and no joint has a gap without it: a cause may act in
-    some motions only. It is minor as well if it increases one of the prediction errors. The
-    returned shares are those of held-out data if there are any.
+    Shares are cross-validated, and also measured on held-out recordings if there are any. A cause
+    is minor if its larger share is below `least`, and no joint has a gap without it: a cause may
+    act in some motions only. It is minor as well if it increases one of the prediction errors. The
+    returned shares are those of held-out recordings if there are any.
 
     Parameters
     ----------
     explanation : Explanation
         The fitted causes.
     unseen : Evidence or None
-        Held-out data.
+        Held-out recordings.
     least : float
         Smallest share of a cause in the headline.
     settings : DiagnosisSettings
@@ -84,8 +84,8 @@ def headline(
     """
     if not explanation.steps:
         return explanation, Attribution((), np.ones(1), np.zeros((0, 1)))
-    fitted = left_out(explanation)
-    held_out = None if unseen is None else predicted(explanation, fitted.order, unseen)
+    fitted = cross_validated(explanation)
+    held_out = None if unseen is None else held_out_gains(explanation, fitted.order, unseen)
     causes = range(len(explanation.steps))
     measured = [fitted] if held_out is None else [fitted, held_out]
     share = np.array([max(one.share([k]) for one in measured) for k in causes])
@@ -103,8 +103,10 @@ def headline(
     return explanation, held_out or fitted
 
 
-def predicted(explanation: Explanation, order: Sequence[int], unseen: Evidence) -> Attribution:
-    """Return the gain of each cause on held-out data; causes are added in a given order."""
+def held_out_gains(
+    explanation: Explanation, order: Sequence[int], unseen: Evidence
+) -> Attribution:
+    """Return the gains of causes on held-out recordings, if they are added in a given order."""
     fewer = [explanation.only(order[:count]) for count in range(1, len(order))]
     every = [explanation.reference, *(one.fitted for one in fewer), explanation.fitted]
     arms = [one.arm for one in every[: len(order) + 1]]
@@ -114,16 +116,16 @@ def predicted(explanation: Explanation, order: Sequence[int], unseen: Evidence) 
     return Attribution(tuple(order), squares[0], gains)
 
 
-def left_out(explanation: Explanation) -> Attribution:
-    """Return the cross-validated gain of each cause, added in order of gain."""
+def cross_validated(explanation: Explanation) -> Attribution:
+    """Return the cross-validated gains of all causes, which are added in order of gain."""
     assert explanation.problem is not None
     problem, named = explanation.problem, explanation.fitted.named
     linear = problem.linear(named)
-    folds, spans = list(_folds(problem, linear)), linear.spans
+    folds, spans = list(_folds(problem, linear)), linear.value_slices
     remaining, order = list(range(len(named))), list[int]()
 
     def squared_residual(causes: Sequence[int]) -> FloatArray:
-        """Return the squared held-out residual of each block, all other causes being zero."""
+        """Return the squared held-out residual of each block if other causes are zero, (B,)."""
         others = [spans[n] for n in range(len(named)) if n not in causes]
         absent = [k for span in others for k in range(span.start, span.stop)]
         squares = []
@@ -151,18 +153,18 @@ def _folds(
     problem: JointFit, linear: Nuisance
 ) -> Iterator[tuple[list[FloatArray], list[FloatArray], FloatArray, FloatArray]]:
     """
-    Yield the folds of the diagnosed day.
+    Yield each held-out fold of the diagnosed recordings, with the fit to all other rows.
 
-    A fold has weighted columns (m, p) and residual (m,) of its blocks, and the means and the
-    covariance of all parameters fitted to all other rows. Columns are zero for parameters that
-    are not part of the arm.
+    A fold has weighted columns (m, p) and residual (m,) of its blocks, and mean and covariance of
+    all parameters, fitted to the other rows. Columns of parameters that the patched arm does not
+    include, such as discrepancies, are zero.
 
     """
     rows = linear.rows
     part_of_arm = np.ones(linear.cross.shape[1], dtype=bool)
-    part_of_arm[: linear.rank] = problem.stated
+    part_of_arm[: linear.rank] = problem.patches_body
     part_of_arm[linear.discrepancy] = False
-    for k in (k for k in problem.recordings if rows.today[k]):
+    for k in (k for k in problem.recordings if rows.diagnosed[k]):
         block, fold = block_rows([part for part in rows.data if part.fold == k])
         x, y = linear.rows_of(k), linear.residual[k].T
         for one in np.unique(fold):
@@ -170,5 +172,5 @@ def _folds(
             columns = [x[own].reshape(-1, x.shape[2]) for own in blocks]
             target = [y[own].ravel() for own in blocks]
             less = k, np.concatenate(columns), np.concatenate(target)
-            under = linear.marginal(problem.setting, problem.recordings, less)
-            yield [own * part_of_arm for own in columns], target, *linear.whole(under)
+            posterior = linear.posterior(problem.hyperparameters, problem.recordings, less)
+            yield [own * part_of_arm for own in columns], target, *linear.moments(posterior)

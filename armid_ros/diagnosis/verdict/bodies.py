@@ -1,9 +1,9 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Bodies that torques do not determine: loads on either of two links, and inconsistent inertias.
+Loads that fit on either of two links, and refitted inertias that are physically impossible.
 
-A body centred on the axis of a turning joint loads every joint alike on either link.
+A load whose centre is on the axis of a revolute joint has equal torques on either of its links.
 
 """
 
@@ -13,8 +13,8 @@ from dataclasses import replace
 
 from armid_ros.diagnosis.search.cause import NamedEffect
 from armid_ros.diagnosis.search.explanation import Explanation
-from armid_ros.diagnosis.search.posterior import Fitted, JointFit
-from armid_ros.diagnosis.search.trial import Trial
+from armid_ros.diagnosis.search.joint_fit import Fitted, JointFit
+from armid_ros.diagnosis.search.ranking import CauseResult
 from armid_ros.effects.quantities import MIN_Z_SCORE
 from armid_ros.errors import IdentificationError
 from armid_ros.identification.physical.fit_among_bodies import physical_program, PhysicalSettings
@@ -27,12 +27,12 @@ import numpy as np
 _MAX_LOSS_RATIO = 1.05
 
 
-def is_same_body(one: Trial, other: Trial, robot: Robot) -> bool:
+def is_same_body(one: CauseResult, other: CauseResult, robot: Robot) -> bool:
     """
-    Return whether two causes are one load, on the link before or after a turning joint.
+    Return whether two causes are one load on either of the two links of a revolute joint.
 
-    Both have the same mass, and the centre of the load of the outer link is on the axis, within
-    three standard deviations.
+    Both have the same mass, and the centre of the load on the outer link is on the joint axis,
+    within three standard deviations.
 
     """
     own = one.effect
@@ -50,8 +50,8 @@ def is_same_body(one: Trial, other: Trial, robot: Robot) -> bool:
     return bool(same_mass and distance <= MIN_Z_SCORE * np.linalg.norm(std[1:4]))
 
 
-def _values(trial: Trial) -> tuple[FloatArray, FloatArray]:
-    """Return all values of a load, and their deviations, zero where they are not fitted."""
+def _values(trial: CauseResult) -> tuple[FloatArray, FloatArray]:
+    """Return values and standard deviations of a load, zero where they are not fitted, (10,)."""
     values, std = np.zeros((2, len(LINK_PARAMETERS)))
     kept = list(trial.kept)
     values[kept], std[kept] = trial.values, trial.std
@@ -59,7 +59,7 @@ def _values(trial: Trial) -> tuple[FloatArray, FloatArray]:
 
 
 def on_outer_link(explanation: Explanation) -> Explanation:
-    """Return the explanation with each load on the outer link, if two links may carry it."""
+    """Move each load that two links may carry to the outer link, and refit the explanation."""
     if explanation.problem is None:
         return explanation
     robot, steps, fitted = explanation.given.robot, explanation.steps, explanation.fitted
@@ -80,10 +80,17 @@ def on_outer_link(explanation: Explanation) -> Explanation:
 
 def as_bodies(explanation: Explanation) -> tuple[Explanation, tuple[str, ...]]:
     """
-    Return the explanation with physically consistent links; if impossible, unchanged with a note.
+    Replace impossible inertias by physically consistent ones near the description.
 
-    A fit of base parameters may give impossible links. They are replaced by consistent links near
-    the description with an equally good fit.
+    The links have to fit the data as well as before. If this is impossible, the explanation is
+    unchanged.
+
+    Returns
+    -------
+    explanation : Explanation
+        The explanation with physically consistent links.
+    notes : tuple of str
+        A note if there are none.
 
     """
     problem, fitted = explanation.problem, explanation.fitted
@@ -115,13 +122,13 @@ def as_bodies(explanation: Explanation) -> tuple[Explanation, tuple[str, ...]]:
 
 
 def _products(problem: JointFit, fitted: Fitted) -> tuple[FloatArray, float]:
-    """Return the normal equations of the base columns and their target, and the number of rows."""
+    """Return the inner products of base columns and their torque, (r + 1, r + 1), and the rows."""
     nuisance, base = problem.nuisance, problem.nuisance.base
     rank = nuisance.rank
     then, now = (base.values(x.theta[: len(base.standard)]) for x in (problem.arm, fitted.arm))
     patched = problem.with_model(fitted.arm)
     products = np.zeros((rank + 1, rank + 1))
-    for k, today in enumerate(nuisance.rows.today):
+    for k, today in enumerate(nuisance.rows.diagnosed):
         values = now if today else then
         square = patched.column_products[0][k][:rank, :rank]
         residual = patched.column_products[1][k][:rank]

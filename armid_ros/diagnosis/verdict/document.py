@@ -1,9 +1,9 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-diagnosis.json, schema armid/diagnosis/1.
+Content of diagnosis.json, with the smallest detectable size of each effect.
 
-It includes the smallest detectable size of each effect: smaller effects may exist without a name.
+Smaller effects may exist without being named.
 
 """
 
@@ -15,7 +15,7 @@ from typing import Any
 
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.search.explanation import Explanation
-from armid_ros.diagnosis.search.trial import Trial
+from armid_ros.diagnosis.search.ranking import CauseResult
 from armid_ros.diagnosis.verdict.finding import Diagnosis, Finding
 from armid_ros.effects import CATALOGUE, Effect
 from armid_ros.estimate import ParameterName
@@ -31,7 +31,7 @@ DETECTABLE_Z = 5.0
 
 def diagnosis_document(diagnosis: Diagnosis, model: str = 'model.yaml') -> dict[str, Any]:
     """
-    Return the content of diagnosis.json.
+    Return a diagnosis as the content of diagnosis.json, schema armid/diagnosis/1.
 
     Parameters
     ----------
@@ -86,6 +86,20 @@ def diagnosis_document(diagnosis: Diagnosis, model: str = 'model.yaml') -> dict[
 
 def _finding(finding: Finding) -> dict[str, Any]:
     rows = zip(finding.parameters, finding.values, finding.std, strict=True)
+    ties = []
+    for tie in finding.ties:
+        _, value, std, _ = next(row for row in finding.rows if row[0].joint == tie.joint)
+        ties.append(
+            {
+                'segment': tie.name,
+                'joint': tie.joint,
+                'point': list(tie.point),
+                'partner_joint': tie.other_joint,
+                'partner_point': list(tie.other_point),
+                'stiffness': value,
+                'interval': [value - HALF_WIDTH * std, value + HALF_WIDTH * std],
+            }
+        )
     return {
         'name': finding.name,
         'joints': list(finding.joints),
@@ -108,29 +122,8 @@ def _finding(finding: Finding) -> dict[str, Any]:
             for r in finding.rivals
         ],
         'experiment': finding.experiment,
-        **_ties(finding),
+        **({'ties': ties} if ties else {}),
     }
-
-
-def _ties(finding: Finding) -> dict[str, Any]:
-    """Return the ties of a finding to another machine, with the intervals of their stiffness."""
-    if not finding.ties:
-        return {}
-    rows = []
-    for tie in finding.ties:
-        _, value, std, _ = next(row for row in finding.rows if row[0].joint == tie.joint)
-        rows.append(
-            {
-                'segment': tie.name,
-                'joint': tie.joint,
-                'point': list(tie.point),
-                'partner_joint': tie.other_joint,
-                'partner_point': list(tie.other_point),
-                'stiffness': value,
-                'interval': [value - HALF_WIDTH * std, value + HALF_WIDTH * std],
-            }
-        )
-    return {'ties': rows}
 
 
 def _gap(diagnosis: Diagnosis) -> dict[str, Any]:
@@ -153,7 +146,7 @@ def _gap(diagnosis: Diagnosis) -> dict[str, Any]:
 
 
 def _candidates(explanation: Explanation) -> list[dict[str, Any]]:
-    """Return the first candidates of the survey: named causes, then the likeliest others."""
+    """Return the first 20 visible causes: named causes, then the likeliest other causes."""
     return [
         {
             'name': trial.effect.name,
@@ -176,7 +169,7 @@ def _finite(value: float) -> float | None:
 @dataclass(frozen=True)
 class Detectable:
     """
-    Smallest detectable size of an effect.
+    Smallest size of an effect that the data would show.
 
     Attributes
     ----------
@@ -185,9 +178,9 @@ class Detectable:
     joints : tuple of str
         Joints on which it acts; empty for the whole arm.
     parameter : ParameterName or None
-        Parameter to which `size` belongs; None if no size is detectable.
+        Parameter whose size it is; None if no size is detectable.
     size : float
-        Smallest detectable size while other parameters are fitted jointly; inf if there is none.
+        Smallest detectable size if all parameters are fitted jointly; inf if there is none.
     visible : float
         Share of its torque that the nuisance parameters cannot reproduce.
 
@@ -200,9 +193,9 @@ class Detectable:
     visible: float
 
 
-def _detectable_size(trial: Trial, arm: ArmModel) -> tuple[ParameterName, float]:
+def _detectable_size(trial: CauseResult, arm: ArmModel) -> tuple[ParameterName, float]:
     """
-    Return the first identifiable parameter of a cause in the catalogue, and its detectable size.
+    Return the first identifiable parameter of a cause, and its smallest detectable size.
 
     A detectable size is significant and material. It is inf if no possible size is detectable.
 
@@ -226,10 +219,10 @@ def _detectable_size(trial: Trial, arm: ArmModel) -> tuple[ParameterName, float]
 
 def is_possible(effect: Effect, index: int, size: float, robot: Robot) -> bool:
     """
-    Return whether a parameter of an effect can have a size on a robot.
+    Return whether a value of an effect parameter is physically possible on a robot.
 
-    The size must not exceed the largest value of its quantity. A size of a million typical values
-    means that the motion excites the effect less than rounding errors do.
+    It must not exceed the largest value of its quantity. A detectable size of a million typical
+    values means that the motion excites the effect less than rounding errors do.
 
     """
     owner, which = divmod(index, len(effect.quantities))
@@ -239,7 +232,7 @@ def is_possible(effect: Effect, index: int, size: float, robot: Robot) -> bool:
 
 
 def detectable(explanation: Explanation | None) -> tuple[Detectable, ...]:
-    """Return the detectable sizes of all effects on all joints, in the order of the catalogue."""
+    """Return the smallest detectable size of each effect on each joint, in catalogue order."""
     if explanation is None:
         return ()
     rows = []

@@ -1,20 +1,14 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""
-Result of a diagnosis, and its reported causes.
-
-A cause has its name, joints, values, share of the gap, and rivals.
-
-"""
+"""Result of a diagnosis: verdict, named effects with values and rivals, and residuals."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.data.evidence import Evidence
-from armid_ros.diagnosis.data.trajectory import not_shown, Trajectory
+from armid_ros.diagnosis.data.trajectory import Trajectory, unchecked_joints
 from armid_ros.diagnosis.search.explanation import Explanation
 from armid_ros.diagnosis.search.spans import Span
 from armid_ros.diagnosis.verdict.where import Where
@@ -31,9 +25,18 @@ import scipy.linalg
 @dataclass(frozen=True)
 class Rival:
     """
-    A competing cause that the data do not exclude, with joints and probability.
+    Another effect that explains the data about as well as a named effect.
 
-    The same body may be on the link before or after a joint; that is no other cause.
+    Attributes
+    ----------
+    name : str
+        Name of the effect.
+    joints : tuple of str
+        Joints on which it acts; empty for the whole arm.
+    probability : float
+        Probability among all causes.
+    same_body : bool
+        Whether it is the named load on the other link of a joint, and no other cause.
 
     """
 
@@ -46,7 +49,7 @@ class Rival:
 @dataclass(frozen=True)
 class Finding:
     """
-    One effect that the diagnosis names.
+    One effect that a diagnosis names, with values, share of the gap and rivals.
 
     Attributes
     ----------
@@ -63,7 +66,7 @@ class Finding:
     share_interval : tuple of float
         The 95 % interval of the share.
     p : float
-        Probability that the effect is not there, or has not changed.
+        Probability that the effect is absent, or has not changed.
     rivals : tuple of Rival
         Other effects that the data do not exclude, the likeliest first.
     sign : str
@@ -73,15 +76,15 @@ class Finding:
     weighs : bool
         Whether its first value is a mass.
     together : tuple of str
-        Other effects of the same cause, with a common share: gravity of another direction is also
-        gravity of another size.
+        Names of other effects of the same cause, with a common share, such as size and direction
+        of gravity.
     added_to : tuple of float
         Values of the same parameters in the given model, to which `values` are added; empty
         if none is known.
     look_at : str
         Part of the robot to inspect, if several effects have one cause; else empty.
     probability : float
-        Probability among all explanations.
+        Probability among all causes.
 
     """
 
@@ -104,7 +107,7 @@ class Finding:
 
     @property
     def rows(self) -> list[tuple[ParameterName, float, float, float]]:
-        """Parameters, values, deviations, and values of the given model (0 for a load)."""
+        """Each parameter with value, standard deviation, and value in the given model."""
         given = (0.0,) * len(self.values) if self.weighs or not self.added_to else self.added_to
         return [
             (name, value, std, before if abs(before) > HALF_WIDTH * std else 0.0)
@@ -115,20 +118,21 @@ class Finding:
 
     @property
     def other_causes(self) -> tuple[Rival, ...]:
-        """Rivals that are other causes, and not the same body on another link."""
+        """Rivals other than the same load on another link."""
         return tuple(rival for rival in self.rivals if not rival.same_body)
 
     @property
     def ambiguous_with(self) -> tuple[str, ...]:
-        """Names of the effects that are other causes."""
+        """Names of the rivals other than the same load on another link."""
         return tuple(rival.name for rival in self.other_causes)
 
     @property
     def experiment(self) -> str:
         """
-        Return the experiment that excludes the likeliest rival; empty without rival.
+        Return advice on the recording that separates the effect from its likeliest rival.
 
-        No motion separates a payload from the link that carries it: the payload has to be weighed.
+        It is empty without rival. No motion separates a payload from its link, so the payload has
+        to be weighed.
 
         """
         if not self.other_causes:
@@ -154,25 +158,25 @@ class Finding:
         return f'To separate {names}, record {best}.'
 
     def place_of(self, joint: str) -> str:
-        """Return the name of the tied segment of a joint, or of the joint without a tie."""
+        """Return the name of the tied segment of a joint, or the joint itself without a tie."""
         return next((tie.name for tie in self.ties if tie.joint == joint), joint)
 
 
 @dataclass(frozen=True)
 class Overlay:
     """
-    Measured and predicted torques of one trajectory, filtered alike.
+    Measured and predicted torques of one trajectory, with the same filter.
 
     Attributes
     ----------
     source : str
-        The recording.
+        Name of the recording.
     trajectory : Trajectory
         Motion of the recording.
     measured, before, after : ndarray, shape (M, n)
         Measured torque, and predictions of the model without and with the named effects [N m].
     sigma : ndarray, shape (n,)
-        Unit of the gap [N m].
+        Floor of each joint: its noise, or the misfit of the model if larger [N m].
 
     """
 
@@ -187,21 +191,21 @@ class Overlay:
 @dataclass(frozen=True)
 class Gap:
     """
-    Size of the gap, without and with the named effects.
+    Root mean square residual of each joint without and with the named effects.
 
     Attributes
     ----------
     before, after, floor : ndarray, shape (n,)
-        Root mean square residual of each joint without and with the named effects, and root mean
-        square unit of the gap [N m].
+        Root mean square residual of each joint without and with the named effects, and the floor
+        [N m].
     chi2_before : ndarray, shape (n,)
-        Mean square of the weighted residual without the named effects.
+        Mean square of the residual over the floor, without the named effects.
     closed : float
-        Share of the gap, without its noise, that the named effects explain, 0 to 1.
+        Share of the gap above the floor that the named effects explain, 0 to 1.
     predicted : bool
-        Whether the gap was measured on held-out recordings.
+        Whether the residual is that of held-out recordings.
     overlays : tuple of Overlay
-        Torques of each trajectory.
+        Measured and predicted torques of each trajectory.
 
     """
 
@@ -216,14 +220,14 @@ class Gap:
     @classmethod
     def of(cls, explanation: Explanation, unseen: Evidence | None) -> Gap:
         """
-        Measure the gap on held-out data; if there are none, on the fitted data.
+        Measure the residuals in held-out recordings, or in the fitted ones without any.
 
         Parameters
         ----------
         explanation : Explanation
             The fitted causes.
         unseen : Evidence or None
-            Held-out data, in the unit of the gap.
+            Held-out recordings, with the floor as deviation.
 
         """
         before, after = explanation.reference.arm, explanation.fitted.arm
@@ -254,7 +258,7 @@ class Gap:
 
     @property
     def data(self) -> str:
-        """Return the kind of data on which the gap was measured, in words."""
+        """Name of the data whose residual it is: held-out, or fitted."""
         return 'held-out' if self.predicted else 'the data it was found in'
 
 
@@ -321,15 +325,9 @@ class Diagnosis:
     doubt: str = ''
     spans: tuple[Span, ...] = ()
 
-    def acting_in(self, spans: Sequence[Span]) -> Diagnosis:
-        """Return the diagnosis with the spans of time in which its causes act."""
-        seconds = [f'{one.source} from {one.start:.1f} to {one.stop:.1f} s' for one in spans]
-        summary = f'In {", ".join(seconds)}: {self.summary} Other seconds were not diagnosed.'
-        return replace(self, summary=summary, spans=tuple(spans))
-
     @property
     def estimate(self) -> Estimate | None:
-        """Estimate of the fit, followed by the parameters of the findings."""
+        """Estimate of the fitted parameters, followed by the values of the findings."""
         if self.explanation is None:
             return None
         fit = self.explanation.fitted.estimate
@@ -347,16 +345,16 @@ class Diagnosis:
 
     @property
     def overlays(self) -> tuple[Overlay, ...]:
-        """Measured and predicted torques; IdentificationError if the data were refused."""
+        """Measured and predicted torques of each trajectory; raises if the data are bad."""
         if self.gap is None:
             raise IdentificationError(f'no residual: {self.summary}')
         return self.gap.overlays
 
     @property
     def not_checked(self) -> tuple[str, ...]:
-        """Joints without informative rows: at rest throughout, or always reversing."""
-        return not_shown(self.data, self.arm.robot.joints)
+        """Joints that rest in all recordings, or reverse in every row."""
+        return unchecked_joints(self.data, self.arm.robot.joints)
 
     def __repr__(self) -> str:
-        """Return the verdict and its sentence."""
+        """Return the verdict and its summary."""
         return f'Diagnosis: {self.verdict}. {self.summary}'

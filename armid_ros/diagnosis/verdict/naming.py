@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""From the fitted causes of an explanation to effects of the catalogue, and their values."""
+"""Findings of a diagnosis: fitted causes as effects of the catalogue, with values and rivals."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from armid_ros.arm import ArmModel
-from armid_ros.diagnosis.search.cause import NamedEffect, room
+from armid_ros.diagnosis.search.cause import bounds_of_change, NamedEffect
 from armid_ros.diagnosis.search.explanation import Explanation
-from armid_ros.diagnosis.search.posterior import places
-from armid_ros.diagnosis.search.trial import Trial
+from armid_ros.diagnosis.search.joint_fit import places
+from armid_ros.diagnosis.search.ranking import CauseResult
 from armid_ros.diagnosis.verdict.attribution import Attribution
 from armid_ros.diagnosis.verdict.bodies import is_same_body
 from armid_ros.diagnosis.verdict.finding import Finding, Rival
@@ -24,7 +24,7 @@ import numpy as np
 
 
 class _Translation(NamedTuple):
-    """Fitted cause of an explanation, converted to an effect of the catalogue."""
+    """Effect of the catalogue that a fitted cause stands for, with its parameters and values."""
 
     effect: Effect
     parameters: tuple[ParameterName, ...]
@@ -39,9 +39,9 @@ def findings(
     rng: np.random.Generator,
 ) -> tuple[Finding, ...]:
     """
-    Return the findings, one for each name of an effect, the largest share of the gap first.
+    Return one finding for each name of an effect, the largest share of the gap first.
 
-    Findings of the same cause have the common share of all their causes.
+    Findings that stand for the same cause have a common share.
 
     """
     translated = _in_catalogue(explanation, arm)
@@ -92,18 +92,17 @@ def findings(
     return tuple(sorted(result, key=lambda one: -one.share))
 
 
-def small_print(explanation: Explanation) -> tuple[Finding, ...]:
+def minor_findings(explanation: Explanation) -> tuple[Finding, ...]:
     """
     Return findings of significant but immaterial causes, the likeliest first.
 
-    Causes with a significant value beyond its bound, which a comparison permits within noise, are
-    left out.
+    Causes with a value significantly outside its bounds are left out.
 
     """
     arm, result = explanation.given, []
     for trial in sorted(explanation.minor, key=lambda trial: -trial.gain):
         effect, kept = trial.effect, list(trial.kept)
-        lower, upper = (bound[kept] for bound in room(effect, arm))
+        lower, upper = (bound[kept] for bound in bounds_of_change(effect, arm))
         beyond = (trial.values < lower) | (trial.values > upper)
         if np.any(beyond & excludes_zero(trial.values, trial.std)):
             continue
@@ -127,7 +126,7 @@ def small_print(explanation: Explanation) -> tuple[Finding, ...]:
 
 
 def _in_catalogue(explanation: Explanation, arm: ArmModel) -> list[list[_Translation]]:
-    """Translate each fitted cause of an explanation into effects of the catalogue."""
+    """Return for each fitted cause the effects of the catalogue that it stands for."""
     fitted, estimate = explanation.fitted, explanation.fitted.estimate
     result = []
     for own, (kept, shapes) in zip(fitted.named, places(fitted.named), strict=True):
@@ -145,7 +144,7 @@ def _in_catalogue(explanation: Explanation, arm: ArmModel) -> list[list[_Transla
 
 
 def _translated(own: NamedEffect, covariance: FloatArray, arm: ArmModel) -> list[_Translation]:
-    """Translate an effect into others of the catalogue, with propagated standard deviations."""
+    """Convert an effect to other effects of the catalogue, and propagate standard deviations."""
     effect, kept, values, parts = own.effect, list(own.kept), own.values, []
     inside = np.zeros((len(values), len(values)))
     inside[np.ix_(kept, kept)] = covariance[: len(kept), : len(kept)]
@@ -176,7 +175,7 @@ def _translated(own: NamedEffect, covariance: FloatArray, arm: ArmModel) -> list
 
 
 def _is_significant(part: _Translation) -> bool:
-    """Return whether any value is significant (3 sigma) and not negligible."""
+    """Return whether any value exceeds three standard deviations and its smallest typical size."""
     typical = [q.typical[0] if q.typical else 0.0 for q in part.effect.quantities]
     count = len(part.values) - len(part.effect.shape)
     size, std = np.abs(part.values[:count]), part.std[:count]
@@ -184,17 +183,17 @@ def _is_significant(part: _Translation) -> bool:
 
 
 def _rivals(
-    trials: Sequence[Trial], own: Rival, others: set[str], arm: ArmModel
+    trials: Sequence[CauseResult], own: Rival, others: set[str], arm: ArmModel
 ) -> tuple[Rival, ...]:
     """
-    Return the two likeliest rivals of an effect on its joints (`own`), with their joints.
+    Return the two likeliest rivals of a finding (`own`), with their joints.
 
     The same effect in another joint is a rival as well; effects of other findings are not.
 
     """
-    best: dict[str, list[Trial]] = {}
+    best: dict[str, list[CauseResult]] = {}
     for one in trials:
-        here: dict[str, Trial] = {}
+        here: dict[str, CauseResult] = {}
         for rival in sorted(one.rivals, key=lambda rival: -rival.probability):
             effect = rival.effect
             if not (effect.name == own.name and set(effect.joints) <= set(own.joints)):
@@ -214,7 +213,7 @@ def _rivals(
 
 
 def _joints(groups: Sequence[tuple[str, ...]], arm: ArmModel) -> tuple[str, ...]:
-    """Return the joints of effects of one name, in the order of the arm unless any is a pair."""
+    """Return the joints of several effects without repetition, in the order of the arm."""
     joints = [joint for group in groups for joint in group]
     if any(len(group) > 1 for group in groups):
         return tuple(dict.fromkeys(joints))

@@ -1,17 +1,16 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-The posterior predictive check: residual with the named effects over its largest usual value.
+Checks whether the named effects explain the residual, up to noise and misfit.
 
-The usual value is larger in other motions, as the misfit varies between motions. At rest and in a
-reversal, dry friction can have any torque up to its limit, so these rows are checked separately: a
-residual beyond friction comes from a stop, a brake, or a contact.
+The limit of the residual is larger in held-out motions, as the misfit varies between motions. At
+rest and in a reversal, dry friction can have any torque up to its limit, so these rows are checked
+separately: a residual beyond friction comes from a stop, a brake, or a contact.
 
-The catalogue may lack a law: a new torque of one joint over its velocity or position, equal in all
-recordings of the day. It is a discrepancy of several times the usual size. The log odds of the
-larger size are compared with the alarm odds, while the named causes, the body and the usual
-discrepancy are fitted as well. If several causes were found in one joint, a law in place of them
-is a simpler explanation, and is compared with the named ones.
+The cause may be no effect of the catalogue, but a new torque of one joint as a function of its
+velocity or position, equal in all diagnosed recordings. Such an unlisted law is a model
+discrepancy of several times the usual size. It is found if the log odds of the larger size reach
+the alarm odds; named causes, rigid body and usual discrepancy are fitted as well.
 
 """
 
@@ -20,17 +19,18 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import product
 
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.data.baseline import Baseline
-from armid_ros.diagnosis.data.discrepancy import hats
+from armid_ros.diagnosis.data.discrepancy import hat_functions
 from armid_ros.diagnosis.data.evidence import Evidence
 from armid_ros.diagnosis.data.trajectory import REST_TIME
 from armid_ros.diagnosis.search.candidates import cause_of
 from armid_ros.diagnosis.search.cause import Cause
 from armid_ros.diagnosis.search.explanation import ESTIMATED, Explanation
+from armid_ros.diagnosis.search.joint_fit import JointFit
 from armid_ros.diagnosis.search.nuisance import Nuisance
-from armid_ros.diagnosis.search.posterior import JointFit
 from armid_ros.diagnosis.settings import DiagnosisSettings, Thresholds, UNLISTED
 from armid_ros.diagnosis.verdict.where import Excess, Where
 from armid_ros.effects import Effect, Quantity
@@ -43,10 +43,9 @@ from scipy.ndimage import uniform_filter1d
 #: the model's friction, whose direction is arbitrary at rest, adds one.
 _MAX_REST_OVER_FRICTION = 3.0
 #: Signature of a blocked joint.
-_WHERE = 'at rest or turning round, and more than friction: a stop, a brake or a contact'
-#: Sizes of a new law, as multiples of the joint's misfit, which is the size of the usual
-#: discrepancy. Of 40 arms with a right name or without a change, one has log odds above 3 (6.4, of
-#: a smaller torque).
+_WHERE = 'torque beyond friction at rest or in a reversal: a stop, a brake or a contact'
+#: Prior standard deviations of an unlisted law over the misfit of the joint. Of 40 arms with a
+#: right name or without a change, one has log odds above 3 (6.4, of a smaller torque).
 _LAW_SIZES = 3.0, 10.0
 #: Knots of velocities in each direction, as shares of the top speed.
 _SPEED_KNOTS = np.array([0.03, 0.1, 0.25, 0.5, 0.75, 1.0])
@@ -55,16 +54,16 @@ _SPEED_KNOTS = np.array([0.03, 0.1, 0.25, 0.5, 0.75, 1.0])
 @dataclass(frozen=True)
 class RemainingMisfit:
     """
-    The remaining misfit of an explanation: excess of the residual over its largest usual value.
+    Inputs of the checks whether named effects explain the residual of all recordings.
 
     Attributes
     ----------
     explanation : Explanation
         The named causes.
     data : tuple of Evidence
-        The fitted recordings, and the held-out ones if there are any.
+        The fitted recordings, then held-out recordings if there are any.
     before : Baseline or None
-        Recordings from when nothing was wrong.
+        Recordings from a time at which the model was right.
     given : ArmModel
         The given model.
     settings : DiagnosisSettings
@@ -78,29 +77,24 @@ class RemainingMisfit:
     given: ArmModel
     settings: DiagnosisSettings
 
-    def of_residual(self) -> list[Excess]:
+    def residual_over_limit(self) -> list[Excess]:
         """
-        Return the excess of the residual with the named causes, for each set of data.
+        Return squared residual over limit of fitted and of held-out data, with the named causes.
 
-        If the model is kept as given, body, friction and discrepancy fitted to both days are
-        subtracted: in other motions the arm visits other states, where the misfit differs.
+        If the misfit is known, fitted changes of body, friction and discrepancy are subtracted:
+        in other motions the arm visits other states, where the misfit differs.
 
         """
         explanation, problem = self.explanation, self.explanation.problem
         residuals = [part.residuals(explanation.fitted.arm) for part in self._parts]
         if problem is not None and not explanation.measured:
-            own = problem.residual_of_day(explanation.fitted)
+            own = problem.unexplained_residual(explanation.fitted)
             first = len(explanation.evidence.data)
             residuals = [own[:first], *(own[first:] or one for one in residuals[1:])]
         return list(self._over_limits(residuals))
 
-    def of_laws(self) -> list[Excess]:
-        """Return the excess of laws that the catalogue lacks, if the misfit is known."""
-        measured = self.explanation.measured
-        return [] if measured else unlisted_laws(self.explanation, self.settings)
-
-    def of_given_body(self) -> Excess | None:
-        """Return the excess with the given body; None if the body is not refitted."""
+    def given_body_over_limit(self) -> Excess | None:
+        """Return squared residual over limit with the given rigid body; None if not refitted."""
         if not self.explanation.refitted:
             return None
         given, fitted = self.given.theta, self.explanation.fitted.arm
@@ -132,39 +126,39 @@ class RemainingMisfit:
 
     @property
     def _parts(self) -> list[Evidence]:
-        """Return fitted and held-out data, in units of noise if the misfit is only estimated."""
+        """Return fitted and held-out data, weighted by noise if the misfit is only estimated."""
         if self.explanation.floor != ESTIMATED:
             return list(self.data)
         return [replace(part, sigma=part.noise) for part in self.data]
 
     def _over_limits(self, residuals: Sequence[Sequence[FloatArray]]) -> Iterator[Excess]:
-        """Yield the excess of residuals of the fitted data, and of the held-out data."""
+        """Yield squared residual over limit of the fitted data, then of the held-out data."""
         usual = 1.0 if self.explanation.measured else self.settings.thresholds.predicted
         more = usual, self.settings.thresholds.predicted
-        where = 'in the recordings', 'in recordings that were not used'
+        where = 'in the recordings', 'in held-out recordings'
         for part, own, factor, words in zip(self._parts, residuals, more, where, strict=False):
             limits = factor * part.limits(own, self.settings)
             yield Excess(part.chi2_per_row(own) / limits, words)
 
     def at_rest(self) -> list[Excess]:
-        """Return the excess of torque over friction in joints at rest, for each set of data."""
+        """Return squared residual over friction of joints at rest, in fitted and held-out data."""
         if self.settings.partner is not None:
             return []
         thresholds, before = self.settings.thresholds, self.before
         arm, usual = self.explanation.fitted.arm, np.ones(self.given.robot.n_joints)
-        if before is not None:  # an earlier blocking torque, such as that of a brake
+        if before is not None:  # a torque at rest in the baseline, such as that of a brake
             rows = Evidence.over_noise(before.data, (before.misfit,) * len(before.data))
             earlier = blocking_excess(self.given, rows, before.residual, thresholds.surely)
             usual = np.maximum(thresholds.same_fit * earlier, usual)
         surely = thresholds.surely
         ratios = (blocking_excess(arm, x, x.residuals(arm), surely) for x in self.data)
-        where = 'where it stands still or turns round'
-        more = ' in addition to friction: a stop, a brake or a contact does that'
+        where = 'at rest or in a reversal'
+        more = ' and friction, as with a stop, a brake or a contact'
         return [Excess(ratio / usual, where, more) for ratio in ratios]
 
 
 def locate_blocked_joints(arm: ArmModel, excesses: Sequence[Excess]) -> tuple[Where, ...]:
-    """Return joints with a torque beyond friction at rest, the largest excess first."""
+    """Return the joints whose residual at rest exceeds friction, the largest ratio first."""
     excess = np.max([np.zeros(arm.robot.n_joints), *(one.ratio for one in excesses)], axis=0)
     beyond = np.where(excess > 1.0, excess, 0.0)
     order = np.argsort(-beyond)[: np.count_nonzero(beyond)]
@@ -179,12 +173,12 @@ def blocking_excess(
     arm: ArmModel, evidence: Evidence, residual: Sequence[FloatArray], surely: float
 ) -> FloatArray:
     """
-    Return the squared ratio of the residual at rest and in reversals to friction, (n,).
+    Return the squared ratio of residual to friction of each joint at rest and in reversals, (n,).
 
-    `surely` units of noise and misfit are added to friction, scaled by the predicted torque over
-    its rms: the error of a model grows with its torque, which is large in a reversal. The
-    residual is averaged over the response time of the position filter, so that its response to a
-    jerk cancels. The time is at least `REST_TIME`, as shorter peaks may be random. The ratio is
+    `surely` standard deviations of noise and misfit are added to friction, scaled by the predicted
+    torque over its rms: the error of a model grows with its torque, which is large in a reversal.
+    The residual is averaged over the response time of the position filter, so that its response to
+    a jerk cancels. The time is at least `REST_TIME`, as shorter peaks may be random. The ratio is
     zero if the residual is below friction, or if dry friction is unknown.
 
     """
@@ -209,7 +203,7 @@ def blocking_excess(
 
 @dataclass(frozen=True)
 class UnlistedLaw(Effect):
-    """Torque of one joint as a function of its velocity or position, linear between knots."""
+    """Joint torque as a function of velocity or position that no effect of the catalogue has."""
 
     of: str = 'velocity'
     knots: tuple[float, ...] = ()
@@ -219,21 +213,21 @@ class UnlistedLaw(Effect):
     quantities = (Quantity('knot_torque', 'N m'),)
 
     def columns(self, motion: Motion, arm: Arm) -> FloatArray:
-        """Return the torque per unit knot value, (N, n, number of knots)."""
+        """Return the torque per unit torque at each knot (hat functions), (N, n, knots)."""
         link, (joint,) = arm.link_motion(motion), self.indices(motion.joints)
         x = (link.dq if self.of == 'velocity' else link.q)[:, joint]
         columns = np.zeros((len(x), motion.n_joints, len(self.knots)))
-        columns[:, joint] = np.column_stack(hats(x, np.array(self.knots)))
+        columns[:, joint] = np.column_stack(hat_functions(x, np.array(self.knots)))
         return columns
 
 
 def unlisted_laws(explanation: Explanation, settings: DiagnosisSettings) -> list[Excess]:
     """
-    Return the squared torque of new laws over its limit, for velocity and for position.
+    Return the squared torque of unlisted laws over its limit, for velocity and for position.
 
-    The limit is the squared unit of the gap plus a torque that is not material. The ratio is zero
-    in joints whose log odds of a new law are below the alarm odds. If several causes were found
-    in a joint, it is at least the ratio of `_instead`.
+    The limit is the squared floor of the gap plus that of the largest immaterial torque. The ratio
+    is zero in joints whose log odds of an unlisted law are below the alarm odds. If several causes
+    were found in a joint, it is at least the ratio of `_one_law_instead`.
 
     """
     problem, named, evidence = explanation.problem, explanation.fitted, explanation.evidence
@@ -245,36 +239,43 @@ def unlisted_laws(explanation: Explanation, settings: DiagnosisSettings) -> list
     ratio = {of: np.zeros(len(joints)) for of in ('velocity', 'position')}
     alarm = settings.thresholds.alarm + np.log(len(ratio) * len(joints))
     found = Counter(one.effect.joints for one in (*explanation.steps, *explanation.minor))
-    for law in _laws([linear.arm.link_motion(part.at_rows) for part in rows.data], joints):
-        joint = joints.index(law.joints[0])
+    motions = [linear.arm.link_motion(part.at_rows) for part in rows.data]
+    q, dq = (np.concatenate([getattr(one, x) for one in motions]) for x in ('q', 'dq'))
+    top = np.abs(dq).max(axis=0)
+    knots = {
+        'velocity': np.outer(top, [*-_SPEED_KNOTS[::-1], *_SPEED_KNOTS]),
+        'position': np.linspace(q.min(axis=0), q.max(axis=0), 12, axis=1),
+    }
+    for joint, of in product(range(len(joints)), ratio):
+        law = UnlistedLaw((joints[joint],), of=of, knots=tuple(knots[of][joint]))
         columns = [law.columns(part.at_rows, linear.arm) for part in rows.data]
         unit = np.full(len(law.knots), misfit[joint])
         cause, fits = cause_of(linear, law, (), columns, unit), []
         for size in (1.0, *_LAW_SIZES):
             with_law = linear.and_cause(cause, size)
-            under = with_law.marginal(problem.setting, problem.recordings)
-            fits.append(under.evidence)
+            posterior = with_law.posterior(problem.hyperparameters, problem.recordings)
+            fits.append(posterior.evidence)
         if found[law.joints] > 1:
-            ratio[law.of][joint] = _instead(problem, linear, cause, settings.thresholds)
+            ratio[of][joint] = _one_law_instead(problem, linear, cause, settings.thresholds)
         odds = np.logaddexp.reduce(fits[1:]) - np.log(len(_LAW_SIZES)) - fits[0]
         if odds > alarm:
-            values = with_law.means(under)[with_law.spans[-1]]
-            torque = np.concatenate([columns[k][:, joint] @ values for k in rows.today_parts])
+            values = with_law.means(posterior)[with_law.value_slices[-1]]
+            torque = np.concatenate([columns[k][:, joint] @ values for k in rows.diagnosed_parts])
             power = np.mean(torque**2) / limit[joint]
-            ratio[law.of][joint] = max(ratio[law.of][joint], power)
+            ratio[of][joint] = max(ratio[of][joint], power)
     return [Excess(own, f'that varies with its {of}') for of, own in ratio.items()]
 
 
-def _instead(problem: JointFit, linear: Nuisance, law: Cause, levels: Thresholds) -> float:
+def _one_law_instead(problem: JointFit, linear: Nuisance, law: Cause, levels: Thresholds) -> float:
     """
-    Return what a law explains in addition to the named causes of its joint, over its limit.
+    Return how much more one unlisted law explains than the causes of its joint, over the limit.
 
-    The law is fitted in place of these causes. At the limit it is as likely as they are, apart
+    The law is fitted in place of these causes. At the limit, it is as likely as the causes, apart
     from the relative error of the laws of the catalogue.
 
     """
-    named = linear.marginal(problem.setting, problem.recordings)
-    pairs = zip(linear.accepted, linear.spans, strict=True)
+    named = linear.posterior(problem.hyperparameters, problem.recordings)
+    pairs = zip(linear.accepted, linear.value_slices, strict=True)
     own = [(one, span) for one, span in pairs if one.joints == law.joints]
     if not own:
         return 0.0
@@ -284,23 +285,13 @@ def _instead(problem: JointFit, linear: Nuisance, law: Cause, levels: Thresholds
     made = [np.concatenate(one.columns, axis=1)[0] @ means[span] for one, span in own]
     size = 1.0 + float(np.sqrt(np.mean(np.sum(made, axis=0) ** 2)))
     fits = [
-        bare.and_cause(law, new * size).marginal(problem.setting, problem.recordings)
+        bare.and_cause(law, new * size).posterior(problem.hyperparameters, problem.recordings)
         for new in _LAW_SIZES
     ]
     best = max(fits, key=lambda fit: fit.evidence)
-    explained = bare.marginal(problem.setting, problem.recordings).loss - named.loss
+    explained = bare.posterior(problem.hyperparameters, problem.recordings).loss - named.loss
     gained = named.loss - best.loss
     odds = (
         best.evidence - float(np.log(len(_LAW_SIZES))) - named.evidence + float(np.log(UNLISTED))
     )
     return gained / (max(gained - odds, 0.0) + levels.inexact * max(explained, 1.0))
-
-
-def _laws(motions: list[Motion], joints: tuple[str, ...]) -> Iterator[UnlistedLaw]:
-    """Yield the laws of velocity and of position of every joint."""
-    q, dq = (np.concatenate([getattr(one, x) for one in motions]) for x in ('q', 'dq'))
-    for k, joint in enumerate(joints):
-        speeds = float(np.abs(dq[:, k]).max()) * _SPEED_KNOTS
-        yield UnlistedLaw((joint,), of='velocity', knots=(*-speeds[::-1], *speeds))
-        knots = np.linspace(q[:, k].min(), q[:, k].max(), 12)
-        yield UnlistedLaw((joint,), of='position', knots=tuple(knots))

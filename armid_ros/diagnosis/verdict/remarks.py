@@ -1,10 +1,10 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Remarks beside a verdict.
+Warnings and notes that are added to a verdict.
 
-They are doubts whether a model belongs to the arm, as its residual in the baseline is too large;
-unchecked joints; a cold start in degrees; and wear at equal temperature.
+They are warnings that a model may not belong to the arm, because its residual in the baseline is
+too large, and notes on joints at rest, on a cold start, and on wear at equal temperature.
 
 """
 
@@ -15,7 +15,7 @@ from collections.abc import Collection, Iterator, Sequence
 from armid_ros.arm import ArmModel, Misfit
 from armid_ros.diagnosis.data.baseline import Baseline
 from armid_ros.diagnosis.data.evidence import torque_rms
-from armid_ros.diagnosis.data.trajectory import not_shown, trajectories, Trajectory
+from armid_ros.diagnosis.data.trajectory import trajectories, Trajectory, unchecked_joints
 from armid_ros.diagnosis.settings import Thresholds
 from armid_ros.diagnosis.verdict.finding import Finding
 from armid_ros.diagnosis.verdict.words import Verdict
@@ -33,7 +33,7 @@ import numpy as np
 _MIN_DIFFERENCE = 2.0
 
 
-def doubt_of(
+def doubt_of_model(
     arm: ArmModel,
     baseline: Baseline | None,
     recordings: Sequence[Recording],
@@ -41,14 +41,14 @@ def doubt_of(
     thresholds: Thresholds,
 ) -> str:
     """
-    Return a sentence on why the given model may be wrong; empty without a reason.
+    Return a warning that the given model may be wrong, or an empty string.
 
     Parameters
     ----------
     arm : ArmModel
         The model.
     baseline : Baseline or None
-        Residual of the model in recordings from when the model was right.
+        Residual of the model in recordings from a time at which the model was right.
     recordings : sequence of Recording
         Recordings of the baseline.
     misfit : Misfit or None
@@ -65,11 +65,15 @@ def doubt_of(
         )
     if baseline is None:
         return unusable
-    changed = '' if misfit is None else _changed(arm, baseline, recordings, misfit, thresholds)
-    return changed or _poor(arm, baseline) or unusable
+    changed = (
+        ''
+        if misfit is None
+        else _increased_residual(arm, baseline, recordings, misfit, thresholds)
+    )
+    return changed or _large_residual(arm, baseline) or unusable
 
 
-def doubted(
+def with_doubt(
     verdict: Verdict,
     doubt: str,
     findings: Sequence[Finding],
@@ -77,40 +81,37 @@ def doubted(
     baseline: Baseline | None,
 ) -> tuple[Verdict, str]:
     """
-    Return the verdict after a doubt about the model, and the doubt, which findings may add to.
+    Combine a verdict with the warning about the given model; return both.
 
-    A model with a large residual in the baseline is consistent with any data: these are bad data.
-    With a smaller one, the doubt precedes the verdict.
+    A model with a large residual in the baseline is consistent with any data, so the verdict is
+    `bad_data`. With a smaller residual, the warning precedes the sentence of the verdict. A link
+    inertia that is named since a baseline is a reason for a warning, as links do not change.
 
     """
     if verdict.word != 'consistent':
-        return verdict, doubt or (doubt_of_names(findings) if baseline else '')
+        listed = [one for one in findings if one.name in CATALOGUE]
+        links = [one for one in listed if CATALOGUE[one.name].traits.corrects]
+        if baseline and links and not doubt:
+            doubt = (
+                'The inertia of a link does not change by itself. Unless the link of '
+                f'{" and ".join(links[0].joints)} was exchanged or carries a new part, the true '
+                'cause is not in the catalogue and resembles this change.'
+            )
+        return verdict, doubt
     if baseline and 100.0 * baseline.errors[0] > LIMITS.unusable:
         lead = 'The data cannot be diagnosed: too little signal, or the model of another arm.'
-        return Verdict('bad_data', f'{lead} {_poor(arm, baseline)}'), ''
+        return Verdict('bad_data', f'{lead} {_large_residual(arm, baseline)}'), ''
     return Verdict(verdict.word, f'{doubt} {verdict.summary}'.lstrip()), doubt
 
 
-def doubt_of_names(findings: Sequence[Finding]) -> str:
-    """Return a sentence if a named cause cannot arise between two days; empty otherwise."""
-    for one in findings:
-        if one.name in CATALOGUE and CATALOGUE[one.name].traits.corrects:
-            return (
-                'Links do not change between two days. Unless the link of '
-                f'{" and ".join(one.joints)} was exchanged or carries a new part, the true '
-                'cause is not in the catalogue and resembles this change.'
-            )
-    return ''
-
-
-def _changed(
+def _increased_residual(
     arm: ArmModel,
     baseline: Baseline,
     recordings: Sequence[Recording],
     misfit: Misfit,
     thresholds: Thresholds,
 ) -> str:
-    """Return a sentence if the baseline residual is much larger than at identification."""
+    """Return a warning if the baseline residual is much larger than at identification."""
 
     def compared(known: Baseline) -> tuple[FloatArray, FloatArray]:
         times = known.misfit / np.maximum(misfit.of(arm.robot, torque_rms(known.data)), 1e-300)
@@ -129,13 +130,13 @@ def _changed(
         return ''
     return (
         f'In the baseline, the residual of {arm.robot.joints[worst]} is {times[worst]:.1f} times '
-        'that of the identification. The model was not identified from this baseline, or '
-        'something had changed by then.'
+        'that of the identification. The model was not identified from this baseline, or the arm '
+        'had changed before the baseline was recorded.'
     )
 
 
-def _poor(arm: ArmModel, baseline: Baseline) -> str:
-    """Return a sentence if the baseline residual is a large share of the torque."""
+def _large_residual(arm: ArmModel, baseline: Baseline) -> str:
+    """Return a warning if the baseline residual is a large share of the torque."""
     whole, each = baseline.errors
     rows = [(whole, LIMITS.poor, 'the arm')]
     rows += [(e, LIMITS.unusable, j) for e, j in zip(each.tolist(), arm.robot.joints, strict=True)]
@@ -147,8 +148,8 @@ def _poor(arm: ArmModel, baseline: Baseline) -> str:
     if not bad:
         return ''
     return (
-        f'In the baseline, the residual of the model is {", ".join(bad[:2])}: is it the model of '
-        'this arm? Smaller changes are not detectable.'
+        f'In the baseline, the residual of the model is {", ".join(bad[:2])}. Check that it is '
+        'the model of this arm. Smaller changes are not detectable.'
     )
 
 
@@ -156,7 +157,7 @@ def data_remarks(
     found: Sequence[Finding], arm: ArmModel, now: Sequence[Trajectory], then: Sequence[Trajectory]
 ) -> Iterator[str]:
     """
-    Yield remarks on joints that did not move, and on the temperatures of the diagnosed day.
+    Yield notes on joints that did not move, and on temperatures of the diagnosed recordings.
 
     Parameters
     ----------
@@ -165,13 +166,13 @@ def data_remarks(
     arm : ArmModel
         The model with the named effects.
     now, then : sequence of Trajectory
-        Data of the diagnosed day, and of the baseline; without a baseline, the reference
+        Diagnosed recordings, and baseline recordings; without a baseline, the reference
         temperatures of the model are compared.
 
     """
-    still = ', '.join(not_shown(now, arm.robot.joints))
+    still = ', '.join(unchecked_joints(now, arm.robot.joints))
     if still:
-        yield f'Not checked: {still} did not move, or turned round all the time.'
+        yield f'Not checked: {still} did not move, or reversed all the time.'
     laws = [own for own in arm.effects if own.lasting]
     today = mean_temperatures([part.motion for part in now])
     if today is None and laws:
@@ -190,7 +191,7 @@ def data_remarks(
     if not warmer:
         return
     changes: dict[str, list[str]] = {'colder': [], 'warmer': []}
-    for joint, share in _changes(laws, arm, now, warmer).items():
+    for joint, share in _friction_changes(laws, arm, now, warmer).items():
         if abs(warmer[joint]) >= _MIN_DIFFERENCE and abs(share) >= 0.03:  # of friction
             changes['colder' if warmer[joint] < 0.0 else 'warmer'].append(
                 f'{joint} by {abs(warmer[joint]):.0f} degC (friction {100.0 * share:+.0f} %)'
@@ -201,20 +202,12 @@ def data_remarks(
         for word, joints in changes.items()
         if joints
     )
-    within = max(_spread(now), _spread(then))
-    named = any(CATALOGUE[one.name].lasting for one in found if one.name in CATALOGUE)
-    # a fifth of the difference within a day separates a law of temperature from wear
-    if named and within < 0.2 * max(map(abs, warmer.values())):
-        yield (
-            'The temperature differs between the days and hardly within them, so wear of the same '
-            'size is not excluded: record a day over a range of temperatures.'
-        )
     equal = {joint for joint, more in warmer.items() if abs(more) < _MIN_DIFFERENCE}
-    yield from _worn(found, equal.union(*(law.joints for law in laws)))
+    yield from _wear(found, equal.union(*(law.joints for law in laws)))
 
 
-def _worn(found: Sequence[Finding], equal: Collection[str]) -> Iterator[str]:
-    """Yield a sentence on each given joint whose friction changed, but not its temperature."""
+def _wear(found: Sequence[Finding], equal: Collection[str]) -> Iterator[str]:
+    """Yield a note on joints of equal temperature whose friction changed: wear."""
     names, where = dict[str, None](), dict[str, None]()
     for one in found:
         kinds = [CATALOGUE[name] for name in (one.name, *one.ambiguous_with) if name in CATALOGUE]
@@ -231,19 +224,13 @@ def _worn(found: Sequence[Finding], equal: Collection[str]) -> Iterator[str]:
         )
 
 
-def _spread(data: Sequence[Trajectory]) -> float:
-    """Return the largest standard deviation of the temperature of a joint on a day [K]."""
-    found = [part.motion.temperature.at(part.t) for part in data if part.motion.temperature]
-    return float(np.nanmax(np.concatenate(found).std(axis=0))) if found else 0.0
-
-
-def _changes(
+def _friction_changes(
     laws: Sequence[Effect],
     arm: ArmModel,
     now: Sequence[Trajectory],
     warmer: dict[str, float],
 ) -> dict[str, float]:
-    """Return the relative change of friction by temperature of each joint, at its mean speed."""
+    """Return the relative change of friction that temperature laws predict at mean speed."""
     action, joints = arm.action(), arm.robot.joints
     speed = np.concatenate([np.abs(part.at_rows.dq) for part in now]).mean(axis=0)
     size = np.zeros(len(joints))

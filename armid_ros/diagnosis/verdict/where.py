@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The joints in which a residual is large, and the quantities with which it varies."""
+"""Location of a residual: its joints, and the position, velocity or load with which it varies."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ import numpy.typing as npt
 @dataclass(frozen=True)
 class Axis:
     """
-    Mean residual of a joint as a function of one quantity.
+    Mean residual of a joint as a function of one quantity, such as its velocity.
 
     Attributes
     ----------
@@ -29,7 +29,7 @@ class Axis:
     centres, means : ndarray, shape (B,)
         Mean of the quantity, and mean of the residual [N m or N], in each bin.
     share : float
-        Mean square of `means` over that of the residual.
+        Mean square of `means` over the mean square residual (R squared).
 
     """
 
@@ -43,16 +43,16 @@ class Axis:
 @dataclass(frozen=True)
 class Where:
     """
-    States in which the residual of one joint is large.
+    The residual of one joint, and the quantities with which it varies.
 
     Attributes
     ----------
     joint : str
-        The joint.
+        Name of the joint.
     share_of_gap : float
         Share of the joint in the gap of all joints, 0 to 1.
     signature : str
-        In words, the residual and the quantity with which it varies.
+        Description of the residual and of the quantity with which it varies.
     axes : tuple of Axis
         All quantities, the largest share first.
     unit : str
@@ -76,14 +76,14 @@ class Where:
 @dataclass(frozen=True)
 class Excess:
     """
-    Losses of the joints divided by their limits.
+    Squared residual of each joint over the limit that noise and misfit explain.
 
     Attributes
     ----------
     ratio : ndarray, shape (n,)
-        Loss over the largest loss without gap; above one there is a gap.
+        Mean square of the weighted residual over its limit; above one there is a gap.
     where : str
-        Words on the data with the excess, within a sentence.
+        Description of the data, for the middle of a sentence.
     more : str
         End of that sentence: further terms of the limit.
 
@@ -97,7 +97,7 @@ class Excess:
 def locate_explained(
     explanation: Explanation, evidence: Evidence, settings: DiagnosisSettings
 ) -> tuple[Where, ...]:
-    """Locate the part of the gap that the named causes explain."""
+    """Return the joints in which the named causes reduce the residual, with its quantities."""
     before, after = (
         evidence.residuals(one.arm) for one in (explanation.reference, explanation.fitted)
     )
@@ -113,7 +113,7 @@ def locate_remaining_gap(
     settings: DiagnosisSettings,
     new: npt.NDArray[np.bool_],
 ) -> tuple[Where, ...]:
-    """Locate the residual beyond the limits of the patched model, or of a new torque law."""
+    """Return the joints in which the patched model exceeds its limit, or has an unlisted law."""
     residual = evidence.residuals(explanation.fitted.arm)
     losses, limits = evidence.chi2_per_row(residual), evidence.limits(residual, settings)
     gap = np.where(new, losses, np.where(losses > limits, losses - 1.0, 0.0))
@@ -124,18 +124,18 @@ def locate(
     arm: ArmModel, evidence: Evidence, residual: Sequence[FloatArray], gap: FloatArray
 ) -> tuple[Where, ...]:
     """
-    Describe the residual of every joint that has a part of the gap, the largest first.
+    Describe the residual of each joint with a gap as a function of single quantities.
 
     Parameters
     ----------
     arm : ArmModel
-        Arm whose loads are computed.
+        Model that computes the loads.
     evidence : Evidence
-        The data in the unit of the gap.
+        The recordings.
     residual : sequence of ndarray, shape (M, n)
         Residual of each trajectory [N m or N].
     gap : ndarray, shape (n,)
-        Loss of each joint that is to be explained; zero where there is none.
+        Size of the gap of each joint, by which the joints are sorted; zero without a gap.
 
     """
     data = evidence.data
@@ -185,7 +185,7 @@ def _quantities(arm: ArmModel, part: Trajectory) -> dict[str, FloatArray]:
 
 
 def _axis(name: str, unit: str, x: FloatArray, residual: FloatArray) -> Axis:
-    """Average the residual over bins with equal numbers of values of a quantity x."""
+    """Return the mean residual in bins of a quantity x with equal numbers of rows."""
     bins = 16
     edges = np.quantile(x, np.linspace(0.0, 1.0, bins + 1))
     index = np.clip(np.searchsorted(edges, x, side='right') - 1, 0, bins - 1)
@@ -201,9 +201,10 @@ def _axis(name: str, unit: str, x: FloatArray, residual: FloatArray) -> Axis:
 
 def _in_words(axes: Sequence[Axis], unit: str, residual: FloatArray) -> str:
     """
-    Describe the residual of a joint as a function of one quantity, such as velocity.
+    Describe the residual of a joint as a function of the quantity that explains most of it.
 
-    The bin means of the quantity explain at least 15 % of the mean square residual.
+    If its bin means explain less than 15 % of the mean square residual, the residual depends on
+    no single quantity.
 
     """
     best = axes[0]

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""From findings to a verdict: its word, and its sentence with the evidence."""
+"""Verdict of a diagnosis, such as `named`, and its sentences on causes and remaining error."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ import numpy as np
 Word = Literal[
     'consistent', 'named', 'ambiguous', 'partial', 'unknown', 'not_repeatable', 'bad_data'
 ]
-#: Reference of the shares of causes.
+#: Quantity of which a cause explains a share, in words.
 DIFFERENCE = 'the difference between model and measurement'
 #: Largest number of joints in the list of a sentence; further joints are only counted.
 _MAX_JOINTS = 3
 
 
 class Verdict(NamedTuple):
-    """The verdict of a diagnosis, and its sentences."""
+    """Verdict of a diagnosis as one word, and its sentences."""
 
     word: Word
     summary: str
@@ -44,26 +44,26 @@ def decide(
     gap: Gap | None = None,
 ) -> Verdict:
     """
-    Return the verdict: word and sentence.
+    Return the verdict and its sentences, from the findings and the remaining residual.
 
     Parameters
     ----------
     findings : sequence of Finding
         Findings of the headline.
     not_repeating : sequence of str
-        Joints whose equal periods differ; see `not_repeating`.
+        Joints whose equal periods differ; see `joints_that_do_not_repeat`.
     excesses : sequence of Excess
-        Losses of the model with the named effects over their limits, for each set of data.
+        Squared residuals over their limits with the named effects, for each set of data.
     arm : ArmModel
         Arm with the names of the joints.
     floor : str
         The floor of the gap in words: noise, or a misfit.
     given_body : Excess or None
-        Losses with the rigid body as given, if ``excesses`` are with a refitted one.
+        Squared residuals over their limits with the given rigid body, if it was refitted.
     minor : sequence of Finding
         Minor findings, the most important first.
     gap : Gap, optional
-        Errors of the model with the findings, and their floor.
+        Residuals of the model with the findings, and their floor.
 
     """
     worst = max(excesses, key=lambda one: float(one.ratio.max()))
@@ -71,9 +71,9 @@ def decide(
     if not_repeating and (not findings or open_gap):
         names = ', '.join(name_in_words(finding.name) for finding in findings)
         text = (
-            f'Equal periods differ in {", ".join(not_repeating)} by more than noise, independent '
-            'of time and velocity. Something acts that does not repeat, such as contact or a '
-            f'person. {f"{names} is provisional" if names else "No effect of the arm is named"}.'
+            f'The torque of {", ".join(not_repeating)} differs between equal periods of the '
+            'motion by more than noise. Its cause does not repeat, such as a contact or a person. '
+            f'{f"{names} is provisional" if names else "No effect of the arm is named"}.'
         )
         return Verdict('not_repeatable', text)
     error = f'the error of {arm.robot.joints[int(np.argmax(worst.ratio))]} {worst.where}'
@@ -101,14 +101,14 @@ def decide(
     if open_gap:
         if sum(group[0].share for group in by_cause(findings)) < 0.5:
             causes = causes.replace(' explains ', ' explains only ')
-        return Verdict('partial', f'{causes} {refit}There is more: {error} is {size}.')
+        return Verdict('partial', f'{causes} {refit}An error remains: {error} is {size}.')
     if any(one.other_causes for one in findings):
         return Verdict('ambiguous', f'{causes} {refit}'.rstrip())
     return Verdict('named', f'{causes} {refit}The remaining error {at_floor}.')
 
 
 def _refit(given_body: Excess | None, robot: Robot, floor: str) -> str:
-    """Return a sentence on the refit, with the error of body and friction as given."""
+    """Return a sentence on refitted body and friction, if the given ones have a gap."""
     if given_body is None or given_body.ratio.max() <= 1.0:
         return ''
     worst = int(np.argmax(given_body.ratio))
@@ -121,20 +121,20 @@ def _refit(given_body: Excess | None, robot: Robot, floor: str) -> str:
 
 
 def larger(ratio: float) -> str:
-    """Write how many times larger one error is than another."""
+    """Return a ratio in words, such as '2.5 times as large as'."""
     if ratio < 1.05:
         return 'a little larger than'
     return f'{ratio:.0f} times as large as' if ratio >= 100.0 else f'{ratio:.1f} times as large as'
 
 
 def sentence(finding: Finding, of: str = DIFFERENCE) -> str:
-    """Return a sentence: the cause and the share that it explains, by default of the gap."""
+    """Return a sentence with a cause, its values, and the share of the gap that it explains."""
     text = f'{_subject(finding)} explains {percent(finding.share)} of {of}.'
     return text[:1].upper() + text[1:]
 
 
 def share_interval_in_words(finding: Finding) -> str:
-    """Return the 95 % interval of a share in brackets; empty if both ends are written alike."""
+    """Return the 95 % interval of a share in brackets; empty if both ends have the same digits."""
     low, high = (percent(end) for end in finding.share_interval)
     return f' ({low} to {high})' if low != high else ''
 
@@ -146,7 +146,7 @@ def percent(share: float) -> str:
 
 
 def _sentences(findings: Sequence[Finding]) -> str:
-    """Return a sentence on the two largest causes, and sentences on further and assumed ones."""
+    """Return sentences on the causes, the two largest in one sentence, with their rivals."""
     clauses: list[str] = []
     assumed: list[str] = []
     for group in by_cause(findings):
@@ -173,7 +173,7 @@ def _sentences(findings: Sequence[Finding]) -> str:
 
 
 def names_and_places(group: Sequence[Finding | Rival]) -> str:
-    """Return the names and joints of findings of one cause."""
+    """Return names and joints of findings in words, such as 'payload of wrist_3'."""
     joints = dict.fromkeys(joint for one in group for joint in one.joints)
     names = ' and '.join(name_in_words(one.name) for one in group)
     where = ', '.join(joints) if len(joints) <= _MAX_JOINTS else f'{len(joints)} joints'
@@ -181,7 +181,7 @@ def names_and_places(group: Sequence[Finding | Rival]) -> str:
 
 
 def by_cause(findings: Sequence[Finding]) -> list[list[Finding]]:
-    """Return groups of findings that have the same cause and the same share of the gap."""
+    """Group findings that stand for one cause, and have a common share of the gap."""
     groups: list[list[Finding]] = []
     done: set[str] = set()
     for one in findings:
@@ -219,7 +219,7 @@ def _subject(finding: Finding) -> str:
 
 
 def _change(finding: Finding) -> str:
-    """Return how an effect of the given model changed in one joint; empty without it."""
+    """Return old and new value of an effect of the given model, such as 'rose from 2 to 3'."""
     rows = _rows(finding)
     if len(finding.joints) != 1 or len(rows) != 1 or not rows[0][3]:
         return ''
@@ -227,13 +227,13 @@ def _change(finding: Finding) -> str:
 
 
 def _rows(finding: Finding) -> list[tuple[ParameterName, float, float, float]]:
-    """Return the values of a cause whose interval excludes zero; all if there are none."""
+    """Return the rows of a finding whose interval excludes zero; all rows if there are none."""
     every = [row for row in finding.rows if not vague(finding, *row[:3])]
     return [row for row in every if excludes_zero(row[1], row[2])] or every
 
 
 def vague(finding: Finding, parameter: ParameterName, value: float, std: float) -> bool:
-    """Return whether the data do not determine a value of a cause."""
+    """Return whether a value of a finding is too uncertain to be written."""
     shapes = CATALOGUE[finding.name].shapes if finding.name in CATALOGUE else ()
     for shape in shapes:
         if shape.name == parameter.name:
@@ -242,7 +242,7 @@ def vague(finding: Finding, parameter: ParameterName, value: float, std: float) 
 
 
 def _with_degrees(parameter: ParameterName, value: float, std: float, had: float) -> str:
-    """Format a value with its interval, after the value that it had; angles also in degrees."""
+    """Format a value with interval and unit, with its old value if any; angles also in degrees."""
     start = f'from {with_half_width(had, std).split(" ")[0]} to ' if had else ''
     text = f'{start}{with_half_width(had + value, std)} {parameter.unit}'.strip()
     degrees, *_ = with_half_width(np.rad2deg(had + value), np.rad2deg(std)).split(' ')
@@ -250,7 +250,7 @@ def _with_degrees(parameter: ParameterName, value: float, std: float, had: float
 
 
 def _alternatives(finding: Finding) -> str:
-    """List a name and its rivals with joints and probabilities, which add up to one."""
+    """Return a finding and its rivals in words, with probabilities that add up to one."""
     every = [Rival(finding.name, finding.joints, finding.probability), *finding.other_causes]
     rest = 1.0 - finding.probability - sum(rival.probability for rival in finding.rivals)
     causes = [(names_and_places([one]), one.probability) for one in every]
@@ -260,7 +260,7 @@ def _alternatives(finding: Finding) -> str:
 
 
 def with_half_width(value: float, std: float) -> str:
-    """Format a value with the half-width of its 95 % interval, to two digits of the half-width."""
+    """Format a value with the half-width of its 95 % interval, such as '3.04 ± 0.05'."""
     wide = HALF_WIDTH * std
     if not 0.0 < wide < np.inf:
         return f'{value:.4g}'

@@ -9,8 +9,8 @@ import math
 
 from armid_ros.diagnosis import Diagnosis, Finding
 from armid_ros.diagnosis.next_run.isolability import DISTINCT, Isolability
-from armid_ros.diagnosis.search.cause import room
-from armid_ros.diagnosis.search.trial import Trial
+from armid_ros.diagnosis.search.cause import bounds_of_change
+from armid_ros.diagnosis.search.ranking import CauseResult
 from armid_ros.diagnosis.verdict.document import Detectable
 from armid_ros.diagnosis.verdict.finding import Gap
 from armid_ros.diagnosis.verdict.words import by_cause, share_interval_in_words
@@ -301,12 +301,12 @@ def candidates_section(diagnosis: Diagnosis) -> ContentSection:
     )
 
 
-def _candidate_value(diagnosis: Diagnosis, trial: Trial) -> str:
-    """Return the first value of a candidate with interval, 'includes 0' or 'not possible'."""
+def _candidate_value(diagnosis: Diagnosis, trial: CauseResult) -> str:
+    """Return the first value with its interval, 'includes 0' or 'not possible'."""
     arm, effect, kept = diagnosis.arm, trial.effect, list(trial.kept)
     if diagnosis.explanation is not None:
         arm = diagnosis.explanation.given
-    lower, upper = (bound[kept] for bound in room(effect, arm))
+    lower, upper = (bound[kept] for bound in bounds_of_change(effect, arm))
     slack = HALF_WIDTH * trial.std
     if not np.all((trial.values > lower - slack) & (trial.values < upper + slack)):
         return 'not possible'

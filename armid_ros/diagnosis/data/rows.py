@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Weighted rows of the recordings of the baseline (first day) and of the diagnosed day."""
+"""Weighted regression rows of the baseline recordings and of the diagnosed recordings."""
 
 from __future__ import annotations
 
@@ -18,38 +18,38 @@ import numpy.typing as npt
 @dataclass(frozen=True)
 class Rows:
     """
-    Weighted regression rows of both days: the baseline, and the diagnosed day.
+    Weighted regression rows of baseline recordings and diagnosed recordings.
 
     Attributes
     ----------
     data : tuple of Trajectory
-        Trajectories of the first day, then of the diagnosed day; `fold` counts through both.
+        Baseline trajectories, then diagnosed ones; their `fold` is the number of the recording.
     sigma : tuple of ndarray, each (n,)
-        Unit of each trajectory [N m].
-    before : int
-        Number of recordings of the first day.
+        Standard deviation by which the torques of each trajectory are divided [N m].
+    n_baseline : int
+        Number of baseline recordings.
     amplitude : tuple of ndarray, each (n,)
-        Unit of the discrepancies of each recording [N m].
-    unseen : bool
-        Whether the amplitude is the misfit of a first day without recordings.
+        Unit of the model discrepancy of each recording: a misfit, or an rms torque [N m].
+    misfit_only : bool
+        Whether only the size of the misfit is known, and no baseline recording.
 
     """
 
     data: tuple[Trajectory, ...]
     sigma: tuple[FloatArray, ...]
-    before: int
+    n_baseline: int
     amplitude: tuple[FloatArray, ...]
-    unseen: bool = False
+    misfit_only: bool = False
 
     @classmethod
     def over_noise(cls, evidence: Evidence) -> Rows:
-        """Weight the data of one day by their noise; discrepancy is measured in rms torques."""
+        """Return the rows of recordings without a baseline, weighted by their noise."""
         torque = np.maximum(evidence.torque_rms, 1e-3 * evidence.torque_rms.max())
         amplitude = (torque,) * count_recordings(evidence.data)
-        return cls(evidence.data, evidence.sigma, 0, amplitude).not_below_rounding()
+        return cls(evidence.data, evidence.sigma, 0, amplitude).above_rounding()
 
-    def not_below_rounding(self) -> Rows:
-        """Return the rows with units of at least 1e-4 of the rms torque, its rounding error."""
+    def above_rounding(self) -> Rows:
+        """Return the rows with deviations of at least 1e-4 of the rms torque (rounding error)."""
         least = 1e-4 * self.torque
         return replace(
             self,
@@ -59,48 +59,48 @@ class Rows:
 
     @cached_property
     def weight(self) -> list[FloatArray]:
-        """Return the weights of each trajectory, (M, n)."""
+        """Return 1 / sigma in the rows in which a joint moves, else zero, (M, n) [1/(N m)]."""
         pairs = zip(self.data, self.sigma, strict=True)
         return [row_weights([part], [sigma]) for part, sigma in pairs]
 
     @cached_property
-    def today(self) -> npt.NDArray[np.bool_]:
-        """Return which recordings are of the diagnosed day, shape (K,)."""
-        return np.arange(max(part.fold for part in self.data) + 1) >= self.before
+    def diagnosed(self) -> npt.NDArray[np.bool_]:
+        """Return whether each recording is a diagnosed one, and no baseline, shape (K,)."""
+        return np.arange(max(part.fold for part in self.data) + 1) >= self.n_baseline
 
     @property
     def repeated(self) -> bool:
-        """Return whether there are enough recordings to estimate how values vary between them."""
-        return 0 < self.before and len(self.today) > 2
+        """Return whether there are a baseline and at least three recordings in total."""
+        return 0 < self.n_baseline and len(self.diagnosed) > 2
 
     @cached_property
-    def today_parts(self) -> list[int]:
-        """Return the indices of the trajectories of the diagnosed day."""
-        return [k for k, part in enumerate(self.data) if self.today[part.fold]]
+    def diagnosed_parts(self) -> list[int]:
+        """Return the indices of the diagnosed trajectories."""
+        return [k for k, part in enumerate(self.data) if self.diagnosed[part.fold]]
 
     @cached_property
     def informative(self) -> FloatArray:
-        """Return the number of informative rows of the diagnosed day, at least 1, (n,)."""
-        count = np.sum([(self.weight[k] > 0.0).sum(axis=0) for k in self.today_parts], axis=0)
+        """Return the number of diagnosed rows in which each joint moves, at least 1, (n,)."""
+        count = np.sum([(self.weight[k] > 0.0).sum(axis=0) for k in self.diagnosed_parts], axis=0)
         return np.asarray(np.maximum(count, 1), dtype=float)
 
-    def rms_today(self, columns: Sequence[FloatArray]) -> FloatArray:
-        """Return the rms of columns (M, n, p) in the rows of the diagnosed day, (n, p)."""
+    def rms_of_diagnosed(self, columns: Sequence[FloatArray]) -> FloatArray:
+        """Return the rms of columns (M, n, p) over the diagnosed rows in motion, (n, p)."""
         squares = np.zeros(columns[0].shape[1:])
-        for k in self.today_parts:
+        for k in self.diagnosed_parts:
             moving = self.weight[k][:, :, np.newaxis] > 0.0
             squares += np.sum(columns[k] ** 2, axis=0, where=moving)
         return np.asarray(np.sqrt(squares / self.informative[:, np.newaxis]))
 
     @cached_property
     def torque(self) -> FloatArray:
-        """Root mean square torque where joints move, shape (n,) [N m]."""
+        """Root mean square torque of each joint while the arm moves, shape (n,) [N m]."""
         parts = [part.torque[part.informative.any(axis=1)] for part in self.data]
         rms = np.sqrt(np.mean(np.concatenate(parts) ** 2, axis=0))
         return np.asarray(np.maximum(rms, 1e-3 * rms.max()))
 
     def weighted(self, columns: Sequence[FloatArray], joints: Sequence[int]) -> list[FloatArray]:
-        """Return weighted columns of each recording, (joints, M, p), from columns (M, n, p)."""
+        """Weight columns (M, n, p) of each trajectory; return (joints, M, p) per recording."""
         index = list(joints)
         rows = [
             (own[:, index] * weight[:, index, np.newaxis]).swapaxes(0, 1)
@@ -109,5 +109,5 @@ class Rows:
         folds = [part.fold for part in self.data]
         return [
             np.concatenate([x for x, fold in zip(rows, folds, strict=True) if fold == k], axis=1)
-            for k in range(len(self.today))
+            for k in range(len(self.diagnosed))
         ]

@@ -1,12 +1,11 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Values of the named effects: the mean and the covariance of their posterior.
+Joint fit of the values and shapes of all named effects, with posterior mean and covariance.
 
-The model is that of the comparison of causes (`Nuisance`), with body, friction, discrepancy and
-earlier values of the cause integrated out. Encoder offsets, delays, elasticities and shapes are
-linear only to first order: the columns are recomputed at each mean (Gauss-Newton), and values
-stay within their physical bounds.
+Rigid body, friction and model discrepancy are integrated out (`Nuisance`). Torque is nonlinear in
+encoder offsets, delays, elasticities and shapes: their columns are recomputed at each mean
+(Gauss-Newton). Values stay within their physical bounds.
 
 """
 
@@ -18,36 +17,35 @@ from dataclasses import dataclass, replace
 from armid_ros.arm import ArmModel
 from armid_ros.arm.memoized_arm import memoized_arm
 from armid_ros.arm.model_file import add_effect
-from armid_ros.diagnosis.data.days import Rows
 from armid_ros.diagnosis.data.evidence import Evidence
+from armid_ros.diagnosis.data.rows import Rows
 from armid_ros.diagnosis.data.trajectory import Trajectory
 from armid_ros.diagnosis.search.candidates import cause_of, value_unit
-from armid_ros.diagnosis.search.cause import Cause, NamedEffect, room
+from armid_ros.diagnosis.search.cause import bounds_of_change, Cause, NamedEffect
+from armid_ros.diagnosis.search.hyperparameters import CORRELATED_ROWS, Hyperparameters
 from armid_ros.diagnosis.search.nuisance import Nuisance
-from armid_ros.diagnosis.search.setting import LASTING, Setting
 from armid_ros.effects import Effect, TorqueReading
 from armid_ros.estimate import Estimate, ParameterName
 from armid_ros.motion import FloatArray, Motion
-from armid_ros.robots import Robot
 import numpy as np
 
 
 @dataclass(frozen=True)
 class Fitted:
     """
-    Arm whose named effects have the means of their posteriors as values.
+    Arm model with named effects at their posterior means, and the estimate of their values.
 
     Attributes
     ----------
     arm : ArmModel
-        The arm; the named effects are its last ones.
+        The arm; the named effects are its last effects.
     named : tuple of NamedEffect
         The named effects, with their fitted shapes and values.
     estimate : Estimate
-        Estimate of the fitted parameters of the named effects, shapes included; the variance of a
-        value that data do not determine is infinite.
+        Fitted values and shapes of the named effects; the variance of a value that data do not
+        determine is infinite.
     means : ndarray, shape (q,)
-        Means of the nuisance parameters.
+        Posterior means of the nuisance parameters.
 
     """
 
@@ -60,20 +58,20 @@ class Fitted:
 @dataclass(frozen=True)
 class JointFit:
     """
-    Values of named effects, fitted jointly with the nuisance parameters.
+    Least-squares problem of named effects, fitted jointly with the nuisance parameters.
 
     Attributes
     ----------
     arm : ArmModel
         The arm without named effects.
     nuisance : Nuisance
-        Data and nuisance columns, without accepted causes.
-    setting : Setting
-        Amplitudes of discrepancy and noise.
+        Regression problem of the nuisance parameters, without accepted causes.
+    hyperparameters : Hyperparameters
+        Standard deviations of discrepancy and noise.
     recordings : tuple of int
-        Recordings that are fitted.
-    stated : bool
-        Whether the fitted arm includes the fitted change of body and friction.
+        Indices of the recordings that are fitted.
+    patches_body : bool
+        Whether the fitted arm includes the fitted change of rigid body and friction.
     spread : float
         Variance of values between recordings, over their variance for white noise.
 
@@ -81,9 +79,9 @@ class JointFit:
 
     arm: ArmModel
     nuisance: Nuisance
-    setting: Setting
+    hyperparameters: Hyperparameters
     recordings: tuple[int, ...]
-    stated: bool
+    patches_body: bool
     spread: float = 0.0
 
     @classmethod
@@ -95,47 +93,47 @@ class JointFit:
         known: FloatArray | None = None,
     ) -> JointFit:
         """
-        Return a fit with a free rigid body, in which the residual is only noise.
+        Return a problem with a free rigid body and no model discrepancy.
 
         Parameters
         ----------
         arm : ArmModel
             The arm.
         evidence : Evidence
-            Data and their noise.
+            Recordings with their noise.
         rng : numpy.random.Generator
             Draws the random states from which base parameters are found.
         known : ndarray, shape (P, P), optional
-            Information on the parameters of the arm, added to that of its description.
+            Fisher information on the parameters of the arm from its identification.
 
         """
         nuisance = Nuisance.of(Rows.over_noise(evidence), memoized_arm(arm), rng, known)
         every = tuple(range(len(nuisance.columns)))
-        setting = Setting(1.0, 0.0, 0.0, 1.0, LASTING)
-        return cls(nuisance.arm, nuisance, setting, every, stated=True)
+        hyperparameters = Hyperparameters(1.0, 0.0, 0.0, 1.0, CORRELATED_ROWS)
+        return cls(nuisance.arm, nuisance, hyperparameters, every, patches_body=True)
 
     @property
     def refits_body(self) -> bool:
         """Whether the body of the arm is refitted."""
-        return self.stated and self.setting.body > 0.0
+        return self.patches_body and self.hyperparameters.body > 0.0
 
     def fit(self, named: Sequence[NamedEffect] = ()) -> Fitted:
         """
-        Fit the values of named effects.
+        Fit the values and shapes of named effects by Gauss-Newton steps with a line search.
 
         Parameters
         ----------
         named : sequence of NamedEffect
-            The effects at their initial values.
+            The effects with their initial values.
 
         """
         linear, named = self.linear(named), tuple(named)
-        under = linear.marginal(self.setting, self.recordings)
+        posterior = linear.posterior(self.hyperparameters, self.recordings)
         loss = self._loss(named)
         # the comparison has refined the shapes, so four Gauss-Newton steps suffice
         for _ in range(4 if named else 0):
-            means = linear.means(under)
-            step = means[linear.spans[0].start : linear.spans[len(named) - 1].stop]
+            means = linear.means(posterior)
+            step = means[linear.value_slices[0].start : linear.value_slices[len(named) - 1].stop]
             for own, (kept, _) in zip(named, places(named), strict=True):
                 step[kept.start : kept.stop] -= own.values[list(own.kept)]
             before = loss
@@ -147,50 +145,56 @@ class JointFit:
             else:
                 break
             named, linear = tried, self.linear(tried)
-            under = linear.marginal(self.setting, self.recordings)
+            posterior = linear.posterior(self.hyperparameters, self.recordings)
             if before - loss < 1e-4 * max(abs(loss), 1e-12):
                 break
-        means, posterior = linear.whole(under)
+        means, covariance_of_all = linear.moments(posterior)
         size = self.nuisance.columns[0].shape[2]
         change = self._change_by_first_day(linear, means)
-        covariance = posterior[size:, size:] * (1.0 + self.spread) + np.diag(change**2)
+        covariance = covariance_of_all[size:, size:] * (1.0 + self.spread) + np.diag(change**2)
         units = np.concatenate([np.zeros(0), *(one.unit for one in linear.accepted)])
         # data that determine a value reduce its prior variance to less than half
-        undetermined = np.diag(posterior)[size:] > 0.5 * units**2
+        undetermined = np.diag(covariance_of_all)[size:] > 0.5 * units**2
         covariance[undetermined], covariance[:, undetermined] = 0.0, 0.0
         covariance[undetermined, undetermined] = np.inf
-        estimate = Estimate(*fitted_parameters(self.arm.robot, named), covariance)
+        names, values = list[ParameterName](), list[float]()
+        for own in named:  # values first, then shapes
+            every = own.effect.parameters(self.arm.robot)
+            names += [every[k] for k in own.kept]
+            names += own.effect.shape_parameters(self.arm.robot)
+            values += [*own.values[list(own.kept)].tolist(), *own.effect.shape]
+        estimate = Estimate(tuple(names), np.array(values), covariance)
         return Fitted(self.arm_at(named, means), named, estimate, means[:size])
 
     def arm_at(self, named: Sequence[NamedEffect], means: FloatArray) -> ArmModel:
-        """Return the arm with the named causes, and with fitted body and friction if stated."""
+        """Return the arm with named effects, and with fitted body and friction if requested."""
         change = means[: self.nuisance.rank]
         arm, base, theta = self.arm, self.nuisance.base, self.arm.theta
-        if self.stated and np.any(change):
+        if self.patches_body and np.any(change):
             arm = arm.with_theta(base.lift(base.values(theta) + change, theta))
         return patched_arm(arm, named)
 
     def as_described(self) -> JointFit:
-        """Return the fit with the rigid body fixed to the description."""
-        return replace(self, setting=replace(self.setting, body=0.0))
+        """Return the same problem with the rigid body fixed to the description."""
+        return replace(self, hyperparameters=replace(self.hyperparameters, body=0.0))
 
-    def residual_of_day(self, fitted: Fitted) -> list[FloatArray]:
+    def unexplained_residual(self, fitted: Fitted) -> list[FloatArray]:
         """
-        Return the residual of the diagnosed day minus the fitted body, friction and discrepancy.
+        Return the diagnosed residual minus named effects, body, friction and discrepancy.
 
         Returns
         -------
         list of ndarray, each (M, n)
-            Residual of each trajectory, zero in rows that are not informative [N m].
+            Residual of each trajectory, zero in rows in which a joint does not move [N m].
 
         """
         rows = self.nuisance.rows
         nuisance = self.with_model(fitted.arm)
         means = fitted.means.copy()
-        means[: self.nuisance.rank] *= not self.stated
+        means[: self.nuisance.rank] *= not self.patches_body
         found = []
-        for k in np.flatnonzero(rows.today).tolist():
-            whole, start = nuisance.noise_at(means, self.setting, k), 0
+        for k in np.flatnonzero(rows.diagnosed).tolist():
+            whole, start = nuisance.noise_at(means, self.hyperparameters, k), 0
             for part, weight in zip(rows.data, rows.weight, strict=True):
                 if part.fold == k:
                     own = whole[:, start : start + len(weight)].T
@@ -199,14 +203,14 @@ class JointFit:
         return found
 
     def with_model(self, model: ArmModel) -> Nuisance:
-        """Return the nuisance parameters with the residual of a model of the diagnosed day."""
+        """Return the regression problem with the residual of a model in diagnosed recordings."""
         return self.nuisance.with_residual(self._weighted_residual(model))
 
     def _weighted_residual(self, model: ArmModel) -> list[FloatArray]:
-        """Return the weighted residual of each recording, (n, M), with a model of today."""
+        """Return the weighted residuals (n, M): of a model in diagnosed recordings only."""
         rows = self.nuisance.rows
         rest = [
-            part.residual(model) if rows.today[part.fold] else np.zeros_like(part.unsure)
+            part.residual(model) if rows.diagnosed[part.fold] else np.zeros_like(part.unsure)
             for part in rows.data
         ]
         joints = range(rest[0].shape[1])
@@ -214,36 +218,36 @@ class JointFit:
         return [
             own[:, :, 0] if today else before
             for own, before, today in zip(
-                weighted, self.nuisance.residual, rows.today, strict=True
+                weighted, self.nuisance.residual, rows.diagnosed, strict=True
             )
         ]
 
     def _loss(self, named: Sequence[NamedEffect]) -> float:
-        """Return the negative log likelihood, the nuisance parameters integrated out."""
+        """Return the negative log likelihood of the effects, with fitted nuisance parameters."""
         nuisance = self.with_model(patched_arm(self.arm, named))
-        return nuisance.marginal(self.setting, self.recordings).loss
+        return nuisance.posterior(self.hyperparameters, self.recordings).loss
 
     def _change_by_first_day(self, linear: Nuisance, means: FloatArray) -> FloatArray:
         """
-        Return the change of the values for a cause that also acted on the first day.
+        Return how much the values change if the causes also acted in the baseline.
 
-        The prior of a value on the first day has zero mean, and the present value as standard
+        The prior of a value in the baseline has zero mean, and the present value as standard
         deviation.
 
         """
         size, both = self.nuisance.columns[0].shape[2], linear
-        if not self.nuisance.rows.before:
+        if not self.nuisance.rows.n_baseline:
             return np.zeros(len(means) - size)
-        for one, span in zip(linear.accepted, linear.spans, strict=True):
+        for one, span in zip(linear.accepted, linear.value_slices, strict=True):
             if one.effect.lasting:
                 continue
             unit = np.clip(np.abs(means[span]), 1e-3 * one.unit, one.unit)
             both = both.and_cause(replace(one, unit=unit, always=True))
-        under = both.marginal(self.setting, self.recordings)
-        return both.means(under)[size : len(means)] - means[size:]
+        posterior = both.posterior(self.hyperparameters, self.recordings)
+        return both.means(posterior)[size : len(means)] - means[size:]
 
     def linear(self, named: Sequence[NamedEffect]) -> Nuisance:
-        """Return the columns of nuisance parameters and named causes, linearised at values."""
+        """Return the regression problem with the named effects, linearised at their values."""
         if not named:
             return self.nuisance
         model = patched_arm(self.arm, named)
@@ -259,7 +263,7 @@ class JointFit:
                 for k, part in enumerate(rows.data)
             ]
             only = [x[:, :, : len(kept)] for x in columns]
-            unit = value_unit(self.nuisance, own.effect, own.kept, rows.rms_today(only))
+            unit = value_unit(self.nuisance, own.effect, own.kept, rows.rms_of_diagnosed(only))
             # without a default, a shape is a position of 0.1 rad or m
             least = [abs(s.default) or 0.1 for s in own.effect.shapes]
             size = np.tile(least, len(own.effect.owners))
@@ -276,14 +280,14 @@ class JointFit:
             [
                 rest + x[:, :, 0] if today else rest
                 for rest, x, today in zip(
-                    self._weighted_residual(model), present, rows.today, strict=True
+                    self._weighted_residual(model), present, rows.diagnosed, strict=True
                 )
             ]
         )
 
 
 def patched_arm(arm: ArmModel, named: Sequence[NamedEffect]) -> ArmModel:
-    """Return an arm with named effects."""
+    """Return the arm with named effects added at their values."""
     for own in named:
         arm = add_effect(arm, own.effect, own.values)
     return arm
@@ -292,11 +296,11 @@ def patched_arm(arm: ArmModel, named: Sequence[NamedEffect]) -> ArmModel:
 def moved(
     arm: ArmModel, named: Sequence[NamedEffect], change: FloatArray
 ) -> tuple[NamedEffect, ...]:
-    """Return the named effects after a step of all fitted parameters, within bounds."""
+    """Return the named effects after a step of their fitted parameters, within bounds."""
     found = []
     for own, (place, shapes) in zip(named, places(named), strict=True):
         effect = own.effect
-        lower, upper = room(effect, arm)
+        lower, upper = bounds_of_change(effect, arm)
         values = own.values.copy()
         values[list(own.kept)] += change[list(place)]
         if shapes:
@@ -310,21 +314,8 @@ def moved(
     return tuple(found)
 
 
-def fitted_parameters(
-    robot: Robot, named: Sequence[NamedEffect]
-) -> tuple[tuple[ParameterName, ...], FloatArray]:
-    """Return names and values of the fitted parameters of each effect, its shapes last."""
-    names: list[ParameterName] = []
-    numbers: list[float] = []
-    for own in named:
-        every = own.effect.parameters(robot)
-        names += [*(every[k] for k in own.kept), *own.effect.shape_parameters(robot)]
-        numbers += [*own.values[list(own.kept)].tolist(), *own.effect.shape]
-    return tuple(names), np.array(numbers)
-
-
 def places(named: Sequence[NamedEffect]) -> list[tuple[range, range]]:
-    """Return where the values and shapes of each effect are among the fitted parameters."""
+    """Return the index ranges of the values and of the shapes of each effect in the estimate."""
     found, start = [], 0
     for own in named:
         shapes = start + len(own.kept)
@@ -335,7 +326,7 @@ def places(named: Sequence[NamedEffect]) -> list[tuple[range, range]]:
 
 
 def _shape_bounds(effect: Effect) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return the bounds of a shape and the finite-difference steps, per value."""
+    """Return lower bound, upper bound and finite-difference step of each shape value."""
     owners = len(effect.owners)
     low = np.tile([s.lower for s in effect.shapes], owners)
     high = np.tile([s.upper for s in effect.shapes], owners)
@@ -346,7 +337,7 @@ def _shape_bounds(effect: Effect) -> tuple[FloatArray, FloatArray, FloatArray]:
 def patch_columns(
     arm: ArmModel, named: Sequence[NamedEffect], part: Trajectory
 ) -> list[FloatArray]:
-    """Return the Jacobian of values and shapes of each named effect in rows, (M, n, p) each."""
+    """Return the Jacobian of the torque in rows by values and shapes of each effect, (M, n, p)."""
     model, blocks = memoized_arm(patched_arm(arm, named)), []
     for own in named:
         columns = [model.columns_of(own.effect, part.motion)[:, :, list(own.kept)]]
@@ -357,7 +348,7 @@ def patch_columns(
 
 
 def _shape_columns(model: ArmModel, effect: Effect, motion: Motion) -> FloatArray:
-    """Return the finite-difference Jacobian of the torque by the shape, (N, n, S)."""
+    """Return the finite-difference Jacobian of the torque by the shape values, (N, n, S)."""
     place = len(model.effects) - 1 - model.effects[::-1].index(effect)
     low, high, step = _shape_bounds(effect)
     shape = np.array(effect.shape)

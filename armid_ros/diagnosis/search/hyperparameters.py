@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Amplitudes of discrepancy and noise, and the fit of the nuisance parameters for each."""
+"""Standard deviations of model discrepancy and noise, and the nuisance parameters given these."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ import numpy as np
 import numpy.typing as npt
 from scipy import linalg
 
-#: Number of correlated rows that equal one independent row, without a baseline.
-LASTING = 2.0
+#: Number of correlated rows that count as one independent row, if no baseline measures it.
+CORRELATED_ROWS = 2.0
 
 
 @dataclass(frozen=True)
-class Setting:
+class Hyperparameters:
     """
-    Sizes that are assumed for errors of the rigid body, for discrepancy and for noise.
+    Standard deviations of errors of the described links, of the model discrepancy, and of noise.
 
     Attributes
     ----------
@@ -27,10 +27,11 @@ class Setting:
         Standard deviation of the errors of described links, over the largest expected errors;
         zero if all given values are exact. Parameters without given values are always fitted.
     shared, own : float
-        Standard deviations of d0 and d_k, over their unit.
+        Standard deviations of the discrepancy of all recordings (d0) and of one recording (d_k),
+        over the amplitude of `Rows`.
     noise : float
-        Standard deviation of e_k, over the unit of the rows.
-    lasting : float
+        Standard deviation of the noise e_k, over the sigma of `Rows`.
+    correlated_rows : float
         Number of correlated rows that count as one independent row.
     prior : float
         Log prior probability.
@@ -41,28 +42,28 @@ class Setting:
     shared: float
     own: float
     noise: float
-    lasting: float
+    correlated_rows: float
     prior: float = 0.0
 
     @property
     def precision(self) -> float:
-        """Precision of a row, 1 / variance, divided by `lasting` as rows are correlated."""
-        return 1.0 / (self.lasting * self.noise**2)
+        """Inverse noise variance of a weighted row, divided by `correlated_rows`."""
+        return 1.0 / (self.correlated_rows * self.noise**2)
 
 
 @dataclass(frozen=True)
-class MotionDiscrepancy:
+class MotionDiscrepancies:
     """
-    The discrepancies d_k of K recordings, which are integrated out.
+    Gaussian model discrepancies d_k of K recordings, given the other parameters.
 
     Attributes
     ----------
     covariance : ndarray, shape (K, n, f, f)
-        Their covariance, given all other parameters.
+        Covariance of the f coefficients of each joint, given all other parameters.
     aim : ndarray, shape (K, n, f)
-        Products of their columns with the residual, over the variance of the noise.
+        Inner products of their columns with the residual, over the variance of the noise.
     regressed : ndarray, shape (K, n f, u)
-        Regression of their values on the fitted parameters.
+        Derivative of their means with respect to the u fitted parameters, with opposite sign.
 
     """
 
@@ -72,14 +73,14 @@ class MotionDiscrepancy:
 
 
 @dataclass(frozen=True)
-class Marginal:
+class NuisancePosterior:
     """
-    Posterior of the nuisance parameters under one setting.
+    Gaussian posterior of the nuisance parameters for given hyperparameters.
 
     Attributes
     ----------
-    setting : Setting
-        The setting.
+    hyperparameters : Hyperparameters
+        The assumed standard deviations of discrepancy and noise.
     used : ndarray of int, shape (u,)
         Indices of the fitted parameters.
     lower : ndarray, shape (u, u)
@@ -87,23 +88,23 @@ class Marginal:
     values : ndarray, shape (u,)
         Means of the fitted parameters.
     evidence : float
-        Log evidence.
+        Log probability density of the data (log evidence), up to a constant.
     loss : float
-        Half of the remaining weighted squares.
-    motion : MotionDiscrepancy or None
+        Half of the minimum of the regularised sum of squares.
+    motion : MotionDiscrepancies or None
         The discrepancies d_k of the fitted recordings; None if they are zero.
 
     """
 
-    setting: Setting
+    hyperparameters: Hyperparameters
     used: npt.NDArray[np.intp]
     lower: FloatArray
     values: FloatArray
     evidence: float
     loss: float
-    motion: MotionDiscrepancy | None
+    motion: MotionDiscrepancies | None
 
     @cached_property
     def root(self) -> FloatArray:
-        """Return the matrix R of the covariance R'R of the fitted parameters, (u, u)."""
+        """Return the matrix R whose product R'R is the posterior covariance, (u, u)."""
         return np.asarray(linalg.solve_triangular(self.lower, np.eye(len(self.lower)), lower=True))
