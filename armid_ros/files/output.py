@@ -15,7 +15,7 @@ results if a document or a page is in the same folder.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator
 from contextlib import contextmanager, suppress
 import fcntl
 from fnmatch import fnmatch
@@ -317,14 +317,10 @@ def refuse_foreign(folder: Path, schema: str, also: Collection[str] = ()) -> Non
                 f'{folder}: contains {name}, which this command does not write; give another '
                 'folder, or add --force to keep that file and write there'
             )
-    for name in _foreign(folder, names):
-        raise OutputError(
-            f'{folder}: contains {name}, which armid did not write; give another folder, or '
-            'overwrite the file with --force'
-        )
+    refuse_replacing(folder, names, ', or overwrite the file with --force')
 
 
-def refuse_replacing(folder: Path, names: Collection[str]) -> None:
+def refuse_replacing(folder: Path, names: Collection[str], remedy: str = '') -> None:
     """
     Raise OutputError if files to be replaced were not written by this package.
 
@@ -334,6 +330,8 @@ def refuse_replacing(folder: Path, names: Collection[str]) -> None:
         The folder, which need not exist.
     names : collection of str
         Names of the files to be written.
+    remedy : str
+        End of the error message: what the user can do other than give another folder.
 
     Raises
     ------
@@ -341,17 +339,14 @@ def refuse_replacing(folder: Path, names: Collection[str]) -> None:
         If the folder has such a file; the message names folder and file.
 
     """
-    for name in _foreign(folder, [name for name in names if (folder / name).exists()]):
-        raise OutputError(
-            f'{folder}: contains {name}, which armid did not write; give another folder'
-        )
-
-
-def _foreign(folder: Path, names: Sequence[str]) -> Iterator[str]:
-    """Return an iterator of the files that armid did not write, by the marks in the files."""
+    there = [name for name in names if os.path.lexists(folder / name)]
     # files that cannot have a mark count only if no other files exist
-    known = [name for name in names if name.endswith(_MARKED_SUFFIXES)]
-    return (name for name in known or names if not is_own(folder / name))
+    for name in [one for one in there if one.endswith(_MARKED_SUFFIXES)] or there:
+        if not is_own(folder / name):
+            raise OutputError(
+                f'{folder}: contains {name}, which armid did not write; give another folder'
+                f'{remedy}'
+            )
 
 
 def is_plan(path: Path) -> bool:
