@@ -65,7 +65,7 @@ class ModelError(ArmidError):
 
 
 class TrajectoryError(ArmidError):
-    """Error of a trajectory that violates limits of the robot, or of a search that found none."""
+    """Error in a trajectory that violates limits of the robot, or failure to find a trajectory."""
 
 
 class IdentificationError(ArmidError):

@@ -54,7 +54,7 @@ class ParameterName:
 
     @property
     def rigid(self) -> bool:
-        """Whether the name is or begins with the mass, a first moment or inertia of a link."""
+        """Whether the parameter, or the first term of its grouping, is an inertial parameter."""
         return _RIGID.match(self.name) is not None
 
 

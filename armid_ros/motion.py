@@ -37,7 +37,7 @@ def freeze(instance: object, *names: str) -> None:
 
 
 def freeze_samples(where: str, samples: Any, *names: str) -> None:
-    """Freeze arrays of joint samples; raise RecordingError unless they are (times, joints)."""
+    """Make arrays of joint samples read-only; RecordingError unless they are (times, joints)."""
     freeze(samples, 't', *names)
     expected = (len(samples.t), len(samples.joints))
     for name in names:
@@ -222,7 +222,7 @@ class BlurredMotion(Motion):
 @dataclass(frozen=True, eq=False)
 class ElasticRun:
     """
-    Signals of one experiment with an elastic arm, true ones or measured ones.
+    Motor, link and reference signals of one experiment with an elastic arm.
 
     Attributes
     ----------

@@ -249,7 +249,7 @@ class ArmModel:
         return inverse_dynamics_derivatives(self.body, self.rigid_body_motion(motion))
 
     def link_torque_derivatives(self, motion: Motion) -> tuple[FloatArray, FloatArray] | None:
-        """Differentiate effects' link-side torques by q and dq, (N, n, n); None without any."""
+        """Differentiate effects' torques on the links by q and dq, (N, n, n); None without any."""
         law = self.along(motion).action().link_torque
         return None if law is None else law_derivatives(law, self.link_motion(motion))
 

@@ -88,7 +88,7 @@ def place_values(
     arm: ArmModel, attribute: Callable[[Effect], str]
 ) -> tuple[dict[str, dict[str, float]], tuple[str, ...]]:
     """
-    Return effect values by attribute of a file format, and a line for each other value.
+    Return effect values by attribute of a file format, and text lines of all other values.
 
     The function ``attribute`` returns the attribute of the format for an effect, or an empty text.
     Effects that change the rigid body are part of its inertial parameters, and appear in neither

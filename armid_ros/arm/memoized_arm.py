@@ -107,7 +107,7 @@ class _Memoized(ArmModel):
         return self._once('derivatives', motion, super().load_derivatives)
 
     def link_torque_derivatives(self, motion: Motion) -> tuple[FloatArray, FloatArray] | None:
-        """Differentiate effects' link-side torques by q and dq, (N, n, n); None without any."""
+        """Differentiate effects' torques on the links by q and dq, (N, n, n); None without any."""
         return self._once('holding', motion, super().link_torque_derivatives)
 
     def joint_torque(self, motion: Motion) -> FloatArray:

@@ -322,7 +322,8 @@ def _rows(
 ) -> Iterator[tuple[tuple[str | int, ...], Any, tuple[str, ...]]]:
     """Yield the keys in the file, the content and the permitted units of each parameter."""
     for k, row in enumerate(document['rigid_parameters']):
-        yield ('rigid_parameters', k), row, link_unit(_name(row))
+        unit = link_unit(_name(row))
+        yield ('rigid_parameters', k), row, (unit,) if unit else ()
     for k, entry in enumerate(document['effects']):
         if not isinstance(entry, dict):
             line = yaml_line(text, ('effects', k))

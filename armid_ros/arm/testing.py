@@ -105,7 +105,7 @@ class EffectCase:
 
 
 def sines(robot: Robot, duration: float = 0.5, rate: float = 200.0) -> Motion:
-    """Return a motion of sines within the position limits, different in every joint."""
+    """Return a motion in which each joint follows a different sine within its limits."""
     t = np.arange(0.0, duration, 1.0 / rate)
     frequency = 2.0 * np.pi * np.linspace(0.4, 2.1, robot.n_joints)
     phase = frequency * t[:, np.newaxis] + np.arange(robot.n_joints)

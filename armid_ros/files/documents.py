@@ -51,7 +51,7 @@ _UNEXPECTED = (
 @contextmanager
 def reading(path: str | Path, error: type[ArmidError]) -> Iterator[None]:
     """
-    Convert all errors inside the block into one error that names the file.
+    Convert every parser error in a with-block into one error that names the file.
 
     Parameters
     ----------

@@ -145,7 +145,7 @@ def result_folder(
     force: bool = False,
 ) -> Iterator[Path]:
     """
-    Create a folder for the results of one command, and lock it during the block.
+    Create a folder for the results of one command, and lock it during the with-block.
 
     Parameters
     ----------
@@ -187,7 +187,7 @@ def result_folder(
 @contextmanager
 def locked(path: Path) -> Iterator[None]:
     """
-    Create a folder if it does not exist, and lock it against other runs during the block.
+    Create a folder if it is missing, and lock it against other runs during the with-block.
 
     Raises
     ------
@@ -250,7 +250,7 @@ def _refuse_other_results(path: Path, schema: str, robot: str) -> None:
 
 
 def _in_words(schema: str) -> str:
-    """Return the results of a schema in words: 'results of comparison'."""
+    """Return a schema of results in words, such as 'results of comparison'."""
     parts = schema.split('/')
     return f'results of {parts[1]}' if len(parts) == 3 else schema
 
@@ -284,7 +284,7 @@ def hash_files(paths: Iterable[str | Path]) -> tuple[tuple[str, int, str], ...]:
 
 
 def written_by(schema: str, also: Collection[str] = ()) -> tuple[str, ...]:
-    """Return the names and patterns, such as '*.png', of the files in a result with a schema."""
+    """Return names and patterns, such as '*.png', of the files that a result with a schema has."""
     return (*_WRITES.get(schema, ()), *also)
 
 

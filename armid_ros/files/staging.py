@@ -94,7 +94,7 @@ class Staged:
             raise OutputError(problem) from error
 
     def _exchanged(self, names: Collection[str]) -> bool:
-        """Replace the folder by a new folder with result and other files; False if impossible."""
+        """Exchange the folder for one with the result and all other files; False if impossible."""
         out = self.out.resolve()
         old, own = out.stat(), self.folder.stat()
         if Path.cwd().is_relative_to(out) or (old.st_uid, old.st_gid) != (own.st_uid, own.st_gid):
@@ -140,7 +140,7 @@ def staged(
     out: Path, replaced: Collection[str] = (), spared: Collection[Path] = ()
 ) -> Iterator[Staged]:
     """
-    Create a staging folder for a result; the end of the block deletes it.
+    Create a staging folder for a result; the end of the with-block deletes it.
 
     Parameters
     ----------

@@ -45,11 +45,9 @@ def rigid_parameter_names(robot: Robot) -> tuple[ParameterName, ...]:
     )
 
 
-def link_unit(name: str) -> tuple[str, ...]:
-    """Return the unit of an inertial parameter such as 'mx2', alone in a tuple; else empty."""
-    units = dict(zip(LINK_PARAMETERS, LINK_UNITS, strict=True))
-    unit = units.get(name.rstrip('0123456789'))
-    return () if unit is None else (unit,)
+def link_unit(name: str) -> str:
+    """Return the unit of an inertial parameter such as 'mx2'; empty for other names."""
+    return dict(zip(LINK_PARAMETERS, LINK_UNITS, strict=True)).get(name.rstrip('0123456789'), '')
 
 
 class _Prepared(threading.local):
@@ -155,7 +153,7 @@ def _projected(jacobian: FloatArray, torques: FloatArray) -> FloatArray:
 
 
 def _difference(robot: Robot, motion: Motion, name: str) -> FloatArray:
-    """Differentiate torques by positions or velocities, with central differences, (N, n, n)."""
+    """Differentiate joint torques by q or dq of each joint, by central differences, (N, n, n)."""
     step = 1e-5
     slopes = []
     for shift in step * np.eye(robot.n_joints):

@@ -91,7 +91,7 @@ def tie_geometry(
     robot: Robot, q: FloatArray, other: Robot, other_q: FloatArray, ties: Sequence[Tie]
 ) -> TieGeometry:
     """
-    Compute the geometry of ties along positions (N, n) and (N, m) of two machines.
+    Compute end points and Jacobians of ties at positions (N, n) and (N, m) of two machines.
 
     Raises
     ------

@@ -153,7 +153,7 @@ def _without_inertials(urdf: str, links: Sequence[str]) -> str:
 
 
 def _share(body: FloatArray, others: FloatArray) -> float:
-    """Return the factor of the other links' inertia with which the child link stays consistent."""
+    """Return the factor for the inertia of other links that keeps the child link consistent."""
     if not np.any(others):
         return 1.0
     if not Consistency.of('', others).eigenvalues[0] > -1e-12:

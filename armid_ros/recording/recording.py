@@ -332,7 +332,7 @@ class Recording:
 
     def motion(self, cutoff: float | None = None) -> Motion:
         """
-        Return the filtered motion of the longest stretch without a gap, with its torque.
+        Return the filtered motion of the longest stretch without a gap, with unfiltered torque.
 
         Parameters
         ----------

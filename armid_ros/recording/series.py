@@ -82,7 +82,7 @@ def clock_problem(
 
 
 def ordered(series: JointSamples, clock: Clock, counts: Counter[str]) -> JointSamples:
-    """Return the samples in order of time, of the longest stretch between clock restarts."""
+    """Return the longest stretch of samples between clock restarts, sorted by time."""
     if clock == 'receive':
         assert series.receive is not None
         series = replace(series, stamps=series.receive)

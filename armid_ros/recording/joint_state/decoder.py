@@ -47,7 +47,7 @@ class JointSamples:
         return len(self.stamps)
 
     def select(self, samples: Samples) -> JointSamples:
-        """Return the data of selected samples."""
+        """Return stamps, positions, velocities and efforts of selected samples."""
         values = tuple(None if v is None else v[samples] for v in self.values)
         receive, number = (
             None if one is None else one[samples] for one in (self.receive, self.number)
@@ -55,7 +55,7 @@ class JointSamples:
         return JointSamples(self.joints, self.stamps[samples], values, receive, number)
 
     def columns(self, joints: Sequence[str]) -> JointSamples:
-        """Return the data of selected joints, in the given order."""
+        """Return positions, velocities and efforts of selected joints, in the given order."""
         if tuple(joints) == self.joints:
             return self
         chosen = [self.joints.index(joint) for joint in joints]

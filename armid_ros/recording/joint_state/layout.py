@@ -57,7 +57,7 @@ class JointStateLayout:
     @classmethod
     def of(cls, cdr: bytes) -> JointStateLayout:
         """
-        Return the layout of one serialised message.
+        Find the positions of the fields in one serialised JointState message.
 
         Raises
         ------

@@ -195,7 +195,7 @@ def heads_by_index(
     data: bytes | mmap.mmap, offsets: IntArray, ranges: IntArray
 ) -> npt.NDArray[np.void] | None:
     """
-    Return the heads of messages at the positions in an index; None if the index is wrong.
+    Read message heads at the positions that an index states; None if the index is wrong.
 
     An index is correct if messages and definitions fill the chunk without gaps: each record
     begins at the end of the previous record.

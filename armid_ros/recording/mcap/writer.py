@@ -307,7 +307,7 @@ def message_record(
 
 
 def _records(records: Sequence[McapRecord]) -> bytes:
-    """Return several records as bytes."""
+    """Return MCAP records as bytes, one after the other."""
     return b''.join(_record(record) for record in records)
 
 

@@ -64,7 +64,7 @@ _RANGE = re.compile(r'([\[{])(\d+)\.\.(\d+)[\]}]')
 @dataclass(frozen=True, eq=False)
 class QuantityColumns:
     """
-    Columns of one quantity, one per joint, with their unit.
+    Table columns of one quantity, such as position: one column per joint, and the unit.
 
     Attributes
     ----------

@@ -90,7 +90,7 @@ class TableColumn:
 @dataclass(frozen=True, eq=False)
 class Table:
     """
-    Columns of one file, with notes from reading the file.
+    Table of samples from a file: named columns of numbers, and notes for the user.
 
     Attributes
     ----------
