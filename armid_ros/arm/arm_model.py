@@ -410,7 +410,7 @@ class ArmModel:
         return columns
 
     def with_load_friction(self, motion: Motion, columns: FloatArray) -> FloatArray:
-        """Add the change of load-dependent friction to changes of the load, (N, n, P)."""
+        """Add the change of load-dependent friction caused by a change of the load, (N, n, P)."""
         friction = self._acting.dry_friction
         if friction is None or friction.load_share is None:
             return columns

@@ -136,7 +136,7 @@ def _with_dates(table: Table) -> Table:
 
 
 def _with_stamps(table: Table) -> Table:
-    """Add the columns of seconds and nanoseconds of a stamp to one column [s]."""
+    """Combine the columns of seconds and nanoseconds of a stamp in one column [s]."""
     pairs = []
     starts = {
         match[1]: column for column in table.columns if (match := _SECONDS.fullmatch(column.name))
