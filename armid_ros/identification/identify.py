@@ -383,11 +383,11 @@ def _fit_quasi_static(
         slower = (
             'these torques have so little noise that inertia matters at any speed'
             if speed < 0.02
-            else f'at {speed:.2g} times the speed it would not matter'
+            else f'at {speed:.2g} times the speed, inertia would not matter'
         )
         notes = (
-            'too fast for quasi-static: the described inertia is subtracted, and its possible '
-            f'error widens the intervals; {slower}',
+            'the motion is too fast for --quasi-static: the described inertia is subtracted, and '
+            f'its possible error widens the intervals; {slower}',
         )
     return replace(fit, solution=solution), notes
 
@@ -425,7 +425,7 @@ def _remarks(fit: FittedValues, theory: BaseParameters) -> tuple[str, ...]:
         remarks.append(f'{fit.solution.outliers} outliers of torque have reduced weight')
     if not fit.converged:
         remarks.append(
-            f'the fit has not converged after {fit.passes} linearisations: the effects '
-            'affect each other too much in these data; leave some out, or record more'
+            f'the fit has not converged after {fit.passes} linearisations: these data do not '
+            'separate the effects; leave effects out, or record more'
         )
     return tuple(remarks)

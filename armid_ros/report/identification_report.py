@@ -236,7 +236,7 @@ def _physical_section(
         'Over its prior',
         'Constraint',
     )
-    activity = [(sentence(line), '') for line in certificate.activity]
+    activity = [(sentence(line), '') for line in certificate.constraint_notes]
     homeless = []
     for file, lines in exports.items():
         kinds = Counter(line.split(':')[0] for line in lines)

@@ -58,7 +58,7 @@ def judge(
     known = set()
     if result.physical is not None:
         given = result.physical
-        known = set(given.sentences()) - set(given.activity) - set(given.notes)
+        known = set(given.sentences()) - set(given.constraint_notes) - set(given.notes)
     findings: list[Caution] = [
         *(
             (f'{recording.source or "A recording"}: {recording.report.describe()}', '')

@@ -143,7 +143,7 @@ class PhysicalCertificate:
         return tuple(link.link for link, at in zip(self.links, near, strict=True) if at)
 
     @property
-    def activity(self) -> tuple[str, ...]:
+    def constraint_notes(self) -> tuple[str, ...]:
         """Notes on constraints that change the fit, and on their cost; empty if none does."""
         notes = []
         # held-out torque error, relative to an unconstrained fit, above which the constraints do
@@ -151,37 +151,38 @@ class PhysicalCertificate:
         if self.held_out_ratio > 1.03:
             given = self.total_mass is not None or self.at_wall or self.at_mass
             notes.append(
-                f'constraints cost {100.0 * (self.held_out_ratio - 1.0):.1f} % of torque error on '
-                f'blocks left out: {"a given mass or box is wrong, or " * bool(given)}the model '
-                'lacks an effect'
+                'the physical constraints increase the torque error on held-out blocks by '
+                f'{100.0 * (self.held_out_ratio - 1.0):.1f} %: '
+                f'{"a given mass or box is wrong, or " * bool(given)}the model lacks an effect'
             )
         if self.active:
             notes.append(
-                f'at the limit of what a body can be: {", ".join(self.active)}; '
-                'the model lacks an effect there, or the data are poor'
+                f'links at the limit of physical consistency: {", ".join(self.active)}; the model '
+                'lacks an effect there, or the data are poor'
             )
         if self.at_wall:
-            notes.append(f'at the limit of the box: {", ".join(self.at_wall)}')
+            notes.append(f'links at the limit of their box: {", ".join(self.at_wall)}')
         if self.at_mass:
-            notes.append(f'as light or heavy as they may be: {", ".join(self.at_mass)}')
+            notes.append(f'links at the limit of their mass: {", ".join(self.at_mass)}')
         if self.total_mass is not None:
             notes.append(f'the masses add up to {self.total_mass:g} kg, as given')
         if self.at_bound:
             names = ', '.join(f'{p.words} of {p.joint}' for p in self.at_bound)
-            notes.append(f'held by their bounds: {names}')
+            notes.append(f'parameters at their bounds: {names}')
         return tuple(notes)
 
     def sentences(self) -> tuple[str, ...]:
         """Return sentences on consistency, cost of the constraints, and assumptions."""
         least = min(self.links, key=lambda link: float(link.eigenvalues[0]))
-        verdict = 'every link is a body' if self.consistent else 'not every link is a body'
+        verdict = 'every link is' if self.consistent else 'not every link is'
         return (
-            f'{verdict}: the smallest eigenvalue of a pseudo-inertia is '
+            f'{verdict} physically consistent: the smallest eigenvalue of a pseudo-inertia is '
             f'{least.eigenvalues[0]:.3g} ({least.link})',
-            f'constraints cost {100.0 * (self.misfit_ratio - 1.0):.2f} % of torque error on the '
-            f'training data and {100.0 * (self.held_out_ratio - 1.0):+.2f} % on blocks left out; '
-            f'weight of the description {self.weight:g}',
-            *(self.activity or ('no constraint is active',)),
+            'the physical constraints change the torque error by '
+            f'{100.0 * (self.misfit_ratio - 1.0):+.2f} % on the training data and by '
+            f'{100.0 * (self.held_out_ratio - 1.0):+.2f} % on held-out blocks; weight of the '
+            f'description {self.weight:g}',
+            *(self.constraint_notes or ('no constraint is active',)),
             *self.notes,
         )
 

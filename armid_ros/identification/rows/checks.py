@@ -99,9 +99,7 @@ def resting(robot: Robot, source: str, ranges: FloatArray) -> tuple[str, ...]:
             'the arm while it follows an excitation'
         )
     if names:
-        return (
-            f'at rest throughout: {", ".join(names)}; their own parameters are not identified',
-        )
+        return (f'joints at rest: {", ".join(names)}; their own parameters are not identified',)
     return ()
 
 
@@ -155,7 +153,7 @@ def check_torque(
         for fault in laws_of_controllers(robot, part.motion, part.informative):
             raise IdentificationError(f'{bag}: {fault}')
     if silent:
-        return (f'torque constant throughout: {", ".join(silent)}',)
+        return (f'joints with constant torque: {", ".join(silent)}',)
     return ()
 
 
@@ -300,8 +298,8 @@ def beyond_limits(robot: Robot, recordings: Sequence[Recording]) -> tuple[str, .
     if not found:
         return ()
     return (
-        f'beyond the limits of the description: {", ".join(found)}; are scale and zero of the '
-        'positions right, and the limits?',
+        f'positions beyond the described limits: {", ".join(found)}; check scale and zero of the '
+        'positions, and the limits',
     )
 
 
