@@ -16,6 +16,7 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from dataclasses import dataclass
+from functools import partial
 
 from armid_ros.effects.action import Action, Displacement
 from armid_ros.effects.base import Arm, Effect
@@ -100,8 +101,4 @@ class TorqueReading(Effect):
         """Return the function from true torque to torque reading, as an action on sensors."""
         if not np.any(values):
             return Action()
-
-        def reading(motion: Motion, tau: FloatArray) -> FloatArray:
-            return self.read(values, motion, tau)
-
-        return Action(reading=reading, reading_memory=self.memory(values))
+        return Action(reading=partial(self.read, values), reading_memory=self.memory(values))
