@@ -311,13 +311,13 @@ class Template:
         # number of draws of a single-joint motion; each draw has a different pose of the other
         # joints
         for _ in range(6):
-            whole = random_feasible(
+            drawn = random_feasible(
                 arm, limits, self.period, self.harmonics, rng, clearance=clearance
             )
-            size = np.ptp(whole.one_period(40 * self.harmonics).q, axis=0) / 2.0
-            moving = [not self.joints or joint in self.joints for joint in whole.joints]
+            size = np.ptp(drawn.one_period(40 * self.harmonics).q, axis=0) / 2.0
+            moving = [not self.joints or joint in self.joints for joint in drawn.joints]
             share = np.minimum(1.0, self.amplitude / np.maximum(size, 1e-9))
-            trajectory = whole.scaled(np.where(moving, share, 0.0))
+            trajectory = drawn.scaled(np.where(moving, share, 0.0))
             found = trajectory_faults(arm, limits, trajectory, clearance)
             if not found:
                 return trajectory

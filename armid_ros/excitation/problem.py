@@ -217,32 +217,32 @@ class DesignProblem:
                 "criterion 'T' needs a rival, and other criteria cannot have one: give both or "
                 'neither'
             )
-        whole = arm if rival is None else _joined(arm, rival)
+        model = arm if rival is None else _joined(arm, rival)
         motion = random_motion(arm.robot, rng)
-        columns = _target_columns(whole, settings.target, motion)
+        columns = _target_columns(model, settings.target, motion)
         if not columns.any():
             raise TrajectoryError(
                 f"{arm.robot.name} has no parameters for target '{settings.target}'"
             )
-        level = replace(whole, robot=levelled(whole.robot))
+        level = replace(model, robot=levelled(model.robot))
         flat = _target_columns(level, settings.target, motion).reshape(-1, columns.shape[-1])
-        base = group_columns(flat, whole.parameters)
+        base = group_columns(flat, model.parameters)
         columns = (columns / noise[:, np.newaxis]).reshape(flat.shape)[:, base.independent]
         scale = 1.0 / np.sqrt(np.sum(columns**2, axis=0) / len(motion))
-        wanted, values = np.ones(base.rank, dtype=bool), base.values(whole.theta)
+        wanted, values = np.ones(base.rank, dtype=bool), base.values(model.theta)
         if rival is not None:
-            lacking = np.arange(len(whole.parameters)) >= len(rival.parameters)
-            wanted, values = lacking[base.independent], base.values(lacking * whole.theta)
+            lacking = np.arange(len(model.parameters)) >= len(rival.parameters)
+            wanted, values = lacking[base.independent], base.values(lacking * model.theta)
         elif settings.focus:
-            names = [effect.name for effect in whole.effects]
+            names = [effect.name for effect in model.effects]
             for name in set(settings.focus) - set(names):
                 raise TrajectoryError(
                     f"focus: the arm has no effect '{name}'; it has {', '.join(names) or 'none'}"
                 )
-            focused = parameter_mask(whole, settings.focus)
+            focused = parameter_mask(model, settings.focus)
             wanted = focused[base.independent]
         criterion = Criterion(settings.criterion, scale, wanted, values, settings.balance)
-        problem = cls(whole, settings, limits, base, read_only(noise), read_only(scale), criterion)
+        problem = cls(model, settings, limits, base, read_only(noise), read_only(scale), criterion)
         problem._require_visible(columns.T @ columns)
         return problem
 

@@ -52,8 +52,8 @@ class Run:
         for name in ('approach', 'back'):
             transfer = getattr(self, name)
             if transfer is not None:
-                whole = max(math.ceil(transfer.duration * self.rate - 1e-6), 1)
-                object.__setattr__(self, name, transfer.lasting(whole / self.rate))
+                samples = max(math.ceil(transfer.duration * self.rate - 1e-6), 1)
+                object.__setattr__(self, name, transfer.lasting(samples / self.rate))
 
     @property
     def joints(self) -> tuple[str, ...]:

@@ -192,13 +192,13 @@ class Excitation:
 
     def _period_samples(self, rate: float) -> int:
         samples = self.trajectory.period * rate
-        whole = max(round(samples), 1)
-        if abs(samples - whole) > _SAMPLE_TOLERANCE * whole:
+        nearest = max(round(samples), 1)
+        if abs(samples - nearest) > _SAMPLE_TOLERANCE * nearest:
             raise TrajectoryError(
                 f'a period of {self.trajectory.period:g} s is {samples:g} samples at {rate:g} Hz; '
-                f'it has to be a whole number: take {whole / self.trajectory.period:.9g} Hz'
+                f'it has to be a whole number: take {nearest / self.trajectory.period:.9g} Hz'
             )
-        return whole
+        return nearest
 
 
 SCHEMA = 'armid/excitation/1'

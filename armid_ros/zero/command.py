@@ -132,17 +132,17 @@ def fit(
     recordings = options.read(bags, robot, topic)
     options.tell_damage(*recordings)
     loaded = payloads_of(payloads, recordings, robot)
-    robots = [loaded.get(one.source, robot) for one in recordings]
-    rests = [find_rests(one) for one in recordings]
+    robots = [loaded.get(recording.source, robot) for recording in recordings]
+    rests = [find_rests(recording) for recording in recordings]
     if external:  # the controller has subtracted the weight of the described arm
         bare = ArmModel(robot, quasi_static=True)
-        rests = [one.with_torque(np.asarray(one.tau) + bare.torque(one)) for one in rests]
+        rests = [rest.with_torque(np.asarray(rest.tau) + bare.torque(rest)) for rest in rests]
     found = fit_rests(rests, robots, known, link_error)
     source = options.kept_source(robot_source, robot, staged.folder)
     save_model(staged.folder / 'model.yaml', found.model(), source)
     document = fit_document(found, known, link_error, external)
     step = f'armid identify RECORDING --robot {robot_source}, which also finds friction in motion'
-    noise = np.sqrt(np.mean([reading_noise(one) ** 2 for one in recordings], axis=0))
+    noise = np.sqrt(np.mean([reading_noise(each) ** 2 for each in recordings], axis=0))
     summary = None if as_json else fit_summary(found, document, step, noise)
     options.deliver_document(staged, 'zero', document, summary, 'model.yaml')
 

@@ -263,9 +263,9 @@ class Constraints:
     def _torque(self, motion: Motion) -> Part:
         arm, limits = self.problem.arm, self.problem.limits
         torque = arm.joint_torque(motion)
-        one = np.ones(len(limits.joints))
-        most = np.where(np.isfinite(limits.torque), one, np.inf)
-        limited, totals, signed = self._between(torque / limits.torque, -most, most, one)
+        unit = np.ones(len(limits.joints))
+        most = np.where(np.isfinite(limits.torque), unit, np.inf)
+        limited, totals, signed = self._between(torque / limits.torque, -most, most, unit)
         of_torque = np.zeros((len(limited), *torque.shape))
         of_torque[np.arange(len(limited)), :, limited] = (
             signed / limits.torque[limited, np.newaxis]

@@ -285,8 +285,8 @@ def _made_feasible(
         faults = trajectory_faults(problem.arm, problem.limits, trajectory, clearance)
         if not faults:
             return trajectory
-        own = {v.joint for v in faults if isinstance(v, Violation) and v.limit != 'torque'}
-        everywhere = len(own) < len(faults)
-        factor = [0.99 if everywhere or j in own else 1.0 for j in trajectory.joints]
+        exceeding = {v.joint for v in faults if isinstance(v, Violation) and v.limit != 'torque'}
+        everywhere = len(exceeding) < len(faults)
+        factor = [0.99 if everywhere or j in exceeding else 1.0 for j in trajectory.joints]
         trajectory = trajectory.scaled(np.array(factor))
     return None
