@@ -173,7 +173,7 @@ class Effect(ABC):
         return ((self, values),)
 
     def _default_shape(self, robot: Robot) -> FloatArray:
-        """Return default shape parameters for this robot, shape (number of owners, S)."""
+        """Return the default shape parameters for this robot, with one row for each owner."""
         return self.shape_values
 
     @property
@@ -183,7 +183,7 @@ class Effect(ABC):
 
     def with_shape(self, values: npt.ArrayLike) -> Effect:
         """
-        Return the effect with other shape parameters.
+        Return the effect with other values of its shape parameters.
 
         Parameters
         ----------
@@ -220,7 +220,7 @@ class Effect(ABC):
 
     def shape_starts(self, unexplained: Unexplained, arm: Arm) -> tuple[FloatArray, ...]:
         """
-        Return start values for a search of the shape parameters, each (number of owners, G).
+        Return start values for the search of each shape parameter, (number of owners, G).
 
         Parameters
         ----------
@@ -234,7 +234,7 @@ class Effect(ABC):
 
     @property
     def owners(self) -> tuple[str, ...]:
-        """Joints that have quantities of their own; one empty name if the whole arm has them."""
+        """Joints with parameters of their own; one empty name for an effect on the whole arm."""
         return self.joints or ('',)
 
     def parameters(self, robot: Robot) -> tuple[ParameterName, ...]:

@@ -215,7 +215,7 @@ class ActuatorSaturation(TorqueReading):
     def transfer(
         self, values: FloatArray, motion: Motion, tau: FloatArray, columns: FloatArray
     ) -> FloatArray:
-        """Return regressor columns of true torque as reported by saturated drives."""
+        """Convert regressor columns of true torque to columns of reported torque, (N, n, Q)."""
         lost, clipped, level = self._spread(values, motion)
         slope = (lost / (1.0 - lost) if motion.tau is None else 0.0) - clipped
         return np.asarray((1.0 + slope * (np.abs(tau) > level))[:, :, np.newaxis] * columns)

@@ -156,7 +156,7 @@ class PayloadChange(Payload):
 @dataclass(frozen=True)
 class LinkInertia(_LinkBody):
     """
-    Difference of a link's mass, first moments and inertia from the description's.
+    Difference of mass, first moments and inertia between a link and its description.
 
     The columns are those of the rigid-body parameters. The effect is identifiable only if the
     other parameters are known; a fit of all parameters absorbs it. For a body on the last link,

@@ -217,7 +217,7 @@ class TorqueCrosstalk(_Pairs, TorqueReading):
     def transfer(
         self, values: FloatArray, motion: Motion, tau: FloatArray, columns: FloatArray
     ) -> FloatArray:
-        """Return regressor columns of true torques as those of readings with crosstalk."""
+        """Convert regressor columns of true torques to columns of readings with crosstalk."""
         return np.asarray(columns + self._shares(values, motion) @ columns)
 
     def sensitivity(self, values: FloatArray, motion: Motion, tau: FloatArray) -> FloatArray:

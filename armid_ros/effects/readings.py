@@ -26,7 +26,7 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Displacing(Effect):
-    """Effect whose link positions differ from the recorded positions."""
+    """Base class of effects that make link positions differ from recorded positions."""
 
     @abstractmethod
     def displacements(self, motion: Motion, arm: Arm) -> Displacement:
@@ -56,7 +56,7 @@ class Displacing(Effect):
 
 @dataclass(frozen=True)
 class TorqueReading(Effect):
-    """Effect that changes the recorded torque."""
+    """Base class of effects that change the recorded torque."""
 
     @abstractmethod
     def read(self, values: FloatArray, motion: Motion, tau: FloatArray) -> FloatArray:
@@ -78,7 +78,7 @@ class TorqueReading(Effect):
         self, values: FloatArray, motion: Motion, tau: FloatArray, columns: FloatArray
     ) -> FloatArray:
         """
-        Return regressor columns of true torque as those of torque readings, (N, n, Q).
+        Convert regressor columns of true torque to columns of torque readings, (N, n, Q).
 
         By default, the reading is linear in the torque, and `read` takes columns as well.
 
@@ -87,14 +87,14 @@ class TorqueReading(Effect):
 
     @abstractmethod
     def sensitivity(self, values: FloatArray, motion: Motion, tau: FloatArray) -> FloatArray:
-        """Return the derivatives of the reading by the parameter values, shape (N, n, P)."""
+        """Return the derivatives of the reading of a torque by the parameters, shape (N, n, P)."""
 
     def memory(self, values: FloatArray) -> float:
         """Return the time span of the past torque on which the reading depends [s]."""
         return 0.0
 
     def columns(self, motion: Motion, arm: Arm) -> FloatArray:
-        """Return the derivatives of the reading by the parameters, shape (N, n, P)."""
+        """Return the derivatives of the torque reading by the parameters, shape (N, n, P)."""
         return self.sensitivity(arm.values_of(self), motion, arm.torque_before(self, motion))
 
     def action(self, values: FloatArray, arm: Arm) -> Action:

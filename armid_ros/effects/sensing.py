@@ -60,7 +60,7 @@ class TorqueGain(TorqueReading):
     quantities = (Quantity('gain_error', '', lower=-0.95, typical=(0.005, 0.3)),)
 
     def read(self, values: FloatArray, motion: Motion, tau: FloatArray) -> FloatArray:
-        """Return torque readings with the gain error, shape (N, n) [N m], or regressor columns."""
+        """Apply the gain error to torques [N m] or regressor columns, shape (N, n, ...)."""
         gain = np.ones(motion.n_joints)
         gain[self.indices(motion.joints)] += values
         return np.asarray(tau * gain.reshape(-1, *(1,) * (tau.ndim - 2)))
@@ -101,7 +101,7 @@ class TorqueDrift(TorqueReading):
     def transfer(
         self, values: FloatArray, motion: Motion, tau: FloatArray, columns: FloatArray
     ) -> FloatArray:
-        """Return the regressor columns unchanged, as drift does not depend on the torque."""
+        """Return regressor columns unchanged, as the drift does not depend on the torque."""
         return columns
 
     def sensitivity(self, values: FloatArray, motion: Motion, tau: FloatArray) -> FloatArray:

@@ -71,7 +71,7 @@ class Hysteresis:
 
     def pullback(self, q: FloatArray, dq: FloatArray, weights: FloatArray) -> FloatArray:
         """
-        Differentiate the sum of weights * torque along a path by its positions.
+        Return the derivative of the weighted sum of torques along a path by the positions.
 
         Parameters
         ----------

@@ -35,7 +35,7 @@ class LateReading(TorqueReading):
 
     @classmethod
     def places(cls, robot: Robot) -> tuple[tuple[str, ...], ...]:
-        """Return the whole arm, with one delay of all joints, and every single joint."""
+        """Return the places of a delay: the whole arm, with one delay, or a single joint."""
         return ((), *((joint,) for joint in robot.joints))
 
     def _owned(self, motion: Motion) -> list[list[int]]:
@@ -77,7 +77,7 @@ class TimeDelay(LateReading):
         return float(np.max(np.abs(values)))
 
     def read(self, values: FloatArray, motion: Motion, tau: FloatArray) -> FloatArray:
-        """Return the delayed torque, shape (N, n) [N m], or delayed regressor columns."""
+        """Delay torques [N m] or regressor columns, shape (N, n, ...)."""
         return self._delayed(values, motion, tau)
 
     def _delayed(
@@ -110,7 +110,7 @@ class TorqueLag(LateReading):
     instantaneous = False
 
     def read(self, values: FloatArray, motion: Motion, tau: FloatArray) -> FloatArray:
-        """Return the filtered torque, shape (N, n) [N m], or filtered regressor columns."""
+        """Filter torques [N m] or regressor columns by the low-pass, shape (N, n, ...)."""
         result = tau.copy()
         for lag, rows in zip(values, self._owned(motion), strict=True):
             if lag:
@@ -173,7 +173,7 @@ def smoothed(motion: Motion) -> Motion:
 
 def low_pass(t: FloatArray, x: FloatArray, lag: float) -> FloatArray:
     """
-    Return samples behind a first-order low-pass, T dy/dt + y = x.
+    Filter samples by a first-order low-pass, T dy/dt + y = x.
 
     Samples are evenly spaced and begin at a constant rate. The filter is computed as y = x - T v,
     where v is the filtered rate of x, and the rate is linear between samples. It is of second

@@ -63,13 +63,13 @@ class Design:
     stopped: str = ''
 
     def robot_limits_used(self, arm: ArmModel) -> dict[str, FloatArray]:
-        """Return the peak use of each limit of the robot, without a reserve, as a share."""
+        """Return the largest share of each limit of the robot that the excitation uses."""
         full = Limits.of(arm.robot, speed=1.0, reserve=False)
         return replace(self, limits=full).limits_used(arm)
 
     def limits_used(self, arm: ArmModel) -> dict[str, FloatArray]:
         """
-        Return the peak use of each limit of the design by the excitation, as a share.
+        Return the largest share of each limit of the design that the excitation uses.
 
         Transfers to and from the excitation do not count.
 

@@ -309,7 +309,7 @@ def with_joint_limits(
 
 
 def with_acceleration_limit(robot: Robot, limit: FloatArray) -> Robot:
-    """Return a robot with given acceleration limits, (n,) [rad/s^2 or m/s^2], where smaller."""
+    """Return a robot with acceleration limits lowered to given ones, (n,) [rad/s^2, m/s^2]."""
     limit = np.nan_to_num(limit, nan=np.inf)
     _require_narrower(robot, 'acceleration', limit, robot.acceleration_limit)
     return replace(robot, acceleration_limit=np.minimum(limit, robot.acceleration_limit))

@@ -158,7 +158,7 @@ def jump_fault(
 
 def slowed(path: Path, phase: float, duration: float, rate: float) -> Motion:
     """
-    Return the motion that slows down to rest along a path, from a given time of the path.
+    Return a motion that stops along a path, starting at a given time of the path.
 
     Parameters
     ----------

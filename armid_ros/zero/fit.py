@@ -94,7 +94,7 @@ class ZeroFit:
     outliers: int
 
     def of(self, name: str, joint: str = '') -> FittedQuantity:
-        """Return the fitted quantity of a name and a joint, which is empty for the whole arm."""
+        """Return the fitted quantity with a name, of a joint or of the whole arm ('')."""
         return next(one for one in self.quantities if (one.name, one.joint) == (name, joint))
 
     def model(self) -> ArmModel:
@@ -205,7 +205,7 @@ def fit_rests(
 def _predicted(
     arms: Sequence[ArmModel], rests: Sequence[Motion], x: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Return torques (K, n) and derivatives (K, n, P) for parameters changed by x."""
+    """Return predicted torques (K, n) and their derivatives (K, n, P) for changed parameters."""
     pairs = [(a.with_theta(a.theta + x), motion) for a, motion in zip(arms, rests, strict=True)]
     torque = np.concatenate([arm.torque(motion) for arm, motion in pairs])
     return torque, np.concatenate([arm.columns(motion) for arm, motion in pairs])

@@ -150,7 +150,7 @@ class ClearanceModel:
         return cls(collision, margin, joints, spheres, planes, numbers, pairs, between, most)
 
     def without_distant_pairs(self, q: FloatArray, reach: float) -> ClearanceModel:
-        """Return the model of only the pairs closer than ``reach`` [m] in some pose q, (N, n)."""
+        """Return the model without pairs farther apart than ``reach`` [m] in all poses q."""
         kept = np.unique(self.near(q, reach).pair)
         return replace(
             self,

@@ -145,7 +145,7 @@ class Objective:
 
 
 def _weighted(blocks: Sequence[FloatArray], weights: FloatArray) -> FloatArray:
-    """Return the weighted sum of columns in each sample of k copies, shape (k, N)."""
+    """Return the weighted sum of columns in each sample of k copies of a motion, (k, N)."""
     total, start = 0.0, 0
     for block in blocks:
         stop = start + block.shape[2]
