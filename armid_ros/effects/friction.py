@@ -139,7 +139,7 @@ class StribeckFriction(JointLaw):
     """
 
     name = 'stribeck_friction'
-    summary = 'breakaway torque beyond Coulomb friction, gone at higher velocity'
+    summary = 'breakaway torque beyond Coulomb friction, which vanishes at higher velocity'
     quantities = (Quantity('stribeck_torque', 'N m', lower=0.0, typical=(0.001, 10.0)),)
     shapes = (
         Shape('stribeck_velocity', 'rad/s', 1e-4, 20.0, 0.1, (0.01, 0.03, 0.1, 0.3, 1.0)),

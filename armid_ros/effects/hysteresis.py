@@ -28,7 +28,7 @@ class LoadDependentFriction(Effect):
     """
 
     name = 'load_dependent_friction'
-    summary = 'dry friction in proportion to the torque that the gear passes on'
+    summary = 'dry friction in proportion to the torque that the gear transmits'
     quantities = (Quantity('load_coefficient', '', lower=0.0, upper=1.0, typical=(0.01, 0.4)),)
     holds_at_rest = True
 
@@ -60,7 +60,7 @@ class PreslidingHysteresis(Effect):
     """
 
     name = 'presliding_hysteresis'
-    summary = 'friction that builds up over a short way after each reversal'
+    summary = 'friction that builds up over a short distance after each reversal'
     quantities = (Quantity('presliding_torque', 'N m', lower=0.0, typical=(0.005, 10.0)),)
     shapes = (
         Shape('breakaway_distance', 'rad', 1e-6, 1.0, 0.01, (0.001, 0.003, 0.01, 0.03, 0.1)),

@@ -186,7 +186,7 @@ class LearnedTorque(Effect):
     maps: tuple[TorqueMap, ...] = ()
 
     name = 'learned_torque'
-    summary = 'torque without a name, learned over position, velocity and load'
+    summary = 'learned torque without a physical cause, over position, velocity and load'
     quantities = (Quantity('learned_share', '', typical=(0.5, 1.0)),)
     learned = True
 

@@ -88,7 +88,7 @@ TRAITS = {
         separate=((0,), (1,)),
     ),
     'torque_crosstalk': Traits(
-        shown_by='one joint loaded while the other one stands still',
+        shown_by='one joint loaded while the other joint stands still',
         look_at='the mounting of the torque sensors, and their cables',
     ),
     'torque_gain': Traits(
@@ -98,7 +98,7 @@ TRAITS = {
     ),
     'torque_drift': Traits(
         shown_by='the same static hold, repeated for half an hour',
-        look_at='the temperature of the torque sensor, and when its zero was set',
+        look_at='the temperature of the torque sensor, and the time at which its zero was set',
     ),
     'time_delay': Traits(
         shown_by='the same motion at two speeds, and a sweep of frequency',
@@ -194,7 +194,7 @@ TRAITS = {
     ),
     'payload': Traits(
         shown_by='the same motion with the tool taken off',
-        look_at='the hand, the gripper, the tool, a part or a cable that it carries',
+        look_at='the hand, the gripper, the tool, a part or a cable that the arm carries',
         weighs=True,
     ),
     'link_inertia': Traits(

@@ -203,7 +203,7 @@ class Fitness:
         if self.word == UNFIT:
             return 'Do not run it. Design it with another --start or --seed, or more --clearance.'
         items = ' '.join(self.unchecked)
-        needed = ', '.join(what for words, what in _REMEDIES.items() if words in items)
+        needed = ', '.join(remedy for words, remedy in _REMEDIES.items() if words in items)
         return f'Give {needed}, or check these items yourself before the run.' if needed else ''
 
     def __str__(self) -> str:
