@@ -259,7 +259,7 @@ def require_radians(robot: Robot) -> None:
         robot.joints, robot.lower, robot.upper, robot.prismatic, strict=True
     ):
         ends = [abs(end) for end in (lower, upper) if math.isfinite(end)]
-        # two turns; larger limits are probably in degrees
+        # limits beyond two turns are probably in degrees
         if not slides and max(ends, default=0.0) > 1.01 * 4.0 * math.pi:
             raise TrajectoryError(
                 f'{robot.name}: joint {joint} has position limits {lower:g} and {upper:g} rad, '
@@ -325,7 +325,7 @@ def _require_narrower(
         if math.isfinite(value) and value > limit * (1.0 + _ROUNDING):
             unit = ('m' if slides else 'rad') + ('/s' if quantity == 'velocity' else '/s^2')
             hint = ''
-            # degrees give a usual share of the limit; 1 % for rounded numbers
+            # in degrees, the value would be a usual share of the limit; 1 % is for rounding
             if not slides and 0.1 * limit <= math.radians(value) <= 1.01 * limit:
                 hint = f'; are these degrees? {value:g} degrees are {math.radians(value):.4g} rad'
             raise TrajectoryError(

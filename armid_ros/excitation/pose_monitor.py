@@ -140,7 +140,7 @@ class PoseMonitor:
         last = (
             source.states[-1]
             if source.states
-            else _State(seen, 0, [self._q[j] for j in source.joints], dq)  # of other senders
+            else _State(seen, 0, [self._q[j] for j in source.joints], dq)  # from other senders
         )
         if stamp_ns == last.stamp_ns != 0 and last.q == q:
             return  # repeated message
@@ -184,7 +184,7 @@ class PoseMonitor:
             states = source.states
             for state in reversed(states):
                 passed = states[-1].arrived - state.arrived
-                # time of the position differences for a velocity [s]: noise of 0.0001 rad gives
+                # shortest time between positions for a velocity [s]: noise of 0.0001 rad gives
                 # 0.01 rad/s
                 if passed >= 0.01:
                     velocity[source.joints] = (np.array(states[-1].q) - state.q) / passed
@@ -254,7 +254,7 @@ class PoseMonitor:
         passed = state.arrived - last.arrived
         if state.stamp_ns and last.stamp_ns:
             between = (state.stamp_ns - last.stamp_ns) * 1e-9
-            # transport delay: stamps may differ by this time more than arrivals [s]
+            # transport delays vary: stamps may be this much farther apart than arrivals [s]
             passed = max(passed, min(between, passed + 0.1))
         allowed = max(passed, 0.0)
         # encoder noise, added to the change of position that the velocity limit allows [rad or m]

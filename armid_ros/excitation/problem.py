@@ -269,7 +269,7 @@ class DesignProblem:
 
     def recorded(self, trajectory: FourierTrajectory, n_periods: int) -> Information:
         """Return the information of a recorded trajectory on the base parameters."""
-        # factor between the samples for the information and the samples of the search
+        # six times as many samples as in the search
         count, margin = 6 * self.settings.samples, MARGIN * trajectory.n_joints
         columns = self.columns(trajectory.with_margins(count))[margin:-margin]
         weight = self.settings.rate * trajectory.period * n_periods / count

@@ -46,7 +46,7 @@ class Run:
         """Check that transfers meet the excitation; round their durations up to whole samples."""
         ends = self.excitation.at([0.0, self.excitation.duration]).q
         for transfer, own, end in ((self.approach, -1, 0), (self.back, 0, 1)):
-            # [rad or m]; rounding
+            # tolerance for rounding [rad or m]
             if transfer is not None and np.abs(transfer.q[own] - ends[end]).max() > 1e-9:
                 raise TrajectoryError('run: a transfer and the excitation do not meet in a pose')
         for name in ('approach', 'back'):
@@ -111,7 +111,7 @@ class Run:
         between = motion.t[:-1] + 0.4 / self.rate
         away = np.abs(Reference.of(motion).sample(between).q - self.at(between).q).max(axis=0)
         j = int(np.argmax(away))
-        if away[j] > 0.001:  # [rad or m]
+        if away[j] > 0.001:  # largest distance from the path [rad or m]
             raise TrajectoryError(
                 f"joint '{self.joints[j]}' would be {away[j]:.2g} rad or m off its path between "
                 f'{self.rate:g} waypoints per second: raise the rate, or take fewer harmonics'

@@ -164,7 +164,8 @@ class CompiledLoop:
         arrays = (*moved, tau, *(values[rows.start : rows.stop] for values in desired))
         addresses = [array.ctypes.data for array in arrays]
 
-        def advance(state: State, row: int, arrays: object = arrays) -> int:  # references
+        # the default argument keeps the arrays whose addresses the kernel has
+        def advance(state: State, row: int, arrays: object = arrays) -> int:
             modes = np.array(state.modes, dtype=np.int64)
             reached: int = library.advance(
                 *self.addresses, modes.ctypes.data, state.t, row, last, *addresses

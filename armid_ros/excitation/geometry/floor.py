@@ -134,7 +134,7 @@ def outline(shape: coal.CollisionGeometry) -> tuple[FloatArray, float]:
         return np.array([end, -end]), float(shape.radius)
     shape.computeLocalAABB()
     ends = np.array([shape.aabb_local.min_, shape.aabb_local.max_])
-    # [m]; an unbounded shape, such as a half space
+    # an unbounded body, such as a half space, is larger [m]
     if not np.all(np.abs(ends) < 1e6):
         return np.empty((0, 3)), 0.0
     return np.array(list(product(*ends.T))), 0.0
