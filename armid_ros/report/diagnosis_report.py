@@ -20,22 +20,9 @@ from armid_ros.identification.rows.signals import conditioning, SignalSettings
 from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording
 from armid_ros.report.arm_drawing import ArmDrawing, draw_arm
-from armid_ros.report.blocks import (
-    ContentSection,
-    next_steps,
-    Origin,
-    Paragraph,
-    VerdictSection,
-)
+from armid_ros.report.blocks import ContentSection, next_steps, Origin, Paragraph, VerdictSection
 from armid_ros.report.charts import Chart, joined, joined_time, Series
-from armid_ros.report.notation import (
-    counted,
-    percent,
-    pretty,
-    probability,
-    robot_label,
-    sentence,
-)
+from armid_ros.report.notation import counted, percent, pretty, probability, robot_label, sentence
 from armid_ros.report.page import Page, Section
 from armid_ros.report.provenance import DEFAULT_ORIGIN, ResultOrigin
 from armid_ros.report.sections.data_quality import data_quality_section
@@ -127,15 +114,9 @@ def diagnosis_report(
     sections: list[Section] = [_verdict(diagnosis, worse, ''.join(steps[:1]))]
     curves = whole_overlays(diagnosis, [one for one, _ in recordings])
     if curves is not None and diagnosis.gap is not None:
-        sections += [
-            overlay_section(diagnosis, curves),
-            Story(diagnosis, learned_joints),
-        ]
+        sections += [overlay_section(diagnosis, curves), Story(diagnosis, learned_joints)]
         if diagnosis.findings:
-            sections += [
-                gap_section(diagnosis, diagnosis.gap),
-                named_section(diagnosis.findings),
-            ]
+            sections += [gap_section(diagnosis, diagnosis.gap), named_section(diagnosis.findings)]
         if diagnosis.where:
             sections.append(evidence_section(diagnosis))
     if learned is not None:

@@ -74,7 +74,18 @@ def inspection_report(found: Inspection, origin: ResultOrigin = DEFAULT_ORIGIN) 
             grade, _TONES[grade], sentences[:first], sentences[first:], step=origin.step
         ),
         _contents_section(found),
-        _joints_section(found),
+        ContentSection(
+            'Joints',
+            [
+                DataTable(joint_heads(found), joint_rows(found), kind='tight'),
+                Paragraph(
+                    'Speed: 99th percentile, from the positions. Step: smallest change of a '
+                    'position between samples. Velocity ratio: recorded velocity over the '
+                    'derivative of the positions; 1 if units and signs agree.',
+                    'hint',
+                ),
+            ],
+        ),
         _curves_section(found),
         Origin(origin.provenance),
     ]
@@ -235,17 +246,6 @@ def _contents_section(found: Inspection) -> ContentSection:
         heads = ('Topic', 'Messages', 'Type', 'Joints')
         blocks.insert(0, DataTable(heads, rows, (0, 2, 3), 'tight'))
     return ContentSection('What is in it', blocks)
-
-
-def _joints_section(found: Inspection) -> ContentSection:
-    """Return the section with range, speed and effort of each joint."""
-    hint = (
-        'Speed: 99th percentile, from the positions. Step: smallest change of position between '
-        'samples. Velocity ratio: recorded velocity over the derivative of the positions; 1 if '
-        'units and signs agree.'
-    )
-    table = DataTable(joint_heads(found), joint_rows(found), kind='tight')
-    return ContentSection('Joints', [table, Paragraph(hint, 'hint')])
 
 
 def _curves_section(found: Inspection) -> ContentSection:

@@ -131,9 +131,9 @@ def parameter_folds(
             name = names[k]
             lead: Cells = (name.joint or name.name,)
             if rigid:
-                words, _ = _words_and_link(name, links)
+                label = _words_and_link(name, links)[0]
                 lead = (
-                    TableCell(words, 'words', grouping(name, links)),
+                    TableCell(label, 'words', grouping(name, links)),
                     TableCell(pretty(name.unit), 'unit'),
                 )
             rows.append((*lead, *cells(k)))
