@@ -19,8 +19,7 @@ import click
     multiple=True,
     type=click.Path(path_type=Path),
     metavar='BAG',
-    help='Bag with responses to steps of the velocity reference, for the tuning; may be given '
-    'several times.',
+    help='Bag with step responses, for the tuning; may be given several times.',
 )
 @click.option('--demo', is_flag=True, help='Simulate the shipped two-link arm and identify it.')
 @click.option(
@@ -39,9 +38,7 @@ import click
     'parameters. Default: found; with --demo: before.',
 )
 @click.option(
-    '--accelerometers',
-    metavar='R1,R2',
-    help='Distances of the accelerometers from the joints [m].',
+    '--accelerometers', metavar='R1,R2', help='Distances of accelerometers from the joints [m].'
 )
 @click.option(
     '--gear', metavar='N1,N2', help='Gear ratios: turns of the motor per turn of the joint.'
@@ -53,8 +50,7 @@ import click
 @click.option(
     '--model',
     type=click.Path(path_type=Path),
-    help='model.yaml with the inertias of the links, for an arm that is not a planar two-link '
-    'arm.',
+    help='model.yaml with the link inertias of an arm other than a planar two-link arm.',
 )
 @parameters.folder
 @parameters.reading

@@ -33,11 +33,9 @@ EXERCISES = ('step', 'quick_step', 'swing', 'lift', 'squat', 'rock')
     help='Inertias of the exoskeleton: known from its description, or free (estimated).',
 )
 @click.option(
-    '--gait',
-    'gait_file',
-    type=click.Path(path_type=Path),
+    '--gait', 'gait_file', type=click.Path(path_type=Path),
     help='CSV file with the joint angles of a gait cycle; default: level walking.',
-)
+)  # fmt: skip
 @click.option(
     '--stiffness', type=float, help='Stiffness of the simulated straps [N/m]; default: 10000.'
 )
@@ -52,16 +50,10 @@ EXERCISES = ('step', 'quick_step', 'swing', 'lift', 'squat', 'rock')
     '--duration', default=10.0, show_default=True, help='Length of the simulated recording [s].'
 )
 @click.option(
-    '--torque-noise',
-    default=0.5,
-    show_default=True,
-    help='Standard deviation of the simulated torque noise [N m].',
+    '--torque-noise', default=0.5, show_default=True, help='Simulated torque noise (std) [N m].'
 )
 @click.option(
-    '--angle-noise',
-    default=0.05,
-    show_default=True,
-    help='Standard deviation of the simulated angle noise [deg].',
+    '--angle-noise', default=0.05, show_default=True, help='Simulated angle noise (std) [deg].'
 )
 @parameters.seed
 @parameters.reading

@@ -252,10 +252,5 @@ class OnlineInteraction:
             )
         )
         return recorded_interaction_problem(
-            self.machines,
-            own,
-            far,
-            inertias=self._inertias,
-            separate=separate,
-            slack=slack,
+            self.machines, own, far, inertias=self._inertias, separate=separate, slack=slack
         )

@@ -14,12 +14,7 @@ from armid_ros.identification.ties.stiffness import identify_interaction, Intera
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.papers.exo.plant.gait import Gait, read_assumptions
 from armid_ros.papers.exo.plant.gait_cycle import check_cycle, gait_cycle, ground_by_shares
-from armid_ros.papers.exo.plant.leg_pair import (
-    pair_torques,
-    PairMotion,
-    TiedPair,
-    walking,
-)
+from armid_ros.papers.exo.plant.leg_pair import pair_torques, PairMotion, TiedPair, walking
 from armid_ros.papers.exo.plant.walkers import walking_pair
 from armid_ros.papers.exo.report.walk import (
     DrivenJoint,
@@ -75,11 +70,7 @@ def identify_ties(
     for share, separate in ((0.1, False), (0.35, True)):
         tick(share, 'identifying')
         problem = recorded_interaction_problem(
-            pair,
-            machine,
-            wearer,
-            inertias=inertias,
-            separate=separate,
+            pair, machine, wearer, inertias=inertias, separate=separate
         )
         found.append(identify_interaction(problem))
     return found

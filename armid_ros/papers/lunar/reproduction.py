@@ -86,29 +86,24 @@ class PaperTable:
         return self.error / (self.noise if self.uniform else self.peak)
 
 
-def _milli(*values: float) -> FloatArray:
-    """Convert torques from N mm to N m."""
-    return np.array(values) * 1e-3
-
-
 TABLES = (
     PaperTable(
         3,
         'on the moon',
         'humanoid_arm',
         'moon',
-        _milli(618.66, 608.73, 147.27, 141.64, 7.27, 1.91),
-        _milli(32.64, 39.93, 4.89, 6.79, 0.46, 0.13),
-        _milli(32.64, 39.93, 4.89, 6.79, 0.46, 0.13),
+        1e-3 * np.array([618.66, 608.73, 147.27, 141.64, 7.27, 1.91]),
+        1e-3 * np.array([32.64, 39.93, 4.89, 6.79, 0.46, 0.13]),
+        1e-3 * np.array([32.64, 39.93, 4.89, 6.79, 0.46, 0.13]),
     ),
     PaperTable(
         4,
         'on the moon, 0.3 kg in the hand',
         'humanoid_arm_loaded',
         'moon',
-        _milli(852.91, 806.69, 270.67, 266.12, 9.95, 4.77),
-        _milli(59.60, 36.35, 7.61, 11.46, 0.60, 0.33),
-        _milli(59.60, 36.35, 7.61, 11.46, 0.60, 0.33),
+        1e-3 * np.array([852.91, 806.69, 270.67, 266.12, 9.95, 4.77]),
+        1e-3 * np.array([59.60, 36.35, 7.61, 11.46, 0.60, 0.33]),
+        1e-3 * np.array([59.60, 36.35, 7.61, 11.46, 0.60, 0.33]),
     ),
     PaperTable(
         6,

@@ -76,10 +76,7 @@ class Signals:
 
 
 def identify_subspace(
-    experiments: Sequence[Signals],
-    dt: float,
-    order: int,
-    hold: Sequence[Hold],
+    experiments: Sequence[Signals], dt: float, order: int, hold: Sequence[Hold]
 ) -> StateSpace:
     """
     Identify a linear system with a given number of states from sampled experiments.

@@ -81,11 +81,7 @@ class Tuning:
         )
 
 
-def tune(
-    runs: Sequence[ElasticRun],
-    start: TwoLinkParameters,
-    loop: VelocityLoop,
-) -> Tuning:
+def tune(runs: Sequence[ElasticRun], start: TwoLinkParameters, loop: VelocityLoop) -> Tuning:
     """
     Fit the parameters to measured velocity responses in closed loop.
 

@@ -216,13 +216,8 @@ def gait_cycle(pair: TiedPair, gait: Gait) -> GaitCycle:
         ground.append(read_only(ground_force(place[..., 1], speed[..., 1], speed[..., 0])))
     motions = PairMotion(*whole)
     found = walking_torques(pair, motions, ground)
-    own, other = (
-        WalkingMachine(*parts)
-        for parts in (
-            (pair.robot, motions.own, ground[0], found.forces, found.tau),
-            (pair.other, motions.other, ground[1], -found.forces, found.other_tau),
-        )
-    )
+    own = WalkingMachine(pair.robot, motions.own, ground[0], found.forces, found.tau)
+    other = WalkingMachine(pair.other, motions.other, ground[1], -found.forces, found.other_tau)
     return GaitCycle(pair, read_only(np.linspace(0.0, 1.0, _STEPS_PER_CYCLE + 1)), own, other)
 
 

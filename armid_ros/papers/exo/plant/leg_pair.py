@@ -22,12 +22,7 @@ from armid_ros.errors import ModelError
 from armid_ros.model import inverse_dynamics
 from armid_ros.model.spring_ties import extension, tie_geometry, TiedMachines, TieGeometry
 from armid_ros.motion import FloatArray, Motion, read_only
-from armid_ros.papers.exo.plant.gait import (
-    Gait,
-    read_assumptions,
-    read_gait,
-    stance_motion,
-)
+from armid_ros.papers.exo.plant.gait import Gait, read_assumptions, read_gait, stance_motion
 from armid_ros.robots import load_robot
 from armid_ros.robots.ties import leg_ties, SEGMENTS
 import numpy as np

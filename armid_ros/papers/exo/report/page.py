@@ -57,16 +57,9 @@ def exo_report(
 
     """
     motions, abscissa, name = shown
-    sections: list[Section] = [
-        verdict(found, walked),
-        _stiffness_section(found, walked),
-    ]
+    sections: list[Section] = [verdict(found, walked), _stiffness_section(found, walked)]
     if walked is not None:
-        sections += [
-            Walk(walked),
-            by_torque_section(walked),
-            feet_section(walked.cycle),
-        ]
+        sections += [Walk(walked), by_torque_section(walked), feet_section(walked.cycle)]
     sections += [
         forces_section(pair, motions, abscissa, name),
         assumptions_section(),
