@@ -244,8 +244,8 @@ class RecursiveLeastSquares:
         stacked = np.zeros((size + count, count + size))
         stacked[:size, :count], stacked[:size, count:] = -self._root @ unit, self._root
         stacked[size:, :count] = np.eye(count) / PRIOR_STD
-        root = np.linalg.qr(stacked, mode='r')[count:, count:]
-        self._take(np.asfortranarray(root), self._values)
+        triangle = np.asarray(np.linalg.qr(stacked, mode='r'))
+        self._take(np.asfortranarray(triangle[count:, count:]), self._values)
         self._freedom -= count
 
     @property
