@@ -45,7 +45,7 @@ def test_identify_then_watch(bags, tmp_path):
             ('identify', '{bags}/*/*', '--robot', 'humanoid_arm', '--out', '{out}'),
             'no bag of humanoid_arm can be read',
         ),
-        (('identify', '{bags}/*/*', '--robot', ROBOT, '--out', ROBOT), '--out is a folder'),
+        (('identify', '{bags}/*/*', '--robot', ROBOT, '--out', ROBOT), 'give a folder with --out'),
         (('watch', '--out', '{out}'), 'run `armid fleet identify` first'),
         (('diagnose', '--out', '{out}'), 'run `armid fleet identify` first'),
     ],

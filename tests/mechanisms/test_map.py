@@ -211,7 +211,7 @@ def test_couplings_that_cannot_be(inside, more, message):
 
 def test_a_passive_joint_cannot_be_driven(tmp_path):
     text = load('palletiser', tmp_path).urdf
-    with pytest.raises(RobotError, match="'elbow' is moved by a loop"):
+    with pytest.raises(RobotError, match="'elbow' is passive"):
         load_robot(text, joints=['j1', 'elbow'])
 
 
