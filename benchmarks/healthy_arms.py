@@ -15,7 +15,7 @@ change, by steps or wear.
 
 import argparse
 
-from armid_ros.changes.histories import judge, named, ParameterHistory, spreads, without_days
+from armid_ros.changes.histories import judge, ParameterHistory, significant, spreads, without_days
 import numpy as np
 
 JOINTS = ('waist', 'shoulder', 'elbow')
@@ -96,7 +96,7 @@ def tally(arms, bags, sick, rng, alpha=0.05):
     series = draw(arms, bags, sick, rng)
     compared = without_days(series)
     judged = judge([(compared, spreads(compared))])
-    found = {one.arm for one in judged if named(one, alpha)}
+    found = {one.arm for one in judged if significant(one, alpha)}
     ill = {f'arm_{arm}' for arm in range(sick)}
     return len(found & ill), len(found - ill)
 

@@ -45,7 +45,7 @@ from armid_ros.identification import verify as run_checks
 from armid_ros.identification.fitting.identifiability import excludes_zero
 from armid_ros.identification.fitting.least_squares import Estimator
 from armid_ros.identification.known_payload import corrected, drive_gains, DriveGains, payloads_of
-from armid_ros.identification.output import SCHEMA, with_contents
+from armid_ros.identification.output import SCHEMA, with_digests
 from armid_ros.identification.parameters_file import parameters_of
 from armid_ros.identification.physical.fit_among_bodies import far_from_described
 from armid_ros.identification.rows.checks import check_held_out
@@ -233,7 +233,7 @@ class IdentificationResult(ShownModel):
                 for name, one in self.exports.items()
             }
         write_file(folder / 'report.html', self.page(origin))
-        document = with_contents(document)
+        document = with_digests(document)
         write_document(folder / 'identification.json', document)
         return document
 

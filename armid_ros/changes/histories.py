@@ -202,7 +202,7 @@ def judge(
     return sorted(judged, key=lambda one: (one.adjusted, one.p, one.arm))
 
 
-def named(judged: Judged, alpha: float) -> tuple[HistoryChange, ...]:
+def significant(judged: Judged, alpha: float) -> tuple[HistoryChange, ...]:
     """Return the changes of an arm that are significant at a false discovery rate alpha."""
     if judged.adjusted > alpha or not judged.changes:
         return ()

@@ -26,7 +26,7 @@ from armid_ros.identification.fitting.least_squares import (
     NormalEquations,
     weighted_fit,
     WeightedFit,
-    within,
+    within_bounds,
 )
 from armid_ros.identification.rows.checks import check_positions, check_torque, resting
 from armid_ros.identification.rows.regression import Regression
@@ -113,7 +113,7 @@ class FleetFit:
         if normal.counts.sum() < 2 * base.rank:
             return None
         fit = weighted_fit(normal.restrict(kept), weighted=job.settings.weighted)
-        values = within(fit.values, fit.factor, bounds(job.arm, base))
+        values = within_bounds(fit.values, fit.factor, bounds(job.arm, base))
         return cls(base, tuple(kept), replace(fit, values=values))
 
     def noise(self, rows: Iterable[Regression]) -> FloatArray:

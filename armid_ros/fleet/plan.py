@@ -28,7 +28,7 @@ from armid_ros.fleet.bags import BagFile, digest
 from armid_ros.fleet.store import fetched, opened, Store, StoreError
 from armid_ros.identification import Conditioning, SignalSettings
 from armid_ros.identification.fitting.held_out import cutoff_of_torques
-from armid_ros.identification.fitting.nonlinear import curved
+from armid_ros.identification.fitting.nonlinear import is_nonlinear
 from armid_ros.identification.output import kinematics_digest
 from armid_ros.identification.rows.damage import without_damage
 from armid_ros.identification.rows.signals import conditioning
@@ -382,7 +382,7 @@ def _model(entry: Entry, settings: FleetSettings) -> ArmModel:
         if linear:
             values = np.clip(0.1, *effect.bounds())
             theta = np.concatenate([1.1 * bare.theta, values])
-            linear = not curved(one, one.with_theta(theta), [motion])
+            linear = not is_nonlinear(one, one.with_theta(theta), [motion])
         if not linear:
             raise FleetError(
                 f'--effects {effect.name}: the torque is not linear in its parameters, so bags '

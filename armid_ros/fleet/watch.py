@@ -22,8 +22,8 @@ from armid_ros.changes.histories import (
     HistoryChange,
     judge,
     Judged,
-    named,
     ParameterHistory,
+    significant,
     spreads,
     wear,
     without_days,
@@ -204,7 +204,7 @@ def watch_fleet(store: Store, alpha: float = 0.05) -> Watch:
                 tuple(own[name]),
                 tuple(bags.get(name, ())),
                 judged,
-                named(judged, alpha),
+                significant(judged, alpha),
                 tuple(refused.get(name, ())),
                 tuple(row for row in worn.get(name, ()) if np.isfinite(row['upper'])),
             )

@@ -10,12 +10,12 @@ from dataclasses import dataclass, field, replace
 from armid_ros.arm import ArmModel
 from armid_ros.errors import IdentificationError
 from armid_ros.estimate import Estimate
-from armid_ros.identification.fitting.held_out import cutoff_of_torques, halves_error, scatter
+from armid_ros.identification.fitting.held_out import cutoff_of_torques, halves_error, jackknife
 from armid_ros.identification.fitting.identifiability import (
     base_spread,
-    determined,
     excited,
     excludes_zero,
+    fit_determined,
     near_deviation,
     NOT_SHOWN,
     Reason,
@@ -31,7 +31,7 @@ from armid_ros.identification.fitting.nonlinear import (
     unidentifiable_directions,
 )
 from armid_ros.identification.physical.fit_among_bodies import (
-    fit_to_bodies,
+    fit_consistent_links,
     PhysicalCertificate,
     PhysicalSettings,
 )
@@ -39,7 +39,7 @@ from armid_ros.identification.rows.checks import (
     beyond_limits,
     check_motion,
     check_torque,
-    too_short_to_tell,
+    short_recording_note,
 )
 from armid_ros.identification.rows.damage import without_damage
 from armid_ros.identification.rows.regression import (
@@ -143,7 +143,7 @@ class Identification:
     halves : Score
         Torque error when either half of the data predicts the other.
     scatter : ndarray, shape (K, r)
-        Jackknife changes of the values without each of K recordings; see `scatter`.
+        Jackknife changes of the values without each of K recordings; see `jackknife`.
     physical : PhysicalCertificate or None
         Evidence that the links are physically consistent, if requested.
     bodies_cost : float or None
@@ -250,7 +250,7 @@ def identify(
     recordings, notes = without_damage(recordings, used)
     used = conditioning(recordings, settings.signals) if notes else used
     notes += check_motion(arm.robot, recordings) + beyond_limits(arm.robot, recordings)
-    notes += too_short_to_tell(recordings)
+    notes += short_recording_note(recordings)
     theory = arm.base_parameters(rng)
     # a quasi-static fit uses the described inertia, unless physical links are fitted to the weight
     described = arm.quasi_static and settings.physical is None
@@ -266,7 +266,7 @@ def identify(
         fit, remarks = _fit_quasi_static(whole, data, settings.least_squares, rng)
         notes += remarks
     else:
-        bodies = _among_bodies(arm, theory, data, settings, rng)
+        bodies = _fit_consistent_links(arm, theory, data, settings, rng)
         if bodies is not None and (settings.physical or bodies[3].cost <= 0.1):
             settings, theory, fit, _ = bodies
             notes += bodies[3].sentences()
@@ -294,11 +294,11 @@ def identify(
         physical=None if bodies is None or settings.physical is None else bodies[3],
         bodies_cost=None if bodies is None else bodies[3].cost,
         passes=fit.passes,
-        scatter=scatter(fit.problem, fit.solution.weights, fit.solution.values),
+        scatter=jackknife(fit.problem, fit.solution.weights, fit.solution.values),
     )
 
 
-def _among_bodies(
+def _fit_consistent_links(
     arm: ArmModel,
     theory: BaseParameters,
     data: tuple[BaseParameters, Sequence[Regression], Sequence[Recording], Conditioning],
@@ -312,7 +312,7 @@ def _among_bodies(
     physical = replace(settings, physical=constraints)
     theory, fit = _fitted(arm, theory, data, physical, rng)
     try:
-        found = fit_to_bodies(arm, fit, *data[2:], physical.least_squares, constraints)
+        found = fit_consistent_links(arm, fit, *data[2:], physical.least_squares, constraints)
     except IdentificationError:
         if settings.physical is not None:
             raise
@@ -334,7 +334,7 @@ def _fitted(
     while True:
         kept, free, solution = base, None, None
         if settings.holds_description:
-            kept, problem, solution = determined(arm, base, problem, method)
+            kept, problem, solution = fit_determined(arm, base, problem, method)
             free = None if kept.rank == base.rank else unidentifiable_directions(arm, base)
         fit = fit_values(arm, kept, problem, recordings, used, method, free, solution)
         if refitted or np.all(np.any(theory.grouping[:, rigid:], axis=0)):

@@ -144,7 +144,7 @@ def write_document(path: str | Path, document: Mapping[str, Any]) -> None:
     write_file(path, rows + '\n')
 
 
-def with_contents(document: Mapping[str, Any]) -> dict[str, Any]:
+def with_digests(document: Mapping[str, Any]) -> dict[str, Any]:
     """Return the content of identification.json with size and digest of each recording."""
     there = [(name, Path(name)) for name in _names(document)]
     rows = [{'bag': name, **_content(path)} for name, path in there if path.exists()]

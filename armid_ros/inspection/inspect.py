@@ -9,7 +9,7 @@ from dataclasses import asdict, dataclass
 from typing import Any, get_args, Literal
 
 from armid_ros.identification.assess.sensor_faults import encoder_faults, velocity_faults
-from armid_ros.identification.rows.checks import beyond_limits, SILENT, too_short_to_tell
+from armid_ros.identification.rows.checks import beyond_limits, short_recording_note, SILENT
 from armid_ros.identification.rows.stamps import rounded_stamps, two_senders
 from armid_ros.inspection.facts import (
     joint_facts,
@@ -240,7 +240,7 @@ def _time_remarks(recording: Recording, sampling: Sampling) -> Iterator[Remark]:
             f'steps between samples vary by {100 * sampling.jitter:.0f} %; velocities and '
             'accelerations from the positions are less accurate',
         )
-    yield from (Remark('doubt', text) for text in too_short_to_tell([recording]))
+    yield from (Remark('doubt', text) for text in short_recording_note([recording]))
     if sampling.period is None:
         yield Remark(
             'note',

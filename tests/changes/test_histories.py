@@ -5,8 +5,8 @@
 from armid_ros.changes.histories import (
     judge,
     MONTH,
-    named,
     ParameterHistory,
+    significant,
     spreads,
     wear,
     without_days,
@@ -46,7 +46,7 @@ def judged(series):
 
 def names(series, alpha=0.05):
     """Return the arms that are named."""
-    return {one.arm for one in judged(series) if named(one, alpha)}
+    return {one.arm for one in judged(series) if significant(one, alpha)}
 
 
 @pytest.mark.long
@@ -59,7 +59,7 @@ def test_a_step_is_found_with_its_arm_parameter_place_and_size():
     series = fleet(np.random.default_rng(1), 50)
     series[8 * 7 + 3] = changed(series[8 * 7 + 3], np.where(np.arange(10) >= 6, 0.1, 0.0))
     (first, *_) = judged(series)
-    change = named(first, 0.05)[0]
+    change = significant(first, 0.05)[0]
     assert (first.arm, change.series.parameter) == ('arm_7', PARAMETERS[3])
     assert (change.kind, change.index) == ('step', 6)
     assert abs(change.size - 0.1) < 3 * change.std

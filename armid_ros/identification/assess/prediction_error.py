@@ -16,7 +16,7 @@ from itertools import product
 
 from armid_ros.identification.assess.grade_limits import FREEDOM, LIMITS
 from armid_ros.identification.fitting.identifiability import near_deviation
-from armid_ros.identification.fitting.least_squares import within
+from armid_ros.identification.fitting.least_squares import within_bounds
 from armid_ros.identification.rows.checks import joined, SLOW_SHARE
 from armid_ros.model import inverse_dynamics, regressor
 from armid_ros.motion import FloatArray, Motion
@@ -124,7 +124,7 @@ def prediction_error(robot: Robot, motion: Motion, *, near: bool) -> PredictionE
     least[bodies:].reshape(n, _N_OWN)[:, 1:] = 0.0
     free = np.asarray(np.linalg.solve(normal, stacked.T @ target_torque.ravel()))
     factor = np.asarray(np.linalg.cholesky(normal).T)
-    values = within(free, factor, (least, np.full(len(free), np.inf)))
+    values = within_bounds(free, factor, (least, np.full(len(free), np.inf)))
     residual = target_torque - (stacked @ values).reshape(target_torque.shape)
     off = float(np.sum(values[:bodies] ** 2)) * FREEDOM / count
     return PredictionError(np.sqrt(np.mean(residual**2, axis=0)), scale, off)

@@ -84,7 +84,9 @@ def halves_error(
     return Score.of_rows(residual, tau, informative)
 
 
-def scatter(problem: Sequence[Regression], weights: FloatArray, values: FloatArray) -> FloatArray:
+def jackknife(
+    problem: Sequence[Regression], weights: FloatArray, values: FloatArray
+) -> FloatArray:
     """
     Return the change of each fitted value if one of the recordings is left out (jackknife).
 

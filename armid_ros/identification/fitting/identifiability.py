@@ -136,7 +136,7 @@ def bounds(arm: ArmModel, base: BaseParameters) -> tuple[FloatArray, FloatArray]
     return np.where(alone, lower, -np.inf), np.where(alone, upper, np.inf)
 
 
-def determined(
+def fit_determined(
     arm: ArmModel, base: BaseParameters, problem: Sequence[Regression], method: Method
 ) -> tuple[BaseParameters, tuple[Regression, ...], Solution]:
     """

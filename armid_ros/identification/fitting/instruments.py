@@ -28,13 +28,13 @@ from armid_ros.errors import IdentificationError
 from armid_ros.estimate import Estimate
 from armid_ros.identification.fitting.covariance import noise_products, sandwich
 from armid_ros.identification.fitting.identifiability import bounds
-from armid_ros.identification.fitting.least_squares import Method, solve, within
+from armid_ros.identification.fitting.least_squares import Method, solve, within_bounds
 from armid_ros.identification.fitting.nonlinear import (
     FittedValues,
     linearised,
-    moved,
     torques,
     unidentifiable_directions,
+    with_base_values,
 )
 from armid_ros.identification.rows.regression import Regression, weighted_rows
 from armid_ros.identification.rows.signals import Conditioning, position_noise, unbroken
@@ -80,7 +80,7 @@ def fit_by_instruments(
         found = _by_instruments(fit.problem, [part.columns for part in exact], weights, limits)
         step = np.abs(found.values - fit.values) / np.sqrt(np.diag(found.covariance))
         solution = replace(fit.solution, values=found.values, covariance=found.covariance)
-        arm = moved(fit.arm, base, found.values, free)
+        arm = with_base_values(fit.arm, base, found.values, free)
         fit = replace(fit, arm=arm, values=found.values, solution=solution)
         if fit.passes == 1:
             return replace(fit, predicted=torques(arm, recordings, used))
@@ -121,7 +121,7 @@ def _by_instruments(
         ) from None
     free = values = by_z @ (z.T @ target)
     if limits is not None:
-        values = within(free, triangle, (limits[0] * scale, limits[1] * scale))
+        values = within_bounds(free, triangle, (limits[0] * scale, limits[1] * scale))
     residual = (target - w @ values).reshape(weights.shape)
     scaled = [replace(part, columns=part.columns / scale) for part in problem]
     further = [columns / scale for columns in instruments]

@@ -212,7 +212,7 @@ def solve(
     relative: FloatArray = used.astype(float)
     if method == 'irls':
         fit, relative = _robust(problem, used, fit)
-    values = fit.values if bounds is None else within(fit.values, fit.factor, bounds)
+    values = fit.values if bounds is None else within_bounds(fit.values, fit.factor, bounds)
     weights = np.asarray(relative / fit.scale)
     residual = np.concatenate([part.residual(values) for part in problem])
     products = noise_products(problem, residual * weights, weights, fit.inverse)
@@ -318,7 +318,7 @@ def factored(products: FloatArray) -> tuple[FloatArray, FloatArray]:
     return lengths[:, np.newaxis] * axes.T * length, axes / lengths / size[:, np.newaxis]
 
 
-def within(
+def within_bounds(
     values: FloatArray, factor: FloatArray, bounds: tuple[FloatArray, FloatArray]
 ) -> FloatArray:
     """

@@ -114,13 +114,13 @@ def fit_values(
     solution = solution or solve(problem, method, bounds(arm, base))
     motions = [part.motion for part in problem]
     chosen = unidentifiable_directions(arm, base) if free is None else free
-    reached = moved(arm, base, solution.values, chosen)
+    reached = with_base_values(arm, base, solution.values, chosen)
     bare = arm.with_theta(
         np.where(np.arange(len(arm.theta)) < len(arm.robot.rigid_parameters), arm.theta, 0.0)
     )
-    if curved(bare, arm, motions):
+    if is_nonlinear(bare, arm, motions):
         problem, _ = linearised(arm, base, recordings, used)
-    elif not curved(arm, reached, motions):
+    elif not is_nonlinear(arm, reached, motions):
         predicted = tuple(part.torque(solution.values) for part in problem)
         # parameters nearest to the description, if they have the fitted torque along this motion
         nearest = arm.with_theta(base.lift(solution.values, arm.theta))
@@ -134,7 +134,7 @@ def fit_values(
     return _iterate(arm, base, problem, recordings, used, method, chosen)
 
 
-def curved(before: ArmModel, after: ArmModel, motions: Sequence[Motion]) -> bool:
+def is_nonlinear(before: ArmModel, after: ArmModel, motions: Sequence[Motion]) -> bool:
     """
     Return whether the torque is nonlinear in the parameters between the values of two arm models.
 
@@ -160,7 +160,9 @@ def curved(before: ArmModel, after: ArmModel, motions: Sequence[Motion]) -> bool
     return False
 
 
-def moved(arm: ArmModel, base: BaseParameters, values: FloatArray, free: FloatArray) -> ArmModel:
+def with_base_values(
+    arm: ArmModel, base: BaseParameters, values: FloatArray, free: FloatArray
+) -> ArmModel:
     """
     Return the arm model with new values of its base parameters.
 
@@ -277,7 +279,7 @@ def _iterate(
             if damping:
                 expected = tuple(part.torque(values) for part in now.problem)
                 unattained = max(unattained, now.gain(expected))
-            stepped = moved(now.arm, base, values, free)
+            stepped = with_base_values(now.arm, base, values, free)
             predicted = torques(stepped, recordings, used)
             if now.cost(predicted) <= now.cost(None if trial is None else trial.predicted):
                 trial = _State(stepped, values, exact_at(now.problem, predicted, values))

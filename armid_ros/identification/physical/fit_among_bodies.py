@@ -213,7 +213,7 @@ class PhysicalCertificate:
         }
 
 
-def fit_to_bodies(
+def fit_consistent_links(
     arm: ArmModel,
     free: FittedValues,
     recordings: Sequence[Recording],
@@ -247,7 +247,7 @@ def fit_to_bodies(
         Evidence of physical consistency.
 
     """
-    fit, certificate = _bodies(arm, free, settings)
+    fit, certificate = _fit_links(arm, free, settings)
     if free.passes == 1:
         return fit, certificate
     for passes in range(1, 8):
@@ -258,12 +258,12 @@ def fit_to_bodies(
             return replace(fit, converged=free.converged), certificate
         solution = solve(problem, method, bounds(fit.arm, fit.base))
         fit = replace(fit, problem=problem, solution=solution)
-        fit, certificate = _bodies(arm, fit, settings)
+        fit, certificate = _fit_links(arm, fit, settings)
     predicted = torques(fit.arm, recordings, used)
     return replace(fit, predicted=predicted, converged=False), certificate
 
 
-def _bodies(
+def _fit_links(
     arm: ArmModel, fit: FittedValues, settings: PhysicalSettings
 ) -> tuple[FittedValues, PhysicalCertificate]:
     """Fit physically consistent links to the linear problem of a fit."""
@@ -354,7 +354,7 @@ def physical_program(
     arm: ArmModel, base: BaseParameters, settings: PhysicalSettings
 ) -> tuple[PhysicalProgram, tuple[str, ...]]:
     """Return the convex program of a physically consistent fit, and assumptions of its prior."""
-    prior, notes = bodily_prior(arm)
+    prior, notes = consistent_prior(arm)
     ends = [effect.bounds() for effect in arm.effects]
     lower, upper = (np.concatenate([np.empty(0), *(b[k] for b in ends)]) for k in (0, 1))
     boxes: dict[int, Box] = {
@@ -367,7 +367,7 @@ def physical_program(
     return PhysicalProgram(base, prior, lower, upper, *given), notes
 
 
-def bodily_prior(arm: ArmModel) -> tuple[FloatArray, tuple[str, ...]]:
+def consistent_prior(arm: ArmModel) -> tuple[FloatArray, tuple[str, ...]]:
     """
     Return the described standard parameters, with physically consistent values for each link.
 

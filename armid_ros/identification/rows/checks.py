@@ -78,7 +78,7 @@ def check_held_out(robot: Robot, held_out: Sequence[Recording]) -> None:
         resting(robot, recording.source, np.ptp(recording.q, axis=0))
 
 
-def too_short_to_tell(recordings: Sequence[Recording]) -> tuple[str, ...]:
+def short_recording_note(recordings: Sequence[Recording]) -> tuple[str, ...]:
     """Return a note if recordings are shorter than 5 s in total."""
     duration = sum(recording.duration for recording in recordings)
     return (f'{duration:.2g} s is short; record 20 s or more',) if duration < 5.0 else ()

@@ -166,7 +166,7 @@ class SpikeGate:
         if not self._in_time(sample):
             return []
         if self._first is None:
-            return self._judge(sample)
+            return self._classify(sample)
         self._first.append(sample)
         return self._begin() if len(self._first) == N_FIRST else []
 
@@ -281,10 +281,10 @@ class SpikeGate:
         self._leave_out_ahead(first[:start], innovations[0])
         good = list(self._reference)
         for sample in first[start + 2 :]:
-            good += self._judge(sample)
+            good += self._classify(sample)
         return good
 
-    def _judge(self, sample: StreamSample) -> list[StreamSample]:
+    def _classify(self, sample: StreamSample) -> list[StreamSample]:
         """Compare a sample with its prediction; return samples now known to be undamaged."""
         if self._first is not None:  # the earlier samples were erratic
             self._first.append(sample)
@@ -311,7 +311,7 @@ class SpikeGate:
         if not continues and float(np.max(ratio[self._suspects])) <= 1.0:
             self._leave_out(Excursion(tuple(self._pending), self._ratio, self._limit))
             self._pending = []
-            return self._judge(sample)
+            return self._classify(sample)
         self._pending.append(sample)
         self._ratio = np.maximum(self._ratio, ratio)
         self._n_continuing += continues
@@ -340,7 +340,7 @@ class SpikeGate:
             return self._accept(held[start:])
         good = self._accept(held[start : start + 2])
         for sample in held[start + 2 :]:
-            good = good + self._judge(sample)
+            good = good + self._classify(sample)
         return good
 
     def _continues(self, sample: StreamSample, ratio: FloatArray) -> bool:

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The scatter of values between recordings is their variance, whatever makes them vary."""
 
-from armid_ros.identification.fitting.held_out import scatter
+from armid_ros.identification.fitting.held_out import jackknife
 from armid_ros.identification.rows.regression import Regression
 from armid_ros.motion import Motion
 import numpy as np
@@ -28,7 +28,7 @@ def fitted(problem):
     values = np.linalg.lstsq(rows, aim, rcond=None)[0]
     weights = np.full((len(problem) * LONG, 2), 1.0 / NOISE)
     std = NOISE * np.sqrt(np.diag(np.linalg.inv(rows.T @ rows)))
-    return scatter(problem, weights, values), std
+    return jackknife(problem, weights, values), std
 
 
 def test_noise_alone_makes_the_variance_that_least_squares_have():
@@ -56,7 +56,7 @@ def test_stretches_of_one_recording_are_one():
     problem = [recording(rng, [1.0, 2.0], name) for name in ('one', 'two', 'one')]
     found, _ = fitted(problem)
     assert len(found) == 2
-    assert scatter(problem[:1], np.ones((LONG, 2)), np.zeros(2)).shape == (0, 2)
+    assert jackknife(problem[:1], np.ones((LONG, 2)), np.zeros(2)).shape == (0, 2)
 
 
 def test_what_one_recording_alone_tells_has_no_scatter():

@@ -5,7 +5,7 @@ from armid_ros.arm import ArmModel
 from armid_ros.effects import make_effect
 from armid_ros.errors import IdentificationError, RobotError
 from armid_ros.identification import IdentificationSettings, identify, Score
-from armid_ros.identification.physical.fit_among_bodies import bodily_prior, PhysicalSettings
+from armid_ros.identification.physical.fit_among_bodies import consistent_prior, PhysicalSettings
 from armid_ros.identification.physical.physical_program import box_conditions
 from armid_ros.model.pseudo_inertia import link_parameters, pseudo_inertia
 import numpy as np
@@ -151,7 +151,7 @@ def test_a_link_stays_in_its_box_which_is_named_where_it_is_too_small(
 
 def test_a_description_without_masses_gets_a_prior(arm, recording):
     bare = ArmModel(arm.robot.with_inertias(0.0 * arm.robot.rigid_parameters), arm.effects)
-    theta, notes = bodily_prior(bare)
+    theta, notes = consistent_prior(bare)
     assert np.linalg.eigvalsh(pseudo_inertia(theta[:60].reshape(-1, 10))).min() > 0.0
     assert len(notes) == 6
     result = run(bare, recording, PhysicalSettings())
@@ -163,7 +163,7 @@ def test_a_nearly_singular_described_inertia_is_no_narrow_prior(arm):
     body = arm.robot.rigid_parameters.copy()
     body[50:54] = 0.63, 0.0, 0.0, 0.0  # principal moments of the last link of a vendor's file
     body[54:] = 5.6e-7, 0.0, 2.2e-4, 0.0, 0.0, 2.2e-4
-    theta, notes = bodily_prior(ArmModel(arm.robot.with_inertias(body), arm.effects))
+    theta, notes = consistent_prior(ArmModel(arm.robot.with_inertias(body), arm.effects))
     second = np.linalg.eigvalsh(pseudo_inertia(theta[50:60])[:3, :3])
     assert second.min() == pytest.approx(0.63 * 0.03**2)
     assert len(notes) == 1
