@@ -195,32 +195,33 @@ class PhysicalProgram:
             normal = np.zeros((9, len(self.prior)))
             normal[:, PER_LINK * link : PER_LINK * (link + 1)] = box_conditions(box)
             linear(clarabel.NonnegativeConeT, normal, np.zeros(9))
-        for link in range(self.n_links):
-            self._add_log_determinant(link, blocks, offsets, cones)
-        return sparse.vstack(blocks, format='csc'), np.concatenate(offsets), cones
+        rows, offset, others = self._log_determinants
+        rows = sparse.vstack([*blocks, rows], format='csc')
+        return rows, np.concatenate([*offsets, offset]), [*cones, *others]
 
-    def _add_log_determinant(
-        self, link: int, blocks: list[Any], offsets: list[FloatArray], cones: list[Any]
-    ) -> None:
-        """Add the constraints sum u <= log det X for the whitened pseudo-inertia X of a link."""
+    @cached_property
+    def _log_determinants(self) -> tuple[sparse.spmatrix, FloatArray, list[Any]]:
+        """Constraints sum u <= log det X for the whitened pseudo-inertia X of each link."""
         # X >= Z diag(Z)^-1 Z' for a lower triangle Z, and u <= log of its diagonal (Ben-Tal and
-        # Nemirovski 2001, section 4.2).
-        size = len(self.prior)
-        first, width = (size + _LOG_DETERMINANT * k for k in (link, self.n_links))
-        matrix = sparse.lil_matrix((36, width))
-        for index in range(PER_LINK):
-            matrix[index, PER_LINK * link + index] = -1.0
-        exponential = sparse.lil_matrix((3 * _DIAGONAL, width))
+        # Nemirovski 2001, section 4.2): 36 rows of a matrix, then an exponential per diagonal
+        height = 36 + 3 * _DIAGONAL
+        inertia, triangle = np.zeros((height, PER_LINK)), np.zeros((height, _LOG_DETERMINANT))
+        np.fill_diagonal(inertia, -1.0)
         lower = [(i, j) for j in range(4) for i in range(j, 4)]
         for index, (i, j) in enumerate(lower):
-            matrix[_packed(i, 4 + j), first + index] = -np.sqrt(2.0)
+            triangle[_packed(i, 4 + j), index] = -np.sqrt(2.0)
             if i == j:
-                matrix[_packed(4 + j, 4 + j), first + index] = -1.0
-                exponential[3 * j + 2, first + index] = -1.0
-                exponential[3 * j, first + _TRIANGLE + j] = -1.0
-        blocks += [matrix, exponential]
-        offsets += [np.zeros(36), np.tile([0.0, 1.0, 0.0], _DIAGONAL)]
-        cones += [clarabel.PSDTriangleConeT(8), *[clarabel.ExponentialConeT()] * _DIAGONAL]
+                triangle[_packed(4 + j, 4 + j), index] = -1.0
+                triangle[36 + 3 * j + 2, index] = -1.0
+                triangle[36 + 3 * j, _TRIANGLE + j] = -1.0
+        links, effects = (
+            sparse.eye(self.n_links),
+            np.zeros((height * self.n_links, len(self.lower))),
+        )
+        parts = [sparse.kron(links, inertia), effects, sparse.kron(links, triangle)]
+        offset = np.concatenate([np.zeros(36), np.tile([0.0, 1.0, 0.0], _DIAGONAL)])
+        cones = [clarabel.PSDTriangleConeT(8), *[clarabel.ExponentialConeT()] * _DIAGONAL]
+        return sparse.hstack(parts), np.tile(offset, self.n_links), cones * self.n_links
 
 
 def box_conditions(box: Box) -> FloatArray:
