@@ -108,8 +108,8 @@ class OnlineIdentifier:
         past = [effect.name for effect in arm.effects if not effect.instantaneous]
         if past:
             raise IdentificationError(
-                f'{past[0]} depends on earlier motion, which a single sample does not contain; '
-                'identify it from a recording'
+                f'the effect {past[0]} depends on earlier motion, which a single sample does not '
+                'contain; identify it from a recording'
             )
         self.arm, self.settings = arm, settings
         self.base: BaseParameters = arm.base_parameters(rng)
@@ -289,11 +289,12 @@ class OnlineIdentifier:
             If the settings need a restart, or are out of range.
 
         """
-        for part in fields(settings):
-            same = getattr(settings, part.name) == getattr(self.settings, part.name)
-            if part.name not in self.CHANGEABLE and not same:
+        for setting in fields(settings):
+            same = getattr(settings, setting.name) == getattr(self.settings, setting.name)
+            if setting.name not in self.CHANGEABLE and not same:
                 raise IdentificationError(
-                    f'{part.name} cannot change during the identification; restart it'
+                    f'the setting {setting.name} cannot change during the identification; restart '
+                    'the identification'
                 )
         if self._watch is None and settings.false_alarm_time is not None:
             raise IdentificationError(
