@@ -163,7 +163,7 @@ class ExcitationPublisherNode(ArmidNode):
                 try:
                     self.start()
                 except TrajectoryError as error:
-                    self._log_trouble(f'not started: {error}')
+                    self._report_trouble(f'not started: {error}')
             elif time.monotonic() > self._deadline:
                 self._waiting = False
                 self.get_logger().warning(f'{missing}; call ~/start when this is solved')
@@ -354,7 +354,7 @@ class ExcitationPublisherNode(ArmidNode):
         """Stop the arm and log the reason; a blocked arm is held at its position."""
         elapsed = self._arm.now() - self._begun
         self._stop_run(reason, blocked)
-        self._log_trouble(f'stopped {elapsed:.2f} s after the start: {reason}')
+        self._report_trouble(f'stopped {elapsed:.2f} s after the start: {reason}')
 
     def _stop_run(self, reason: str, blocked: bool = False) -> None:
         """Send the motion that stops the arm on its path, or holds a blocked arm."""
@@ -384,7 +384,7 @@ class ExcitationPublisherNode(ArmidNode):
         if motion is not None:
             self._controller.send_stop_again(write_trajectory(motion))
         if report:
-            self._log_trouble(report)
+            self._report_trouble(report)
 
     def _finish_run(self, gate: MotionGate) -> None:
         self._gate, end = None, gate.run.at([gate.run.duration])
@@ -397,14 +397,14 @@ class ExcitationPublisherNode(ArmidNode):
         if gate is None:  # the run was stopped before
             ending = self._ending
             if reason and ending is not None and ending.last is not None and not ending.warned:
-                self._log_trouble(
+                self._report_trouble(
                     f'the stop failed: {reason}; if the arm still moves, use the emergency stop'
                 )
             return
         if reason:
             self._gate, self._rehearsal, self._outcome = None, None, 'stopped'
             self._ending = Ending(gate, self._begun, None, self._arm.now(), reason)
-            self._log_trouble(f'stopped {elapsed:.2f} s after the start: {reason}')
+            self._report_trouble(f'stopped {elapsed:.2f} s after the start: {reason}')
         elif elapsed < gate.run.duration - self.value('state_timeout'):
             self._abort(f'the controller reported the end of a run of {gate.run.duration:.1f} s')
         else:
@@ -415,7 +415,7 @@ class ExcitationPublisherNode(ArmidNode):
         self._rehearsal = None
         report, surprises = rehearsal.report()
         if surprises:
-            self._log_trouble(f'rehearsed: {report}; find the cause before ~/start')
+            self._report_trouble(f'rehearsed: {report}; find the cause before ~/start')
         else:
             advice = f'~/start runs it at {100.0 * self.value("speed_scaling"):.0f} % of its speed'
             self._rehearsed = self.log(f'rehearsed: {report}; {advice}')
@@ -430,7 +430,7 @@ class ExcitationPublisherNode(ArmidNode):
         self._excitation = checked(excitation, self._planner, self._experiments.topic_name)
         self.log(f'received an excitation of {self._excitation.duration:g} s; ~/start runs it')
 
-    def _log_trouble(self, text: str) -> None:
+    def _report_trouble(self, text: str) -> None:
         self._trouble = text
         self.get_logger().error(text)
 

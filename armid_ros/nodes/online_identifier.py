@@ -202,7 +202,7 @@ class OnlineIdentifierNode(ListeningNode):
                 'spike', f"the {signal} of '{joint}' jumps for single samples, which are skipped"
             )
         self._disturbed = counted
-        self._begin_statistics()
+        self._squares, self._counted = np.zeros(len(self._names)), 0
         trouble = self.stream_trouble()
         if self.awaited or self.freshness.stopped:
             return trouble, values
@@ -354,15 +354,11 @@ class OnlineIdentifierNode(ListeningNode):
         self._progress = LearningProgress(
             identifier.arm, identifier.base, np.random.default_rng(0)
         )
-        self._begin_statistics()
+        self._squares, self._counted = np.zeros(len(self._names)), 0
         self.get_logger().info(
             f'{robot.name}: {len(identifier.base.parameters)} base parameters of '
             f'{robot.n_joints} joints'
         )
-
-    def _begin_statistics(self) -> None:
-        self._squares = np.zeros(len(self._names))
-        self._counted = 0
 
     def _require(self) -> OnlineIdentifier:
         """Return the identifier; raise an error while the robot is not known."""

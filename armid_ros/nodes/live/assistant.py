@@ -64,7 +64,9 @@ class Worker:
                 return f'wrote {", ".join(FILES)} to {result.save(argument)}', ''
             run = next_run(diagnosis, np.random.default_rng(argument))
             if run is None:
-                raise IdentificationError('no candidates are ambiguous: no motion is needed')
+                raise IdentificationError(
+                    'no candidates are ambiguous, so no further motion is needed'
+                )
             return run.sentence, excitation_text(run.excitation)
         except ArmidError as error:
             return IdentificationError(str(error))
