@@ -250,7 +250,6 @@ def scaled_inputs(inputs: FloatArray, knee: float) -> FloatArray:
 
 def holding_torque(robot: Robot, q: FloatArray) -> FloatArray:
     """Return the torque that holds the rigid body at rest, shape (..., n) [N m]."""
-    flat = np.reshape(q, (-1, robot.n_joints))
-    still = np.zeros_like(flat)
-    there = Motion(robot.joints, np.arange(len(flat), dtype=float), flat, still, still)
-    return np.asarray(inverse_dynamics(robot, there)).reshape(np.shape(q))
+    poses = np.reshape(q, (-1, robot.n_joints))
+    still = Motion.of_states(robot.joints, poses, 0.0, 0.0)
+    return inverse_dynamics(robot, still).reshape(np.shape(q))

@@ -55,16 +55,15 @@ class JointElasticity(Displacing):
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
         """Return springs and dampers of the plant, and displaced encoder readings."""
-        (compliance,) = scatter(self, values, arm.robot)
-        (retardation,) = scatter(self, self.shape_values, arm.robot)
-        with np.errstate(divide='ignore'):
-            stiffness = np.where(compliance > 0.0, 1.0 / compliance, np.inf)
-        damping = np.where(compliance > 0.0, retardation, 0.0) * np.where(
-            compliance > 0.0, stiffness, 0.0
-        )
-        springs = Transmission(stiffness, damping, np.zeros_like(stiffness))
         if not np.any(values):
             return Action()
+        (compliance,) = scatter(self, values, arm.robot)
+        (retardation,) = scatter(self, self.shape_values, arm.robot)
+        elastic, rigid = compliance > 0.0, np.full_like(compliance, np.inf)
+        stiffness = np.divide(1.0, compliance, out=rigid, where=elastic)
+        none = np.zeros_like(compliance)
+        damping = np.divide(retardation, compliance, out=none.copy(), where=elastic)
+        springs = Transmission(stiffness, damping, none)
         return replace(super().action(values, arm), transmission=springs)
 
 
@@ -102,9 +101,9 @@ class Backlash(Displacing):
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
         """Return gaps of the plant's transmissions, and displaced encoder readings."""
-        (gap,) = scatter(self, values, arm.robot)
         if not np.any(values):
             return Action()
+        (gap,) = scatter(self, values, arm.robot)
         rigid = np.full_like(gap, np.inf)
         gaps = Transmission(rigid, np.zeros_like(gap), gap / 2)
         return replace(super().action(values, arm), transmission=gaps)
