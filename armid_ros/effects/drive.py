@@ -199,7 +199,7 @@ class ActuatorSaturation(TorqueReading):
         (level,) = scatter(self, self.shape_values, arm.robot)
 
         def drive(tau: FloatArray) -> FloatArray:
-            return np.asarray(tau - lost * _beyond(tau, level))
+            return np.asarray(tau - lost * _excess(tau, level))
 
         reading = super().action(values, arm)
         return Action(drive=drive if np.any(lost) else None, reading=reading.reading)
@@ -207,10 +207,10 @@ class ActuatorSaturation(TorqueReading):
     def read(self, values: FloatArray, motion: Motion, tau: FloatArray) -> FloatArray:
         """Return the torque that saturated drives report, shape (N, n) [N m]."""
         lost, clipped, level = self._spread(values, motion)
-        hidden = clipped * _beyond(tau, level)
+        hidden = clipped * _excess(tau, level)
         if motion.tau is None:
-            return np.asarray(tau + lost / (1.0 - lost) * _beyond(tau, level) - hidden)
-        return np.asarray(tau + lost * _beyond(motion.tau, level) - hidden)
+            return np.asarray(tau + lost / (1.0 - lost) * _excess(tau, level) - hidden)
+        return np.asarray(tau + lost * _excess(motion.tau, level) - hidden)
 
     def transfer(
         self, values: FloatArray, motion: Motion, tau: FloatArray, columns: FloatArray
@@ -223,8 +223,8 @@ class ActuatorSaturation(TorqueReading):
     def sensitivity(self, values: FloatArray, motion: Motion, tau: FloatArray) -> FloatArray:
         """Return the derivatives of the reported torque by both shares, shape (N, n, P)."""
         lost, _, level = self._spread(values, motion)
-        beyond = _beyond(tau, level)
-        asked = beyond / (1.0 - lost) ** 2 if motion.tau is None else _beyond(motion.tau, level)
+        beyond = _excess(tau, level)
+        asked = beyond / (1.0 - lost) ** 2 if motion.tau is None else _excess(motion.tau, level)
         return joint_columns(self, motion, asked, -beyond)
 
     def _spread(self, values: FloatArray, motion: Motion) -> tuple[FloatArray, ...]:
@@ -241,5 +241,5 @@ class ActuatorSaturation(TorqueReading):
         return spread[0], spread[1], spread[2]
 
 
-def _beyond(tau: FloatArray, level: FloatArray) -> FloatArray:
+def _excess(tau: FloatArray, level: FloatArray) -> FloatArray:
     return np.asarray(np.sign(tau) * np.maximum(np.abs(tau) - level, 0.0))

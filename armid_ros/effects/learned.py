@@ -103,7 +103,7 @@ class TorqueMap:
         """Whether the learned torque depends on the load."""
         return bool(np.isfinite(self.lengths[2]))
 
-    def given(self, torque: FloatArray) -> TorqueMap:
+    def fitted_to(self, torque: FloatArray) -> TorqueMap:
         """Return the torque map fitted to torques at its inducing points, shape (M,) [N m]."""
         return replace(self, weights=cho_solve(self._factor, torque))
 

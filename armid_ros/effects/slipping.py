@@ -64,7 +64,7 @@ class Hysteresis:
         states[0] = self.start(np.where(moves, dq[0], 0.0))
         for element, distance in enumerate(self.distance):
             own, state = travel[:, element], states[:, element]
-            for first, last, end in _stretches(own):
+            for first, last, end in _monotone_parts(own):
                 decay = np.exp(-np.abs(own[first + 1 : last + 1] - own[first]) / float(distance))
                 state[first + 1 : last + 1] = end - (end - state[first]) * decay
         return states
@@ -92,7 +92,7 @@ class Hysteresis:
         for element in np.flatnonzero(by_state.any(axis=0)):
             path, state, distance = travel[:, element], states[:, element], self.distance[element]
             # backwards, because a stretch starts in the final state of the previous one
-            for first, last, end in reversed(_stretches(path)):
+            for first, last, end in reversed(_monotone_parts(path)):
                 own = slice(first + 1, last + 1)
                 decay = np.exp(-np.abs(path[own] - path[first]) / distance)
                 slope = by_state[own, element] * (end - state[own]) * end / distance
@@ -102,7 +102,7 @@ class Hysteresis:
         return np.asarray(by_travel @ self.directions)
 
 
-def _stretches(travel: FloatArray) -> list[tuple[int, int, float]]:
+def _monotone_parts(travel: FloatArray) -> list[tuple[int, int, float]]:
     """Return first and last sample of every motion between reversals, and its direction."""
     step = np.sign(np.diff(travel))
     turns = np.flatnonzero(np.diff(step)) + 1

@@ -38,7 +38,7 @@ class LateReading(TorqueReading):
         """Return the places of a delay: the whole arm, with one delay, or a single joint."""
         return ((), *((joint,) for joint in robot.joints))
 
-    def _owned(self, motion: Motion) -> list[list[int]]:
+    def _joints_of_delays(self, motion: Motion) -> list[list[int]]:
         """Return the indices of the joints that share each delay: all joints, or single ones."""
         joints = self.indices(motion.joints)
         return [[joint] for joint in joints] or [list(range(motion.n_joints))]
@@ -70,7 +70,7 @@ class TimeDelay(LateReading):
 
     def sensitivity(self, values: FloatArray, motion: Motion, tau: FloatArray) -> FloatArray:
         """Return the derivative of the reading by the delay, -dtau/dt [N m/s], (N, n, P)."""
-        return _by_owner(self, motion, -self._delayed(values, motion, tau, derivative=1))
+        return _as_columns(self, motion, -self._delayed(values, motion, tau, derivative=1))
 
     def memory(self, values: FloatArray) -> float:
         """Return the longest torque delay [s]."""
@@ -85,7 +85,7 @@ class TimeDelay(LateReading):
     ) -> FloatArray:
         rate = rate_of_change(motion.t, x)
         shifted = rate.copy() if derivative else x.copy()
-        for delay, rows in zip(values, self._owned(motion), strict=True):
+        for delay, rows in zip(values, self._joints_of_delays(motion), strict=True):
             if delay:
                 curve = CubicHermiteSpline(motion.t, x[:, rows], rate[:, rows])
                 shifted[:, rows] = curve(motion.t - float(delay), derivative)
@@ -112,7 +112,7 @@ class TorqueLag(LateReading):
     def read(self, values: FloatArray, motion: Motion, tau: FloatArray) -> FloatArray:
         """Filter torques [N m] or regressor columns by the low-pass, shape (N, n, ...)."""
         result = tau.copy()
-        for lag, rows in zip(values, self._owned(motion), strict=True):
+        for lag, rows in zip(values, self._joints_of_delays(motion), strict=True):
             if lag:
                 result[:, rows] = low_pass(motion.t, tau[:, rows], float(lag))
         return result
@@ -121,11 +121,11 @@ class TorqueLag(LateReading):
         """Return the derivative of the reading by the lag [N m/s], shape (N, n, P)."""
         rates = -rate_of_change(motion.t, tau)
         more = 1.0001  # factor between two lags whose difference is the derivative
-        for lag, rows in zip(values, self._owned(motion), strict=True):
+        for lag, rows in zip(values, self._joints_of_delays(motion), strict=True):
             if lag > 0.0:
                 ends = [low_pass(motion.t, tau[:, rows], lag * s) for s in (more, 1 / more)]
                 rates[:, rows] = (ends[0] - ends[1]) / (lag * (more - 1 / more))
-        return _by_owner(self, motion, rates)
+        return _as_columns(self, motion, rates)
 
     def memory(self, values: FloatArray) -> float:
         """Return the time after which the slowest filter has settled [s]."""
@@ -192,7 +192,7 @@ def low_pass(t: FloatArray, x: FloatArray, lag: float) -> FloatArray:
     return np.asarray(x - lag * filtered)
 
 
-def _by_owner(effect: TorqueReading, motion: Motion, values: FloatArray) -> FloatArray:
+def _as_columns(effect: TorqueReading, motion: Motion, values: FloatArray) -> FloatArray:
     """Return derivatives (N, n) as columns: one for each joint, or one for the whole arm."""
     if effect.joints:
         return joint_columns(effect, motion, values)

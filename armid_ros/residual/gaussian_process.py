@@ -133,4 +133,4 @@ def _fitted(cells: _Cells, knee: float) -> tuple[float, _Scales]:
 def _posterior(cells: _Cells, scales: _Scales) -> TorqueMap:
     none = np.zeros(len(cells.torque))
     noise = np.full_like(none, scales.noise)
-    return TorqueMap(cells.points, none, noise, *scales[1:]).given(cells.torque)
+    return TorqueMap(cells.points, none, noise, *scales[1:]).fitted_to(cells.torque)

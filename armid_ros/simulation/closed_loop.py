@@ -135,7 +135,7 @@ class CompiledLoop:
         nominal = kernel_body(feedback.robot, feedback.added_inertia, feedback.weighs)
         return None if body is None or nominal is None else cls(plant, feedback, body, nominal)
 
-    def over(
+    def step_function(
         self, targets: Motion, rows: range, moved: FloatArray, tau: FloatArray
     ) -> Callable[[State, int], int]:
         """
@@ -263,7 +263,7 @@ def run(
     links = np.empty((3, *tau.shape))
     motors = links if plant.springs is None else np.empty_like(links)
     q, dq, ddq = links
-    fast = None if compiled is None else compiled.over(targets, rows, links, tau)
+    fast = None if compiled is None else compiled.step_function(targets, rows, links, tau)
     k = 0
     while k < last:
         q[k], dq[k], ddq[k], tau[k] = state.q, state.dq, state.ddq, torque

@@ -138,7 +138,7 @@ class Contacts:
         single = -1 not in axes and len(set(axes)) == len(axes)
         return cls(friction.directions, friction.lower, friction.upper, axes, single, loaded)
 
-    def under(self, load: FloatArray) -> Contacts:
+    def with_load(self, load: FloatArray) -> Contacts:
         """Return the contacts with friction levels under a rigid-body torque, shape (n,) [N m]."""
         if self.friction is None:
             return self

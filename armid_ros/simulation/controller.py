@@ -113,7 +113,7 @@ class Controller:
         """Make a controller with a linear feedback law; a subclass may override `torque`."""
         self.feedback = feedback
 
-    def started(self) -> Controller:
+    def in_initial_state(self) -> Controller:
         """Return a controller in its initial state; the same object if it has no state."""
         return self
 
@@ -266,7 +266,7 @@ class MotorControl(Controller):
         )
         return cls(VelocityLoop(gain, gain**2 / (4.0 * inertia)), plant.dt, plant)
 
-    def started(self) -> MotorControl:
+    def in_initial_state(self) -> MotorControl:
         """Return a controller with the same loops and zero integrals."""
         return replace(self)
 

@@ -21,7 +21,7 @@ from __future__ import annotations
 
 from armid_ros.motion import FloatArray
 from armid_ros.simulation.contacts import Contacts, Modes
-from armid_ros.simulation.plant import no_body, Plant, Rotors, State
+from armid_ros.simulation.plant import inertia_error, Plant, Rotors, State
 from armid_ros.simulation.springs import ElasticJoints
 import numpy as np
 from scipy.linalg.lapack import dgesv, dposv
@@ -59,11 +59,11 @@ def step(plant: Plant, state: State, torque: FloatArray) -> State:
     force -= plant.damping.dot(dq)
     memory, slipping = state.memory, plant.action.hysteresis
     middle = memory if slipping is None else slipping.advance(memory, half * dq)
-    plant.resist(force, state.t + 0.5 * plant.dt, q_middle, dq_middle, middle)
+    plant.subtract_smooth_effects(force, state.t + 0.5 * plant.dt, q_middle, dq_middle, middle)
     contacts, load = plant.contacts, None
     if contacts.friction is not None:
         load = robot.inverse_dynamics(plant.data, q_middle, dq_middle, state.ddq)
-        contacts = contacts.under(load)
+        contacts = contacts.with_load(load)
     inertia = robot.inertia(plant.data, q_middle) + plant.added_inertia
     dq_next, ddq, modes = _end_velocity(plant, contacts, inertia, force, dq, state.modes)
     q_next = q_middle + half * dq_next
@@ -89,7 +89,7 @@ def _end_velocity(
     right[0], right[1:] = force, directions
     _, solution, failed = dposv(inertia, right.T, 0, 0, 1)
     if failed:
-        raise no_body(plant.robot)
+        raise inertia_error(plant.robot)
     solution = dt * solution
     dq_free, response = dq + solution[:, 0], solution[:, 1:]
     taken, modes = contacts.torques(directions.dot(response), directions.dot(dq_free), modes)
@@ -128,7 +128,7 @@ def _stop(
     while True:
         contacts = plant.contacts_at(at_lower, at_upper)
         if load is not None:
-            contacts = contacts.under(load)
+            contacts = contacts.with_load(load)
         guess = state.modes + (0,) * (len(contacts.axes) - count)
         dq, ddq, modes = _end_velocity(plant, contacts, inertia, force, state.dq, guess)
         q = state.q + 0.5 * plant.dt * (state.dq + dq)
@@ -164,7 +164,7 @@ def spring_substep(
         response, contacts = after[:, 1:], plant.contacts
         if contacts.friction is not None:
             load = plant.robot.inverse_dynamics(plant.data, q, v[e:], state.ddq)
-            contacts = contacts.under(load)
+            contacts = contacts.with_load(load)
         w, g = springs.friction @ x_next[e:], springs.friction @ response[e:]
         rub, modes = contacts.torques(g, w, modes)
         x_next = x_next - response @ rub
@@ -212,7 +212,8 @@ def _force(
         middle_memory = action.hysteresis.advance(memory, 0.5 * springs.dt * motor_speed)
         memory = action.hysteresis.advance(memory, springs.dt * motor_speed)
     drive = torque.copy()
-    plant.resist(drive, t, springs.at_motors(q, twist), motor_speed, middle_memory)
+    q_motors = springs.at_motors(q, twist)
+    plant.subtract_smooth_effects(drive, t, q_motors, motor_speed, middle_memory)
     force = springs.to_motors.T.dot(drive)
     force[e:] -= plant.weight(q, v[e:])
     if action.link_torque is not None:

@@ -77,7 +77,7 @@ def require_any_mass(robot: Robot) -> None:
         )
 
 
-def no_body(robot: Robot) -> ModelError:
+def inertia_error(robot: Robot) -> ModelError:
     """Return the error for an inertia matrix that is not positive definite."""
     odd = [
         f"'{name}' ({values[0]:g} kg)"
@@ -301,7 +301,7 @@ class Plant:
         ddq = to_motors.dot(np.concatenate([rotors.ddq, state.ddq]))
         return self.springs.at_motors(state.q, rotors.twist), dq, ddq
 
-    def resist(
+    def subtract_smooth_effects(
         self, force: FloatArray, t: float, q: FloatArray, dq: FloatArray, memory: FloatArray
     ) -> None:
         """Subtract the torques of all smooth effects from the motor torques, (n,) [N m]."""
@@ -345,7 +345,7 @@ def _damping_weight(robot: Robot, inertia: FloatArray, damping: FloatArray, dt: 
     try:
         rates = eigh((damping + damping.T) / 2, inertia, eigvals_only=True)
     except LinAlgError:
-        raise no_body(robot) from None
+        raise inertia_error(robot) from None
     z = dt * float(rates[-1])
     if z < 1e-3:
         return 0.5

@@ -367,7 +367,7 @@ class SimulatedArm:
         self._state = self.plant.state(first.q[0], first.dq[0], first.ddq[0], steps)
         self._ahead = 0
         self._reference, self._begun = reference, steps
-        self._acting = self.controller.started()
+        self._acting = self.controller.in_initial_state()
         self._look_ahead(steps=1)
         self._torque = command(self.plant, self._acting, self._state, self._targets, 0)
         delay = self.sensors.torque_delay

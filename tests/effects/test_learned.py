@@ -21,7 +21,7 @@ def posterior(rng, load=2.0, torque=lambda x: 0.3 * x[:, 0] + 0.1 * np.sign(x[:,
     points = rng.uniform([-1.0, -2.0, -3.0], [1.0, 2.0, 3.0], (40, 3))
     lengths = np.array([0.5, 0.6, load])
     empty = TorqueMap(points, np.zeros(40), np.full(40, 0.02), lengths, 0.4, 0.3)
-    return empty.given(torque(points))
+    return empty.fitted_to(torque(points))
 
 
 @pytest.fixture
@@ -51,7 +51,7 @@ def test_its_deviation_holds_the_truth():
         difference = (every[:, None] - every) / 0.7
         kernel = np.exp(-0.5 * np.sum(difference**2, axis=-1)) + 1e-10 * np.eye(35)
         drawn = np.linalg.cholesky(kernel) @ rng.normal(size=35)
-        found = own.given(drawn[:30] + 0.1 * rng.normal(size=30))
+        found = own.fitted_to(drawn[:30] + 0.1 * rng.normal(size=30))
         inside += list(
             np.abs(found.torque(every[30:]) - drawn[30:]) < 1.96 * found.std(every[30:])
         )

@@ -119,7 +119,7 @@ class Search:
                     self.rng,
                     clearance=self.clearance,
                 )
-                drawn.append((self.offer(trajectory), trajectory))
+                drawn.append((self.keep_best(trajectory), trajectory))
             drawn.sort(key=lambda pair: pair[0])
             self._improve([trajectory for _, trajectory in drawn[: settings.starts]])
         except _OutOfTime:
@@ -131,7 +131,7 @@ class Search:
         self._watch(1.0, self.cost)
         return ''
 
-    def offer(self, trajectory: FourierTrajectory) -> float:
+    def keep_best(self, trajectory: FourierTrajectory) -> float:
         """Return the cost of a feasible trajectory, and keep the trajectory if it is the best."""
         problem, prior = self.problem, self.prior
         matrix = problem.recorded(trajectory, problem.settings.n_periods).matrix
@@ -224,7 +224,7 @@ class _Branch:
         if feasible is None:
             self.box /= 3.0
             return
-        cost = self.search.offer(feasible)
+        cost = self.search.keep_best(feasible)
         gain, self.cost = self.cost - cost, min(cost, self.cost)
         self.trajectory, self.box = feasible, min(2.0 * self.box, _BOX_HALF_WIDTH)
         # gain of a round below which the search has converged
