@@ -160,11 +160,11 @@ def design(
     search = Search(problem, clearance, prior, rng.spawn(1)[0], progress)
     stopped = search.run()
     assert search.trajectory is not None
-    excitation = placed(problem, search.trajectory)
+    excitation = with_run_in(problem, search.trajectory)
     return evaluate(problem, excitation, prior, stopped=stopped)
 
 
-def placed(problem: DesignProblem, trajectory: FourierTrajectory) -> Excitation:
+def with_run_in(problem: DesignProblem, trajectory: FourierTrajectory) -> Excitation:
     """
     Return an excitation that runs a trajectory from rest to rest within all limits.
 

@@ -32,7 +32,7 @@ from armid_ros.excitation import (
     Excitation,
     FourierTrajectory,
 )
-from armid_ros.excitation.design import placed
+from armid_ros.excitation.design import with_run_in
 from armid_ros.excitation.feasibility import CLEARANCE, Template, templates
 from armid_ros.robots import collision_model, CollisionModel
 import numpy as np
@@ -176,7 +176,7 @@ def next_run(
         )
         problem = DesignProblem.of(arm, settings, rng)
         try:
-            excitation = placed(problem, trajectory)
+            excitation = with_run_in(problem, trajectory)
         except TrajectoryError as error:
             refused.append(str(error))
             continue
