@@ -26,7 +26,7 @@ RESULTS = Path(__file__).parent / 'results' / 'speed.json'
 
 
 def run(name: str) -> int:
-    """Run a benchmark in a separate process, and keep its output; return its exit code."""
+    """Run a benchmark in a separate process, record its output, and return its exit code."""
     command, lines = [sys.executable, '-m', f'benchmarks.{name}'], []
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
         assert process.stdout is not None
@@ -43,7 +43,7 @@ def run(name: str) -> int:
 
 
 def main() -> int:
-    """Run the benchmarks named on the command line, or all."""
+    """Run the benchmarks named on the command line, or all of them."""
     names = sys.argv[1:] or BENCHMARKS
     unknown = [name for name in names if name not in BENCHMARKS]
     if unknown:

@@ -46,7 +46,7 @@ def bic_selection(
     rng: np.random.Generator,
 ) -> list[Cause]:
     """
-    Return the candidates that lower the criterion, in the order of selection.
+    Return the effects that forward selection adds by the BIC, in the order of selection.
 
     Parameters
     ----------

@@ -37,7 +37,7 @@ from benchmarks.multisine import multisine
 
 
 def ball(mass: float) -> str:
-    """Return the quantities of a ball of 3 cm, 5 cm from the wrist."""
+    """Return the payload parameters of a ball of 3 cm, 5 cm from the wrist."""
     own = 0.4 * mass * 0.03**2
     inertia = own + mass * 0.05**2
     return (
@@ -77,12 +77,12 @@ Sample = tuple[float, FloatArray, FloatArray]
 
 
 def arm_with(*effects: str) -> ArmModel:
-    """Return the humanoid arm with given effects."""
+    """Return the model of the humanoid arm with given effects."""
     return ArmModel.of('humanoid_arm', effects=effects)
 
 
 def working_motion(duration: float, speed: float, rng: np.random.Generator) -> Motion:
-    """Return a motion of three harmonics a joint, from rest to rest in the middle of the range."""
+    """Return a motion of three harmonics per joint that starts and ends at rest."""
     robot = load_robot('humanoid_arm')
     size = rng.uniform(0.3, 1.0, robot.n_joints) * 0.3
     tones = [(0.1 * speed * k, share * size) for k, share in ((1, 1.0), (2, 0.6), (5, 0.2))]
@@ -104,14 +104,14 @@ def working_motion(duration: float, speed: float, rng: np.random.Generator) -> M
 
 
 def coloured(count: int, joints: int, rate: float, rng: np.random.Generator) -> FloatArray:
-    """Return coloured noise, shape (count, joints) [N m]."""
+    """Return first-order autoregressive torque noise, shape (count, joints) [N m]."""
     keep = np.exp(-1.0 / (COLOUR * rate))
     white = np.sqrt(1.0 - keep**2) * rng.normal(size=(count, joints))
     return np.asarray(NOISE * signal.lfilter([1.0], [1.0, -keep], white, axis=0))
 
 
 def moving_arm(seed: int, duration: float, rate: float = RATE) -> tuple[SimulatedArm, FloatArray]:
-    """Return a simulated arm at the start of a motion, and the noise of its torque samples."""
+    """Return a simulated arm at the start of a motion, and its torque noise for each sample."""
     rng = np.random.default_rng(seed)
     motion = working_motion(duration + _RAMP, 1.0, rng)
     plant = Plant(arm_with(*IDENTIFIED, *LACKING), dt=1.0 / rate)
@@ -121,20 +121,20 @@ def moving_arm(seed: int, duration: float, rate: float = RATE) -> tuple[Simulate
 
 
 def sampled(simulated: SimulatedArm, noise: FloatArray) -> Iterator[Sample]:
-    """Advance an arm and yield a sample for every row of noise."""
+    """Advance the simulated arm, and yield time, position and noisy torque of each sample."""
     for more in noise:
         sample = simulated.advance()
         yield sample.t, sample.q, sample.tau + more
 
 
 def changed(change: str) -> ArmModel:
-    """Return the simulated arm after a change."""
+    """Return the true model of the humanoid arm with a change."""
     arm = arm_with(*IDENTIFIED, *LACKING)
     return arm.with_effect(*parse_effect(change, arm.robot))
 
 
 def size(change: str) -> dict[ParameterName, float]:
-    """Return the values that a change adds, by parameter."""
+    """Return the true change of each parameter by name."""
     effect, values = parse_effect(change, load_robot('humanoid_arm'))
     names = effect.parameters(load_robot('humanoid_arm'))
     return dict(zip(names, values, strict=True))
@@ -143,7 +143,7 @@ def size(change: str) -> dict[ParameterName, float]:
 def changing(
     change: str, seed: int, before: float = BEFORE, after: float = AFTER, rate: float = RATE
 ) -> Iterator[Sample]:
-    """Yield samples of an arm that changes at the time `before` [s]."""
+    """Yield samples of an arm whose effects change at the time `before` [s]."""
     simulated, noise = moving_arm(seed, before + after, rate)
     count = round(before * rate)
     yield from sampled(simulated, noise[:count])
@@ -152,7 +152,7 @@ def changing(
 
 
 def unchanging(minutes: int, seed: int, rate: float = RATE) -> Iterator[Sample]:
-    """Yield samples of a working arm: another motion each minute, a rest each fifth."""
+    """Yield samples of an unchanged arm: a new motion each minute, every fifth minute at rest."""
     rng = np.random.default_rng(seed)
     plant = Plant(arm_with(*IDENTIFIED, *LACKING), dt=1.0 / rate)
     for minute in range(minutes):
@@ -168,7 +168,7 @@ def unchanging(minutes: int, seed: int, rate: float = RATE) -> Iterator[Sample]:
 
 
 def identifier() -> OnlineIdentifier:
-    """Return an online identifier without prior values of the effects."""
+    """Return an online identifier of the arm that does not know the values of the effects."""
     nothing = replace(arm_with(*IDENTIFIED, 'torque_offset'), values=())
     return OnlineIdentifier(nothing, rng=np.random.default_rng(0))
 
@@ -178,7 +178,7 @@ def watch(
     tell: Callable[[float, Change], None] | None = None,
     online: OnlineIdentifier | None = None,
 ) -> OnlineIdentifier:
-    """Identify online, and call `tell` with the time and each named change."""
+    """Identify online, and call `tell` with time and cause of each detected change."""
     online = online or identifier()
     seen = len(online.changes)
     for t, q, tau in samples:
@@ -191,7 +191,7 @@ def watch(
 
 
 def outcome(truth: Mapping[ParameterName, float], found: Change) -> str:
-    """Return whether the cause of a detected change is named first, among others, or wrongly."""
+    """Return 'named', 'named second' or 'WRONG': where the true cause is in a change."""
     if {p for p, value in truth.items() if value} & set(found.size.parameters):
         return 'named'
     among = any(set(rival.parameters) & set(truth) for rival in found.rivals)
@@ -199,14 +199,14 @@ def outcome(truth: Mapping[ParameterName, float], found: Change) -> str:
 
 
 def held(truth: Mapping[ParameterName, float], found: Change) -> list[bool]:
-    """Return whether the 95 % interval of each size holds the truth."""
+    """Return whether the 95 % interval of each changed parameter contains the true value."""
     right = np.array([truth.get(p, 0.0) for p in found.size.parameters])
     lower, upper = found.size.interval().T
     return ((lower <= right) & (right <= upper)).tolist()
 
 
 def main() -> None:
-    """Print the delay of the detection of every change, and its named cause."""
+    """Print detection delay and named cause of each change."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[1])
     parser.add_argument('--draws', type=int, default=4, help='runs with every change')
     outcomes: Counter[str] = Counter()
@@ -220,13 +220,17 @@ def main() -> None:
             truth = size(change)
             simulated, online = copy.deepcopy((arm, learned))
             simulated.become(changed(change))
-            told: list[tuple[float, Change]] = []
+            detected: list[tuple[float, Change]] = []
             after = sampled(simulated, noise[count:])
-            watch(after, lambda t, c, told=told: told.append((t, c)), online)
-            outcomes[outcome(truth, told[0][1]) if told else 'not seen'] += 1
-            if told and outcome(truth, told[0][1]) == 'named':
-                inside += held(truth, told[0][1])
-            print(change, *(f'  after {t - BEFORE:.2f} s: {found}' for t, found in told), sep='\n')
+            watch(after, lambda t, c, found=detected: found.append((t, c)), online)
+            outcomes[outcome(truth, detected[0][1]) if detected else 'not seen'] += 1
+            if detected and outcome(truth, detected[0][1]) == 'named':
+                inside += held(truth, detected[0][1])
+            print(
+                change,
+                *(f'  after {t - BEFORE:.2f} s: {found}' for t, found in detected),
+                sep='\n',
+            )
             sys.stdout.flush()
     print(f'\nafter {BEFORE:g} s of motion, within {AFTER:g} s: {dict(outcomes)}')
     print(f'95 % intervals of sizes that hold the truth: {sum(inside)} of {len(inside)}')

@@ -47,14 +47,14 @@ def recorded(motion, tau, rng, encoder, pole):
 
 
 def from_recording(arm, recording):
-    """Identify offline; return base parameters and estimate."""
+    """Identify from a recording, and return base parameters and estimate."""
     settings = IdentificationSettings(signals=SignalSettings(10.0, 4))
     result = identify(arm, [recording], settings, rng=np.random.default_rng(0))
     return result.base, result.estimate
 
 
 def online(arm, recording):
-    """Identify sample by sample; return base parameters and estimate."""
+    """Identify online, sample by sample, and return base parameters and estimate."""
     identifier = OnlineIdentifier(arm, rng=np.random.default_rng(0))
     for t, q, tau in zip(recording.t, recording.q, recording.tau, strict=True):
         identifier.update(float(t), q, None, tau)
@@ -62,7 +62,7 @@ def online(arm, recording):
 
 
 def coverage(method, repeats, encoder, pole):
-    """Identify repeatedly and print a table of coverages."""
+    """Identify repeatedly, and print the share of 95 % intervals that contain the truth."""
     rng = np.random.default_rng(0)
     arm = ArmModel.of('humanoid_arm', effects=FRICTION)
     structure = ArmModel(arm.robot, arm.effects)
@@ -96,7 +96,7 @@ def coverage(method, repeats, encoder, pole):
 
 
 def main():
-    """Print the tables."""
+    """Print the coverage of intervals from recordings and of online intervals."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument('--repeats', type=int, default=500)
     parser.add_argument('--online-repeats', type=int, default=200)

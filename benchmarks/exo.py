@@ -45,7 +45,7 @@ PAIR = leg_pair(STIFFNESS)
 
 
 def main() -> None:
-    """Print the tables."""
+    """Print the errors of torque-driven joints and of identified strap stiffness."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[1])
     parser.add_argument('--draws', type=int, default=8, help='noise drawn so many times')
     asked = parser.parse_args()
@@ -60,7 +60,7 @@ def main() -> None:
 
 
 def gait_by_torque() -> None:
-    """Drive joints by splined torques in MuJoCo over a cycle."""
+    """Drive joints in MuJoCo by splined torques over a gait cycle, and print their errors."""
     cycle = gait_cycle(walking_pair(), read_gait())
     soft = cycle.pair.with_stiffness(0.8 * cycle.pair.stiffness)
     print('in MuJoCo, one joint by its torque               paper      wanted      measured')
@@ -77,7 +77,7 @@ def gait_by_torque() -> None:
 
 
 def stiffness(sets: dict[str, PairMotion], draws: int) -> None:
-    """Identify the springs with noise; print mean error and scatter of the worst in per cent."""
+    """Identify strap stiffness from noisy data, and print mean error and scatter [%]."""
     print(
         f'stiffness, {TORQUE_NOISE} N m noise, inertias free: {draws} draws, the worst spring [%]'
     )
@@ -102,7 +102,7 @@ def stiffness(sets: dict[str, PairMotion], draws: int) -> None:
 
 
 def motions_of_four_springs() -> None:
-    """Print the stated intervals of four springs for 10 s at 1 kHz of each motion."""
+    """Print the 95 % intervals of four straps for 10 s at 1 kHz of each motion."""
     print('four springs, inertias free, 0.05 deg, 10 s: 95 % interval [%] of', ', '.join(SEGMENTS))
     for name in EXERCISES:
         motions = with_torques(PAIR, exercise(PAIR, name, np.arange(0.0, 10.0, 1e-3)))
@@ -124,7 +124,7 @@ def find_springs(
     inertias: Inertias = 'known',
     separate: bool = False,
 ) -> Interaction:
-    """Draw noise, and identify springs from poses, or from 1000 samples on as a recording."""
+    """Add noise, and identify the straps from poses or, from 1000 samples on, a recording."""
     own, other = measured(motions, degrees, np.random.default_rng(seed))
     if len(own) < 1000:
         problem = interaction_problem(
@@ -148,12 +148,12 @@ def find_springs(
 
 
 def with_torques(pair: TiedPair, motions: PairMotion) -> PairMotion:
-    """Return a motion with exact torques of the machine."""
+    """Return a motion of both machines with the exact torques of the exoskeleton."""
     return PairMotion(motions.own.with_torque(pair_torques(pair, *motions).tau), motions.other)
 
 
 def measured(motions: PairMotion, degrees: float, rng: np.random.Generator) -> PairMotion:
-    """Return a motion with exact torques and added sensor noise."""
+    """Return a motion of both machines with sensor noise on angles and torques."""
     own, other = (
         replace(m, q=m.q + np.radians(degrees) * rng.normal(size=m.q.shape)) for m in motions
     )
@@ -163,7 +163,7 @@ def measured(motions: PairMotion, degrees: float, rng: np.random.Generator) -> P
 
 
 def recorded(motion: Motion, start_ns: int = 0) -> Recording:
-    """Return a motion as a recording."""
+    """Return a motion as a Recording."""
     return Recording(
         joints=motion.joints, t=motion.t, q=motion.q, tau=motion.tau, start_ns=start_ns
     )

@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Straps hidden between an exoskeleton and its wearer in MuJoCo, found by the whole diagnosis.
+Rates of the diagnosis for straps hidden between an exoskeleton and its wearer in MuJoCo.
 
     python -m benchmarks.exo_diagnosis [--sets 24] [--first-seed 0]
 
@@ -45,7 +45,7 @@ STIFFNESSES = (1e3, 3e3, 1e4, 5e4)
 
 
 def diagnosed(sets: int, first: int = 0) -> None:
-    """Diagnose bags of an independent engine with hidden springs, and print rates."""
+    """Diagnose MuJoCo bags with hidden straps, and print the rates of right names."""
     ties = leg_pair()
     partner = Partner(ties.other, ties.ties, 'human_legs')
     right = alarms = 0
@@ -67,14 +67,14 @@ def diagnosed(sets: int, first: int = 0) -> None:
             for value, std in zip(finding.values, finding.std, strict=True)
         ]
         if not ok:
-            print(f'  {k:g} N/m at {", ".join(segments)}: {found.verdict} {_said(found)}')
+            print(f'  {k:g} N/m at {", ".join(segments)}: {found.verdict} {_headline(found)}')
     for number in range(sets):
         found = diagnosis_of(partner, recorded_pair(partner, Straps(), first + 1000 + number))
         body = number % 2 == 1 and [f.name for f in found.findings] == ['link_inertia']
         alarms += bool(found.findings) and not body
         if found.findings or found.verdict != 'consistent':
             what = ', a body whose mass is off' if body else ''
-            print(f'  nothing: {found.verdict} {_said(found)}{what}')
+            print(f'  nothing: {found.verdict} {_headline(found)}{what}')
     print(f'right name, and segments where visible   {right} of {sets}')
     print(f'named where there is nothing             {alarms} of {sets}')
     print(f'held-out gap closed, least and median    {min(closed):.3f}, {np.median(closed):.3f}')
@@ -83,7 +83,7 @@ def diagnosed(sets: int, first: int = 0) -> None:
 
 
 def expected_z(recordings: list[Recording], stiffness: float) -> dict[str, float]:
-    """Return the expected z-score of a stiffness by segment, if all segments may be tied."""
+    """Return the expected z-score of the stiffness of each segment, if all may have a strap."""
     exo = load_robot('exoskeleton_legs')
     settings = SignalSettings()
     used = band_of_motion(recordings, conditioning(recordings, settings), settings)
@@ -98,7 +98,7 @@ def expected_z(recordings: list[Recording], stiffness: float) -> dict[str, float
 
 
 def recorded_pair(partner: Partner, straps: Straps, seed: int) -> list[Recording]:
-    """Record a pair three times; its masses are wrong by up to a tenth for odd seeds."""
+    """Record exoskeleton and wearer three times; odd seeds have mass errors of up to 10 %."""
     exo = load_robot('exoskeleton_legs')
     recordings = []
     for walk in walks(straps, seed, seconds=SECONDS, wrong_masses=0.1 * (seed % 2)):
@@ -109,12 +109,13 @@ def recorded_pair(partner: Partner, straps: Straps, seed: int) -> list[Recording
 
 
 def diagnosis_of(partner: Partner, recordings: list[Recording]) -> Diagnosis:
-    """Return the diagnosis of the exoskeleton with a partner."""
+    """Return the diagnosis of the exoskeleton with the wearer as its partner."""
     arm, rng = ArmModel(load_robot('exoskeleton_legs')), np.random.default_rng(0)
     return diagnose(arm, recordings, settings=DiagnosisSettings(partner=partner), rng=rng)
 
 
-def _said(found: Diagnosis) -> str:
+def _headline(found: Diagnosis) -> str:
+    """Return the named effects and their places as a line of text."""
     places = (
         (f.name, ', '.join(t.name for t in f.ties) or ', '.join(f.joints)) for f in found.findings
     )

@@ -54,7 +54,7 @@ EFFECTS = (
 
 
 def chain(joints: int) -> str:
-    """Return the URDF of a serial chain whose axes alternate."""
+    """Return the URDF of a serial chain of links whose joint axes alternate."""
     parts = ['<robot name="chain"><link name="l0"/>']
     for k in range(1, joints + 1):
         axis = ('0 0 1', '0 1 0', '1 0 0')[k % 3]
@@ -76,7 +76,7 @@ def recording(arm: ar.ArmModel, samples: int, seed: int) -> ar.Recording:
 
 
 def prepared(job: str, sizes: dict[str, int], folder: Path) -> Callable[[], object]:
-    """Make the data of a job, and return the job as a function."""
+    """Create the data of a job, and return the job as a function without arguments."""
     truth = ar.ArmModel.of(chain(sizes['joints']), effects=list(FRICTION))
     arm = ar.ArmModel.of(truth.robot, effects=EFFECTS[: sizes['effects']])
     size = sizes['samples'] if sizes['bags'] == 1 else BAG
@@ -97,7 +97,7 @@ def prepared(job: str, sizes: dict[str, int], folder: Path) -> Callable[[], obje
 
 
 def measure(run: Callable[[], object]) -> tuple[float, float]:
-    """Return processor time [s] of a job, and the memory that it adds [MB]."""
+    """Return processor time [s] and additional memory [MB] of a job."""
     before, begun = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss, time.process_time()
     run()
     used = time.process_time() - begun
@@ -105,13 +105,13 @@ def measure(run: Callable[[], object]) -> tuple[float, float]:
 
 
 def slope(x: tuple[int, ...], y: list[float]) -> float:
-    """Return the exponent of the growth over the upper half of the values."""
+    """Return the exponent of a power law, fitted to the larger half of the sizes."""
     last = max(2, len(x) // 2)
     return float(np.polyfit(np.log(x[-last:]), np.log(np.maximum(y[-last:], 1e-3)), 1)[0])
 
 
 def main() -> None:
-    """Measure every point in a separate process; write and print the table."""
+    """Measure each job and size in a separate process; write and print the results."""
     parser = argparse.ArgumentParser(description=__doc__.strip().partition('\n')[0])
     parser.add_argument('--point', nargs=3, help=argparse.SUPPRESS)
     asked = parser.parse_args()

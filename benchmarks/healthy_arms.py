@@ -37,7 +37,7 @@ MISSING = 0.1
 
 
 def lasting(rng, days, size):
-    """Draw a first-order autoregressive series over days, of unit standard deviation."""
+    """Draw a first-order autoregressive series over days, with unit standard deviation."""
     values = np.empty(size)
     values[..., 0] = rng.normal(size=size[:-1])
     for day in range(1, days):
@@ -47,12 +47,12 @@ def lasting(rng, days, size):
 
 
 def heavy(rng, size):
-    """Draw errors with a standard deviation of one and heavy tails: Student's t of five."""
+    """Draw errors of Student's t distribution with five degrees of freedom, scaled to unit std."""
     return rng.standard_t(5.0, size) * np.sqrt(3.0 / 5.0)
 
 
 def draw(arms, bags, sick, rng):
-    """Return the series of a fleet whose first arms change, by steps or wear."""
+    """Return parameter series of a fleet whose first arms change suddenly or by wear."""
     days = np.arange(bags, dtype=float) + 20_000.0
     shared = SEASON * np.sin(2 * np.pi * days / 365.25 + rng.uniform(0, 6.3))
     shared = shared + SHARED * lasting(rng, bags, (bags,))
@@ -83,7 +83,7 @@ def draw(arms, bags, sick, rng):
 
 
 def change_of(arm, bags, rng):
-    """Return the changed parameter, and its relative change on every day."""
+    """Return the changed parameter of an arm, and its relative change on each day."""
     joint = JOINTS[int(rng.integers(3))]
     start = int(rng.integers(bags // 3, 2 * bags // 3))
     if arm % 2:
@@ -92,7 +92,7 @@ def change_of(arm, bags, rng):
 
 
 def tally(arms, bags, sick, rng, alpha=0.05):
-    """Return the numbers of named arms that have changed and that are healthy."""
+    """Return how many changed arms and how many healthy arms are reported."""
     series = draw(arms, bags, sick, rng)
     compared = without_days(series)
     judged = judge([(compared, spreads(compared))])
@@ -102,7 +102,7 @@ def tally(arms, bags, sick, rng, alpha=0.05):
 
 
 def main():
-    """Print the numbers of named arms in fleets with and without changes."""
+    """Print how many arms are reported in fleets with and without changes."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument('--arms', type=int, default=1000)
     parser.add_argument('--bags', type=int, nargs='+', default=[10, 30, 90])

@@ -36,7 +36,7 @@ from tests.hidden.specification import case_list, CaseSpec, SETS
 @dataclass(frozen=True)
 class Judged:
     """
-    One case with its truth and the answer of the diagnosis.
+    One case: the hidden effects, and the answer of the diagnosis.
 
     Attributes
     ----------
@@ -61,7 +61,7 @@ class Judged:
 
     @property
     def line(self) -> str:
-        """Return truth and answer in a line."""
+        """Return the hidden effects and the answer as a line of text."""
         names = ' + '.join(map(str, self.answer.headline))
         return (
             f'{self.spec.key} (gap {self.size:.2g}): {self.answer.verdict} {names} '
@@ -70,40 +70,40 @@ class Judged:
 
     @property
     def visible(self) -> bool:
-        """Whether what is hidden is large enough to be found."""
+        """Whether the hidden effect is large enough to be found."""
         return bool(self.effects) and self.size >= VISIBLE
 
     @property
     def findings(self) -> tuple[Named, ...]:
-        """Return the findings, without link errors if the nominal model has wrong links."""
+        """Named effects, without link errors if the nominal model has wrong links."""
         honest = () if self.spec.exact else ('link_inertia',)
         return tuple(f for f in self.answer.headline if f.name not in honest)
 
     @property
     def false_alarm(self) -> bool:
-        """Whether the verdict is not `consistent`, apart from link errors of the nominal model."""
+        """Whether the verdict is not `consistent`, link errors of the nominal model aside."""
         only_bodies = bool(self.answer.headline) and not self.findings
         return self.answer.verdict != 'consistent' and not only_bodies
 
     @property
     def top(self) -> bool:
-        """Whether the truth was named first."""
+        """Whether the hidden effect is named first."""
         return bool(self.findings) and self.findings[0].name in self.spec.effects
 
     @property
     def found(self) -> Named | None:
-        """Return the finding with the (first) hidden effect among its names."""
+        """Named effect that is the first hidden effect, or has it as a rival; None without one."""
         return next((f for f in self.findings if self.spec.effects[0] in f.names), None)
 
     @property
     def localised(self) -> bool:
-        """Whether the truth was found in its joints, named first or as a rival."""
+        """Whether the hidden effect is found in its joints, named first or as a rival."""
         found, truth = self.found, self.effects[0]
         return found is not None and set(found.joints_of(truth.name)) == set(truth.joints)
 
     @property
     def exact(self) -> bool:
-        """Whether the named effects are exactly the hidden ones."""
+        """Whether the named effects are exactly the hidden effects."""
         return sorted(f.name for f in self.findings) == sorted(self.spec.effects)
 
     @property
@@ -114,7 +114,7 @@ class Judged:
         return self.answer.verdict in honest
 
     def parameter_errors(self) -> list[tuple[float, bool]]:
-        """Compare the parameters of a right name with the true ones; empty for a wrong name."""
+        """Return error and coverage of each parameter of a right name; [] for a wrong name."""
         truth = self.effects[0]
         if self.found is None or self.found.name != truth.name:
             return []
@@ -122,7 +122,7 @@ class Judged:
 
 
 def true_arm(case: Case) -> ArmModel:
-    """Return the true arm, with the hidden effects that are in the catalogue."""
+    """Return the model of the true arm, with the hidden effects that the catalogue has."""
     arm = ArmModel(case.true_robot)
     for name, values in case.true_known.items():
         joints = tuple(j for j, value in zip(arm.robot.joints, values, strict=True) if value)
@@ -137,7 +137,7 @@ def true_arm(case: Case) -> ArmModel:
 def with_true_effect(
     arm: ArmModel, hidden: HiddenEffect | Cause, shape: Sequence[float] | None = None
 ) -> ArmModel:
-    """Return an arm with the catalogue's equivalent of a hidden effect."""
+    """Return an arm model with the effect of the catalogue that equals a hidden effect."""
     true = {(p.name, p.joint): p.value for p in hidden.parameters}
     effect = CATALOGUE[hidden.name].on(arm.robot, hidden.joints or None)
     if shape is None:
@@ -150,22 +150,17 @@ def with_true_effect(
     return arm.with_effect(effect, [true.get((n.name, n.joint or ''), 0.0) for n in names])
 
 
-def run_diagnosis(case: Case) -> Answer:
-    """Diagnose a case."""
-    library = tuple(name for name in CATALOGUE if name not in case.removed)
-    return ask(
-        known_arm(case.robot, case.known),
-        [bag.recording for bag in case.bags],
-        validate=[bag.recording for bag in case.validation],
-        settings=DiagnosisSettings(library=library, material=0.0),
-    )
-
-
 def judge(spec: CaseSpec) -> Judged:
-    """Make a case and diagnose it; an exception is an outcome as well."""
+    """Create a case, diagnose it, and return truth and answer; an exception is an answer."""
     case = make_case(spec)
     try:
-        answer = run_diagnosis(case)
+        library = tuple(name for name in CATALOGUE if name not in case.removed)
+        answer = ask(
+            known_arm(case.robot, case.known),
+            [bag.recording for bag in case.bags],
+            validate=[bag.recording for bag in case.validation],
+            settings=DiagnosisSettings(library=library, material=0.0),
+        )
     except Exception:
         answer = Answer(verdict='failed', error=traceback.format_exc(limit=-3))
     whole = any(len(one.joints) in (0, case.robot.n_joints) for one in case.effects)
@@ -173,7 +168,7 @@ def judge(spec: CaseSpec) -> Judged:
 
 
 def score(judged: Sequence[Judged]) -> tuple[Metric, ...]:
-    """Return all metrics of judged cases."""
+    """Return the rates of right names, false alarms and parameter errors of judged cases."""
     free = [j for j in judged if j.spec.kind == 'free']
     single = [j for j in judged if j.spec.kind == 'single' and j.visible]
     pairs = [j for j in judged if j.spec.kind == 'pair']

@@ -74,7 +74,7 @@ KINDS = (
 
 class Unhurried:
     """
-    Diagnoses in this process, with answers delayed by their processor time.
+    Executor of diagnoses in this process, which delays answers by their processor time.
 
     Attributes
     ----------
@@ -93,13 +93,13 @@ class Unhurried:
         return self._result is not None
 
     def ask(self, task: str, argument: object) -> None:
-        """Run a task, and set the time of its answer."""
+        """Run a diagnosis, and set the time at which its answer is available."""
         begun = time.process_time()
         self._result = self._worker.run(task, argument)
         self._due = self.now + time.process_time() - begun
 
     def poll(self) -> Result | None:
-        """Return the answer once its time has come; None before."""
+        """Return the answer from its time on; None before."""
         if self.now < self._due:
             return None
         result, self._result = self._result, None
@@ -110,7 +110,7 @@ class Unhurried:
 
 
 def drawn(along: Motion, kind: tuple[str, str], rng: np.random.Generator) -> str:
-    """Return an effect of typical size with the share `SHARE` of the torque of a joint."""
+    """Return an effect as text, with the share `SHARE` of the torque of a random joint."""
     name, quantity = kind
     largest = next(own.typical[1] for own in CATALOGUE[name].quantities if own.name == quantity)
     torque, unit = ARM.torque(along), 1e-3
@@ -127,7 +127,7 @@ def drawn(along: Motion, kind: tuple[str, str], rng: np.random.Generator) -> str
 
 
 class Bench:
-    """The two nodes, in lock step."""
+    """Simulated arm and live diagnosis as nodes in lock step."""
 
     def __init__(self, stage: Stage, along: Motion) -> None:
         self.plant = stage.add(
@@ -150,12 +150,13 @@ class Bench:
         self.plant._arm.set_trajectory(Reference.of(along))
 
     def _connected(self) -> bool:
+        """Publish the time, and return whether both nodes have found each other."""
         self.plant.publish_clock()
         self.node.joint_states.match()
         return bool(self.plant.readers and self.node.get_clock().now().nanoseconds)
 
     def run(self, seconds: float) -> Iterator[float]:
-        """Run for some seconds; yield the time of each diagnosis since the start [s]."""
+        """Run both nodes for some seconds, and yield the time of each diagnosis [s]."""
         for count in range(round(seconds * RATE)):
             stamp = self.plant.step()
             self.helper.now += 1.0 / RATE
@@ -168,12 +169,12 @@ class Bench:
 
     @property
     def proposed(self) -> list[list[str]]:
-        """Effects that the node proposes, with their joints."""
+        """Names and joints of the effects that the node proposes."""
         return [[name, *joints] for name, joints in self.live.named]
 
 
 def draw(number: int, seed: int) -> tuple[bool, str]:
-    """Let an effect appear in a running arm; return whether it is named, and a line about it."""
+    """Add an effect to a running arm; return whether it is named, and a line of text."""
     rng = np.random.default_rng(number + 1000 * seed)
     along = working_motion(BEFORE + WANTED + 6.0, rng.uniform(1.0, 2.0), rng)
     effect = drawn(along, KINDS[number % len(KINDS)], rng)
@@ -190,23 +191,23 @@ def draw(number: int, seed: int) -> tuple[bool, str]:
 
 
 def quiet(minutes: float, seed: int) -> tuple[int, int, list[list[list[str]]]]:
-    """Return the numbers of diagnoses and of named ones, and all proposals, without a change."""
+    """Return numbers of diagnoses and of false names, and proposals, without a change."""
     rng = np.random.default_rng([1000, seed])
-    asked, said, proposed = 0, 0, []
+    asked, named, proposed = 0, 0, []
     for _ in range(max(1, round(minutes / 5.0))):
         with Stage() as stage:
             nodes = Bench(stage, working_motion(304.0, rng.uniform(1.0, 2.0), rng))
             for _ in nodes.run(min(300.0, 60.0 * minutes)):
                 latest = nodes.live.latest
-                said += bool(latest is not None and latest.named)
+                named += bool(latest is not None and latest.named)
                 if nodes.proposed:
                     proposed.append(nodes.proposed)
             asked += nodes.live.asked
-    return asked, said, proposed
+    return asked, named, proposed
 
 
 def main() -> None:
-    """Print every draw, and the names without a change."""
+    """Print the result of each draw, and the false names without a change."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument('--draws', type=int, default=40)
     parser.add_argument('--seed', type=int, default=0, help='other draws of the same kinds')
@@ -219,9 +220,9 @@ def main() -> None:
         print(line, flush=True)
     print(f'named rightly within {WANTED:g} s: {right} of {chosen.draws}')
     if chosen.minutes:
-        asked, said, proposed = quiet(chosen.minutes, chosen.seed)
+        asked, named, proposed = quiet(chosen.minutes, chosen.seed)
         print(
-            f'{chosen.minutes:g} min without a change: {asked} diagnoses, {said} with a name, '
+            f'{chosen.minutes:g} min without a change: {asked} diagnoses, {named} with a name, '
             f'proposed: {proposed}'
         )
     print(f'{time.process_time() - begun:.0f} s of processor time')

@@ -32,9 +32,9 @@ def judge(
     kind: str, index: int, *, again: bool = True, model_alone: bool = False
 ) -> LivedJudged | None:
     """
-    Make a case and diagnose it; an exception is an answer; None if it cannot be made.
+    Create a case, diagnose it, and return truth and answer; None if it cannot be created.
 
-    If the model is given alone, the diagnosis gets no recordings of day 1.
+    An exception is an answer. With `model_alone`, the diagnosis gets no recordings of day 1.
 
     """
     try:
@@ -69,7 +69,7 @@ def judge(
 
 
 def main() -> None:
-    """Run a kind of cases, print the table and write the requested files."""
+    """Diagnose the cases of a kind, print the table and write the requested files."""
     parser = argparse.ArgumentParser(prog='python -m benchmarks.lived')
     parser.add_argument('kind', nargs='?', default='development', choices=KINDS)
     parser.add_argument('--cases', default=':', metavar='FIRST:LAST', help='some of them')

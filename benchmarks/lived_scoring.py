@@ -36,7 +36,7 @@ ALSO = {
 @dataclass(frozen=True)
 class LivedJudged:
     """
-    One case with its truth and the answers of the diagnosis.
+    One case: the true cause, and the answers of the diagnosis.
 
     Attributes
     ----------
@@ -69,7 +69,7 @@ class LivedJudged:
 
     @classmethod
     def of(cls, case: LivedCase, answer: Answer, again: Answer | None = None) -> LivedJudged:
-        """Return a case with the answers to it, without its recordings."""
+        """Return a case with its answers, without the recordings."""
         (cause,) = case.truth or (None,)
         felt = felt_directions(Chain.of(case.robot))
         return cls(
@@ -77,7 +77,7 @@ class LivedJudged:
         )
 
     def among(self, named: Named) -> int | None:
-        """Return the index of the right name: 0 for the finding, then its rivals; None if none."""
+        """Return the rank of the right name: 0 if named, then its rivals; None if absent."""
         if self.cause is None:
             return None
         for k, (name, joints) in enumerate(((named.name, named.joints), *named.rivals)):
@@ -88,12 +88,12 @@ class LivedJudged:
 
     @property
     def nameable(self) -> bool:
-        """Whether the catalogue has a name for the cause."""
+        """Whether the cause is an effect of the catalogue."""
         return self.cause is not None and (self.cause.in_catalogue or self.cause.name == 'gravity')
 
     @property
     def line(self) -> str:
-        """Return truth and answers in a line."""
+        """Return the true cause and the answers as a line of text."""
         spec, cause, answer = self.spec, self.cause, self.answer
         right = self.first if self.nameable else self.admitted
         truth = 'nothing'
@@ -118,7 +118,7 @@ class LivedJudged:
 
     @property
     def tied(self) -> bool:
-        """Whether the cause is named first, or is in a short tie with the first name."""
+        """Whether the cause is named first, or among the few rivals of the first name."""
         if not self.answer.headline:
             return False
         leading = self.answer.headline[0]
@@ -128,7 +128,7 @@ class LivedJudged:
 
     @property
     def too_many(self) -> int:
-        """Number of wrong or redundant names in the headline."""
+        """Number of wrong or superfluous names in the headline."""
         true = [named for named in self.answer.headline if self.among(named) is not None]
         mounting = (
             self.cause is not None and self.cause.name == 'gravity'
@@ -137,14 +137,14 @@ class LivedJudged:
 
     @property
     def placed(self) -> bool:
-        """Whether the first finding of the headline has the joints of the cause."""
+        """Whether the first named effect has the joints of the cause."""
         first = self.answer.headline[0]
         names = (first.joints, *(joints for _, joints in first.rivals))
         return set(names[self.among(first) or 0]) == set(self.cause.joints)
 
     @property
     def share_error(self) -> float:
-        """Stated share minus the true one; nan if one of them is unknown."""
+        """Stated share of the gap minus the true share; NaN if one of them is unknown."""
         return self.answer.headline[0].share - self.answer.true_share
 
     @property
@@ -158,22 +158,22 @@ class LivedJudged:
         return self.answer.verdict in (*UNEXPLAINED, 'not_repeatable') or pushed
 
     def parameter_errors(self) -> list[tuple[float, bool]]:
-        """Return relative errors of large values, and whether their intervals hold the truth."""
+        """Return relative errors of large parameters, and whether intervals contain the truth."""
         if not self.first:
             return []
         return self.answer.headline[0].parameter_errors(self.cause.parameters)
 
     def gravity_error(self) -> tuple[float, float]:
-        """Return the error of gravity: of its direction [deg], relative of its magnitude [-]."""
-        told = self.felt @ gravity_of(self.answer.headline, self.described)
-        there = self.felt @ self.gravity
-        size, true = np.linalg.norm(told), np.linalg.norm(there)
-        cosine = told @ there / size / true
+        """Return the errors of gravity: direction [deg], and relative magnitude."""
+        stated = self.felt @ gravity_of(self.answer.headline, self.described)
+        truth = self.felt @ self.gravity
+        size, true = np.linalg.norm(stated), np.linalg.norm(truth)
+        cosine = stated @ truth / size / true
         return float(np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0)))), float(size / true - 1.0)
 
 
 def gravity_of(headline: Iterable[Named], described: FloatArray) -> FloatArray:
-    """Return the gravity from the values of a headline, shape (3,) [m/s^2]."""
+    """Return the gravity vector that a headline states, shape (3,) [m/s^2]."""
     values = {name: value for named in headline for name, _, value, _ in named.parameters}
     if 'gravity_x' in values:
         return np.array([values[f'gravity_{axis}'] for axis in 'xyz'])
@@ -185,7 +185,7 @@ def gravity_of(headline: Iterable[Named], described: FloatArray) -> FloatArray:
 
 
 def felt_directions(chain: Chain) -> FloatArray:
-    """Return the projection on the directions of gravity that act on any joint, shape (3, 3)."""
+    """Return the projection onto directions of gravity that load any joint, shape (3, 3)."""
     q = np.random.default_rng(0).uniform(-1.5, 1.5, (20, chain.n_joints))
     still = np.zeros_like(q)
     pulls = [chain.with_gravity(unit).torque(q, still, still).ravel() for unit in np.eye(3)]
@@ -195,7 +195,7 @@ def felt_directions(chain: Chain) -> FloatArray:
 
 
 def probabilities(judged: Sequence[LivedJudged]) -> list[tuple[float, bool]]:
-    """Return the probability of each first name, lowest first, and whether it is right."""
+    """Return probability and correctness of each first name, lowest probability first."""
     first = [(j.answer.headline[0].probability, j.first) for j in judged if j.answer.headline]
     known = [pair for pair in first if np.isfinite(pair[0])]
     return sorted(known, key=lambda pair: pair[0])
@@ -204,13 +204,13 @@ def probabilities(judged: Sequence[LivedJudged]) -> list[tuple[float, bool]]:
 def reliability(
     pairs: Sequence[tuple[float, bool]], least: int = 20
 ) -> list[tuple[float, float, int]]:
-    """Return mean probability, share of right names and count of bins of `least` or more."""
+    """Return mean probability, share of right names and count of bins of at least `least`."""
     bins = np.array_split(np.array(pairs, dtype=float).reshape(-1, 2), max(len(pairs) // least, 1))
     return [(*own.mean(axis=0).tolist(), len(own)) for own in bins if len(own)]
 
 
 def score(judged: Sequence[LivedJudged], kind: str = '') -> tuple[Metric, ...]:
-    """Return all metrics of judged cases, with those of their kind."""
+    """Return all rates of judged cases, including those of their kind."""
     free = [j for j in judged if j.cause is None]
     changed = [j for j in judged if j.cause is not None and j.gap >= VISIBLE]
     seen = [j for j in changed if j.nameable]
@@ -247,7 +247,7 @@ def score(judged: Sequence[LivedJudged], kind: str = '') -> tuple[Metric, ...]:
 
 
 def pairs(judged: Sequence[LivedJudged]) -> tuple[Metric, ...]:
-    """Return the rates of causes found in point to point and in periodic motion, and the ratio."""
+    """Return the rates of found causes in point-to-point and periodic motion, and their ratio."""
     by_number = {one.spec.index: one for one in judged}
     whole = [k for k in sorted(by_number) if k % 2 == 0 and k + 1 in by_number]
     periodic = [by_number[k] for k in whole]
@@ -264,7 +264,7 @@ def pairs(judged: Sequence[LivedJudged]) -> tuple[Metric, ...]:
 
 
 def exact(judged: Sequence[LivedJudged]) -> tuple[Metric, ...]:
-    """Return the rates of named payloads and of false alarms, for exact descriptions."""
+    """Return the rates of named payloads and of false alarms for exact descriptions."""
     rows: list[Metric] = []
     for known in ('values', 'names'):
         own = [one for one in judged if one.spec.friction == known]
@@ -299,5 +299,5 @@ _OF_KIND: dict[str, Callable[[Sequence[LivedJudged]], tuple[Metric, ...]]] = {
 
 
 def silent(answer: Answer | None) -> bool:
-    """Return whether there is an answer, and it names nothing."""
+    """Return whether an answer exists and names no effect."""
     return answer is not None and not answer.headline and not answer.error

@@ -41,7 +41,7 @@ def judge_all(
     out: Path | None = None,
 ) -> list[Any]:
     """
-    Judge cases in several processes, with a line of progress each; print the table.
+    Judge cases in several processes, print a line for each and the table of rates.
 
     Parameters
     ----------
@@ -77,7 +77,7 @@ def judge_all(
 
 
 def write_json(path: Path, content: object) -> None:
-    """Write a file with arrays as lists and other objects as numbers."""
+    """Write data as JSON, with arrays as lists and other objects as numbers."""
     text = json.dumps(
         content, indent=1, default=lambda x: x.tolist() if isinstance(x, np.ndarray) else float(x)
     )
@@ -87,7 +87,7 @@ def write_json(path: Path, content: object) -> None:
 @contextmanager
 def look(what: str, log: Path = LOG) -> Iterator[dict[str, Any]]:
     """
-    Record a run on a locked set; SystemExit for uncommitted code.
+    Context manager that records a run on a locked set of cases.
 
     Parameters
     ----------
@@ -113,7 +113,7 @@ def look(what: str, log: Path = LOG) -> Iterator[dict[str, Any]]:
 
 def results_of(metrics: Iterable[Metric]) -> dict[str, dict[str, Any]]:
     """
-    Return metrics for the record; a part of another metric has both names.
+    Return rates as JSON for the record; a subordinate rate has the names of both rates.
 
     Parameters
     ----------
@@ -136,7 +136,7 @@ def results_of(metrics: Iterable[Metric]) -> dict[str, dict[str, Any]]:
 
 
 def clean_commit(log: Path = LOG) -> str:
-    """Return the commit of the tree; SystemExit if a file other than the log is uncommitted."""
+    """Return the current commit; raise SystemExit if a file other than the log changed."""
     git = ['git', '-C', str(log.parent)]
     others = [*git, 'status', '--porcelain', '--', ':/', f':!{log.name}']
     changed = subprocess.check_output(others, text=True).splitlines()

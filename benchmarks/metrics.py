@@ -23,7 +23,7 @@ def wilson(hits: int, total: int) -> tuple[float, float]:
 @dataclass(frozen=True)
 class Metric:
     """
-    One row of the table.
+    One row of a table of rates: name, value, interval and required value.
 
     Attributes
     ----------
@@ -59,7 +59,7 @@ def rate(
     least: float | None = None,
     most: float | None = None,
 ) -> Metric:
-    """Return a row with the share of cases that pass a test, and its required value."""
+    """Return the rate of cases that pass a test, with its interval and required value."""
     hits, total = sum(map(bool, map(test, cases))), len(cases)
     value = hits / total if total else np.nan
     wanted = [f'at least {least:g}'] if least is not None else []
@@ -77,14 +77,14 @@ def number(
     reach: str,
     test: Callable[[float], bool] | None,
 ) -> Metric:
-    """Return a row with a statistic of values, and its required value."""
+    """Return a statistic of values, such as the median, with its required value."""
     value = float(statistic(values)) if len(values) else np.nan
     good = bool(test(value)) if test and len(values) else None
     return Metric(name, value, np.nan, np.nan, len(values), reach, good)
 
 
 def table(metrics: Iterable[Metric]) -> str:
-    """Return metrics as the rows of a table."""
+    """Format rates as a table, one row each."""
     rows = [f'{"":30s} {"value":>7s}  {"95 %":>15s} {"cases":>6s}  reach']
     for metric in metrics:
         interval = '' if np.isnan(metric.low) else f'{metric.low:.3f} - {metric.high:.3f}'

@@ -20,7 +20,7 @@ def multisine(
     tones: Sequence[tuple[float, FloatArray | float]] = TONES,
 ) -> Motion:
     """
-    Return sines of random phases.
+    Return a motion that is a sum of sines with random phases.
 
     Parameters
     ----------

@@ -41,7 +41,7 @@ MS = 10**6
 
 
 def short_run(robot, period, n_periods):
-    """Return a random feasible run."""
+    """Return a random motion within the limits of the arm."""
     rng = np.random.default_rng(0)
     limits = Limits.of(robot, speed='medium')
     trajectory = random_feasible(ArmModel(robot), limits, period, 5, rng)
@@ -50,7 +50,7 @@ def short_run(robot, period, n_periods):
 
 @contextmanager
 def process(context, node, *parameters):
-    """Run a node as a separate process until the block ends."""
+    """Context manager that runs a node as a separate process."""
     environment = {
         **os.environ,
         'ROS_DOMAIN_ID': str(context.get_domain_id()),
@@ -67,13 +67,13 @@ def process(context, node, *parameters):
 
 
 def resident(running):
-    """Return the memory of a process [MB]."""
+    """Return the resident memory of a process [MB]."""
     lines = Path(f'/proc/{running.pid}/status').read_text().splitlines()
     return next(int(line.split()[1]) / 1024.0 for line in lines if line.startswith('VmRSS'))
 
 
 def at_one_kilohertz(seconds, folder):
-    """Identify, diagnose and record an arm at 1 kHz; print losses, memory and update times."""
+    """Run all nodes at 1 kHz, and print lost samples, memory and update times."""
     robot = load_robot(PANDA)
     save_excitation(short_run(robot, 8.0, max(1, int(seconds / 8.0))), folder / 'run.yaml')
     with private_context() as context, steady():
@@ -144,7 +144,7 @@ def at_one_kilohertz(seconds, folder):
 
 def in_lock_step(rate, wanted, folder):
     """
-    Print the speed of all nodes in lock step over real time.
+    Print the speed of all nodes in lock step, relative to real time.
 
     The speed is measured by the clock, which includes delays by other processes, and by
     processor time, as on an idle machine.
@@ -170,7 +170,7 @@ def in_lock_step(rate, wanted, folder):
 
 
 def main():
-    """Measure and print."""
+    """Print the measurements of the nodes."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument('--seconds', type=float, default=60.0, help='at 1 kHz')
     seconds = parser.parse_args().seconds

@@ -33,7 +33,7 @@ FRICTION = {'viscous_friction': 0.5, 'coulomb_friction': 0.3, 'torque_offset': 0
 
 
 def panda():
-    """Load the arm with friction."""
+    """Return the model of the Panda arm with friction."""
     arm = ArmModel(load_robot(str(example_robot('panda_description/urdf/panda.urdf'))))
     for name, value in FRICTION.items():
         arm = arm.with_effect(make_effect(name, arm.robot), np.full(7, value))
@@ -41,14 +41,14 @@ def panda():
 
 
 def motion(arm, minutes, rng):
-    """Return a motion of three sines per joint with noisy torque."""
+    """Return a recording of three sines per joint with noisy torque."""
     t = np.arange(round(60 * minutes * RATE)) / RATE
     exact = multisine(arm.robot.joints, t, rng)
     return exact.with_torque(arm.torque(exact) + 0.05 * rng.normal(size=exact.q.shape))
 
 
 def ours(bag):
-    """Identify with this package; return both times, viscous friction of joint 1, and its std."""
+    """Identify with this package; return wall and processor time, and friction of joint 1."""
     from armid_ros.identification import IdentificationSettings, identify, SignalSettings
 
     arm = panda()
@@ -63,7 +63,7 @@ def ours(bag):
 
 
 def figaroh_arm(robot, recording, cutoff_hz, every=1):
-    """Return the class with which figaroh identifies a robot from every k-th sample."""
+    """Return a subclass of figaroh's identification that uses every k-th sample."""
     from figaroh.identification.base_identification import BaseIdentification
 
     n = robot.n_joints
@@ -106,7 +106,7 @@ def figaroh_arm(robot, recording, cutoff_hz, every=1):
 
 
 def theirs(bag):
-    """Identify with figaroh; return both times, viscous friction of joint 1, and its std."""
+    """Identify with figaroh; return wall and processor time, and friction of joint 1."""
     from pinocchio.robot_wrapper import RobotWrapper
 
     robot = panda().robot

@@ -31,7 +31,7 @@ POSITION_NOISE = 1e-5
 
 
 def update_times(arm: ArmModel, measured: Motion, settings: OnlineSettings) -> str:
-    """Identify online from all samples; return one line of the table of update times."""
+    """Identify online from all samples, and return update times as a table line."""
     online = OnlineIdentifier(arm, settings, rng=np.random.default_rng(0))
     used, with_row = [], []
     assert measured.tau is not None
@@ -50,7 +50,7 @@ def update_times(arm: ArmModel, measured: Motion, settings: OnlineSettings) -> s
 
 
 def main() -> None:
-    """Print update times with default rows and with a row per sample, and with forgetting."""
+    """Print update times with default rows, with a row per sample, and with forgetting."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[1])
     parser.add_argument('--seconds', type=float, default=30.0, help='of motion at 1 kHz')
     seconds = parser.parse_args().seconds

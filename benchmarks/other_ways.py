@@ -45,7 +45,7 @@ RANK = 1e-6
 
 
 def figaroh_estimates(robot: Robot, recordings: list[Recording]) -> Estimates:
-    """Identify each recording with figaroh; return means over the recordings."""
+    """Identify each recording with figaroh, and return mean parameters and deviations."""
     found = defaultdict(list)
     for recording in recordings:
         every = max(round(1.0 / (SAMPLES * recording.period)), 1)
@@ -68,7 +68,7 @@ def figaroh_estimates(robot: Robot, recordings: list[Recording]) -> Estimates:
 
 
 def _place(robot: Robot, name: str) -> tuple[str, str]:
-    """Return name and joint of a base parameter of figaroh, by the first of its sum."""
+    """Return name and joint of the first parameter in a base parameter of figaroh."""
     kind, joint = re.match(r'[^a-zA-Z]*([a-zA-Z]+)_?(.*?)(?:\s|$)', name).groups()
     places = [k for k in robot.joints if k in name.split(' ')[0]]
     joint = max(places, key=len) if places else robot.joints[int(re.findall(r'\d+', joint)[0]) - 1]
@@ -76,7 +76,7 @@ def _place(robot: Robot, name: str) -> tuple[str, str]:
 
 
 def sysid_days(robot: Robot, *days: list[Recording]) -> list[Estimates]:
-    """Fit the description to each day with mujoco.sysid, from the fit of the day before."""
+    """Fit the description to each day with mujoco.sysid, starting at the previous fit."""
     from mujoco import sysid
 
     logging.getLogger('absl').setLevel(logging.ERROR)
@@ -132,7 +132,7 @@ def sysid_days(robot: Robot, *days: list[Recording]) -> list[Estimates]:
 
 
 def _set(name: str, joint: str, spec: mujoco.MjSpec, parameter: Any) -> None:
-    """Write a parameter of a joint into a description."""
+    """Set a parameter of a joint in a MuJoCo model."""
     hinge, value = spec.joint(joint), parameter.value[0]
     if name == 'viscous_coefficient':
         hinge.damping = [value, 0.0, 0.0]
@@ -147,7 +147,7 @@ def _set(name: str, joint: str, spec: mujoco.MjSpec, parameter: Any) -> None:
 def _stretches(
     robot: Robot, model: mujoco.MjModel, day: list[Recording], period: float
 ) -> tuple[list[Any], ...]:
-    """Return names, initial states, torques and positions of stretches of recordings."""
+    """Divide recordings into short stretches with initial state, torque and positions."""
     from mujoco import sysid
 
     order = [model.joint(joint).qposadr[0] for joint in robot.joints]

@@ -31,14 +31,14 @@ WITHIN = 1.0
 
 
 def payloads() -> Iterator[LivedCase]:
-    """Yield the development arms with a payload."""
+    """Yield the development cases in which a payload was added."""
     for k in count():
         if specify('development', k).cause == 'payload':
             yield lived_case('development', k)
 
 
 def answer(case: LivedCase, seed: int) -> tuple[Diagnosis, list[tuple[float, float]]]:
-    """Return the diagnosis of an arm, and the true span of the payload in each recording [s]."""
+    """Diagnose an arm; also return the true time span of the payload in each recording [s]."""
     rng = np.random.default_rng(seed)
     day_1, recordings, spans = [run.recording for run in case.day_1], [], []
     for run in (*case.day_2, case.held_out):
@@ -61,7 +61,7 @@ def answer(case: LivedCase, seed: int) -> tuple[Diagnosis, list[tuple[float, flo
 
 
 def main() -> None:
-    """Print the named effects and the errors of their spans."""
+    """Print the named effects and the errors of their time spans."""
     draws = int(sys.argv[1]) if len(sys.argv) > 1 else 12
     named = timed = 0
     for seed, case in enumerate(islice(payloads(), draws)):

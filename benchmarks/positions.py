@@ -35,7 +35,7 @@ STEP = 1e-3
 
 
 def case(seed):
-    """Return name, robot, secret, recordings and known gains of an arm."""
+    """Return name, description, true values, recordings and controller gains of an arm."""
     rng = np.random.default_rng(1000 + seed)
     name = 'chain' if seed == 9 else ARMS[seed]
     robot = random_chain(rng) if name == 'chain' else load_machine(name)
@@ -51,18 +51,18 @@ def case(seed):
 
 
 class CountedModel(LoopModel):
-    """A loop model that counts its simulations."""
+    """Model of arm and controller that counts its simulations."""
 
     count = 0
 
     def simulated(self, x, windows):
-        """Count, and simulate."""
+        """Simulate the closed loop, and count the simulation."""
         CountedModel.count += 1
         return super().simulated(x, windows)
 
 
 def rollouts(robot, recording, commanded):
-    """Return a function of parameters and bias: simulated minus measured positions [mrad]."""
+    """Return a function of parameters and encoder bias: position errors of rollouts [mrad]."""
     n = robot.n_joints
     commands = CommandedMotion.of(commanded, recording)
     edges = STEP * np.arange(round(recording.t[-1] / STEP) + 2)
@@ -86,7 +86,7 @@ def rollouts(robot, recording, commanded):
 
 def pace_way(robot, apart, known, budget):
     """
-    Fit by CMA-ES with a number of simulations; return the values.
+    Fit parameters by CMA-ES with a given number of simulations (method of PACE).
 
     The mean starts in the middle of the bounds, with a standard deviation of a quarter of them.
 
@@ -107,7 +107,7 @@ def pace_way(robot, apart, known, budget):
 
 
 def minimised(cost, mean, sigma, budget, rng):
-    """Return the final mean of CMA-ES between 0 and 1 (Hansen 2016, table 1)."""
+    """Return the minimiser, between 0 and 1, of a cost by CMA-ES (Hansen 2016, table 1)."""
     size = len(mean)
     many = 4 + int(3.0 * np.log(size))
     weights = np.log(many / 2 + 0.5) - np.log(np.arange(1, many // 2 + 1))
@@ -143,7 +143,7 @@ def minimised(cost, mean, sigma, budget, rng):
 
 
 def own_way(robot, apart, start, size, gains):
-    """Fit a model of MuJoCo by rollouts; return the values and their standard errors."""
+    """Fit a MuJoCo model to rollouts by least squares; return values and standard errors."""
     n = robot.n_joints
     free = np.ones(len(start), dtype=bool)
     free[1 : 2 * n + 1] = gains is None
@@ -170,7 +170,7 @@ def own_way(robot, apart, start, size, gains):
 
 
 def shown(model, values, std, truth, determined):
-    """Return errors of delay [ms] and, in per cent, of friction, and intervals that hold."""
+    """Format the errors of delay [ms] and friction [%], and the coverage of intervals."""
     names = [one.name for one in model.parameters]
     wanted = np.array([truth[one.name, one.joint] for one in model.parameters])
     of = {name: np.array([one == name for one in names]) for name in set(names)}
@@ -185,7 +185,7 @@ def shown(model, values, std, truth, determined):
 
 
 def main(number=10, first=0, ways='mujoco,pace'):
-    """Print a row for each arm and way."""
+    """Print a row for each arm and each fitting method."""
     print('arm             way     delay  viscous  dry   rotor  held   runs    time')
     print('                         [ms]    [%]     [%]   [%]                  [s]')
     total = {'armid': [0, 0], 'mujoco': [0, 0]}

@@ -64,7 +64,7 @@ RESULTS = Path(__file__).parent / 'results' / 'public.json'
 
 
 def cases(seed: int, count: int) -> Iterator[tuple[str, LivedCase]]:
-    """Yield the names of folders and the cases, in random order, on arms that the seed draws."""
+    """Yield folder name and case in random order, for arms that the seed determines."""
     order = np.random.default_rng(seed).permutation(count).tolist()
     for number, index in enumerate(order):
         own, shared = (
@@ -79,7 +79,7 @@ def cases(seed: int, count: int) -> Iterator[tuple[str, LivedCase]]:
 
 
 def make(folder: Path, seed: int, count: int) -> None:
-    """Write the recordings of cases, and no truth."""
+    """Write descriptions and recordings of all cases, without the true causes."""
     for name, case in cases(seed, count):
         (folder / name).mkdir(parents=True)
         (folder / name / 'arm.urdf').write_text(case.robot.urdf, encoding='utf-8')
@@ -90,7 +90,7 @@ def make(folder: Path, seed: int, count: int) -> None:
 
 
 def answer(case: Path, method: str) -> dict[str, Any]:
-    """Return the answer of a method to one case."""
+    """Return the answer of a diagnosis method to one case."""
     robot = load_robot(str(case / 'arm.urdf'))
     day_1, day_2, held_out = (
         [read_recording(path, robot) for path in sorted(case.glob(f'{day}_*'))]
@@ -107,7 +107,7 @@ def answer(case: Path, method: str) -> dict[str, Any]:
 
 
 def own_days(robot: Robot, *days: list[Recording]) -> list[Estimates]:
-    """Identify each day with this tool."""
+    """Return value and standard deviation of each parameter and day, by this tool."""
     found = [identification_of(robot, day).estimate for day in days]
     return [
         {
@@ -118,21 +118,16 @@ def own_days(robot: Robot, *days: list[Recording]) -> list[Estimates]:
     ]
 
 
-def figaroh_days(robot: Robot, *days: list[Recording]) -> list[Estimates]:
-    """Identify each day with figaroh."""
-    return [figaroh_estimates(robot, day) for day in days]
-
-
 #: Methods that identify both days: from robot and recordings to estimates.
 DAYS: dict[str, Callable[..., list[Estimates]]] = {
     'parameters': own_days,
-    'figaroh': figaroh_days,
+    'figaroh': lambda robot, *days: [figaroh_estimates(robot, day) for day in days],
     'sysid': sysid_days,
 }
 
 
 def changed_parameter(before: Estimates, after: Estimates) -> dict[str, Any]:
-    """Name the parameter with the most significant difference."""
+    """Return an answer that names the parameter with the most significant difference."""
     most, found = SIGNIFICANT, {'verdict': 'consistent', 'effects': []}
     for (name, joint), (value, std) in before.items():
         other, spread = after.get((name, joint), (value, 0.0))
@@ -145,7 +140,7 @@ def changed_parameter(before: Estimates, after: Estimates) -> dict[str, Any]:
 
 
 def judged(seed: int, count: int, answers: Path) -> list[LivedJudged]:
-    """Make the cases again, and judge the answers; a case without an answer has failed."""
+    """Create the cases again, and judge the answers; a missing answer has failed."""
     given = json.loads(answers.read_text(encoding='utf-8'))
     missing = Answer('failed', error='no answer')
     return [
@@ -155,7 +150,7 @@ def judged(seed: int, count: int, answers: Path) -> list[LivedJudged]:
 
 
 def main() -> None:
-    """Make cases, answer them or score answers."""
+    """Make cases, answer them, or score answers, as the command line states."""
     parser = argparse.ArgumentParser(prog='python -m benchmarks.public', description=__doc__)
     parser.formatter_class = argparse.RawDescriptionHelpFormatter
     commands = parser.add_subparsers(dest='command', required=True)

@@ -60,7 +60,7 @@ judged by the rules before.
 
 def page(looks: str, rates: str) -> str:
     """
-    Return the page.
+    Return the Markdown page of success rates.
 
     Parameters
     ----------
@@ -110,7 +110,7 @@ def page(looks: str, rates: str) -> str:
 
 
 def public_page(public: str) -> str:
-    """Return the page of the public benchmark; `public` is the content of public.json."""
+    """Return the Markdown page of the public benchmark from the content of public.json."""
     found = json.loads(public)
     return '\n'.join(
         [
@@ -136,7 +136,7 @@ def public_page(public: str) -> str:
 
 
 def _added(looks: Iterable[dict[str, Any]]) -> dict[str, Any]:
-    """Return the rates of several looks together."""
+    """Return the pooled rates of several recorded runs."""
     total: dict[str, list[int]] = {}
     for look in looks:
         for name, found in look.items():
@@ -148,6 +148,7 @@ def _added(looks: Iterable[dict[str, Any]]) -> dict[str, Any]:
 
 
 def _share(found: dict[str, Any]) -> tuple[str, str]:
+    """Format a recorded rate with its 95 % interval."""
     return _right([round(found['value'] * found['cases']), found['cases']])
 
 
@@ -160,7 +161,7 @@ def _of(pair: list[int] | None) -> str:
 
 
 def _right(pair: list[int]) -> tuple[str, str]:
-    """Return a rate and its 95 % interval."""
+    """Format the rate of right names with its 95 % interval."""
     low, high = wilson(*pair)
     return _of(pair), f'{100.0 * low:.0f} - {100.0 * high:.0f} %'
 

@@ -44,7 +44,7 @@ Arrays = tuple[FloatArray, FloatArray, FloatArray, FloatArray]
 
 
 def write_file(path: Path, count: int, compression: CompressionType, topics: list[str]) -> None:
-    """Write a file with a number of messages on the first topic, and as many on the others."""
+    """Write an MCAP file with a number of messages on each topic."""
     described = message_type(JOINT_STATE)
     with path.open('wb') as stream:
         writer = Writer(
@@ -66,7 +66,7 @@ def write_file(path: Path, count: int, compression: CompressionType, topics: lis
 
 
 def motion_messages(stamps: np.ndarray, number: int) -> list[bytes]:
-    """Return messages of a moving arm with noise; each topic has another frame."""
+    """Return serialised joint states of a moving arm with noise."""
     t = (stamps - START_NS)[:, np.newaxis] * 1e-9
     rates = np.linspace(0.3, 2.0, len(JOINTS)) * (1 + number)
     noise = np.random.default_rng(int(stamps[0] % 2**32)).normal(size=(3, len(t), len(JOINTS)))
@@ -78,14 +78,14 @@ def motion_messages(stamps: np.ndarray, number: int) -> list[bytes]:
 
 
 def read_ours(path: Path) -> Arrays:
-    """Read with this package."""
+    """Read the joint states of a topic with this package."""
     recording = read_recording(path, joints=JOINTS, topic=TOPIC)
     assert recording.dq is not None and recording.tau is not None
     return recording.t, recording.q, recording.dq, recording.tau
 
 
 def read_rosbags(path: Path) -> Arrays:
-    """Read with rosbags: its high-level reader and its decoder."""
+    """Read the joint states of a topic with the reader and decoder of rosbags."""
     with AnyReader([path], default_typestore=get_typestore(Stores.ROS2_JAZZY)) as reader:
         connections = [c for c in reader.connections if c.topic == TOPIC]
         return stacked(
@@ -95,7 +95,7 @@ def read_rosbags(path: Path) -> Arrays:
 
 
 def read_mcap_ros2(path: Path) -> Arrays:
-    """Read with mcap's reader and mcap-ros2-support's decoder."""
+    """Read the joint states of a topic with mcap and mcap-ros2-support."""
     with path.open('rb') as stream:
         reader = make_reader(stream, decoder_factories=[DecoderFactory()])
         decoded = reader.iter_decoded_messages(topics=[TOPIC], log_time_order=False)
@@ -103,7 +103,7 @@ def read_mcap_ros2(path: Path) -> Arrays:
 
 
 def stacked(messages: Iterable[Any]) -> Arrays:
-    """Return arrays of messages decoded one by one, as stored messages slow garbage collection."""
+    """Return the arrays of decoded messages, copied one by one to keep no message."""
     stamps, position, velocity, effort = [], [], [], []
     for message in messages:
         stamp = message.header.stamp
@@ -125,7 +125,7 @@ READERS: dict[str, Callable[[Path], Arrays]] = {
 def measure(
     read: Callable[[Path], Arrays], path: Path, repeats: int
 ) -> tuple[float, float, Arrays]:
-    """Return the median time and processor time of some runs [s], and the arrays."""
+    """Return the median wall and processor time of several runs [s], and the arrays read."""
     seconds, used = [], []
     for _ in range(repeats):
         begin, used_before = time.perf_counter(), time.process_time()
@@ -136,7 +136,7 @@ def measure(
 
 
 def compare(path: Path, count: int, wanted: float, title: str) -> bool:
-    """Print one table; return whether the wanted ratio is reached."""
+    """Print the times of all readers for a file, and return whether the ratio is reached."""
     seconds, used, arrays = {}, {}, {}
     for name, read in READERS.items():
         # other programs may disturb a short run; a long one averages over them
@@ -159,7 +159,7 @@ def compare(path: Path, count: int, wanted: float, title: str) -> bool:
 
 
 def main() -> None:
-    """Write the files, read them with all readers, print the tables."""
+    """Write the files, read them with all readers, and print the times."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[1])
     parser.add_argument('--messages', type=int, default=1_000_000, help='on the topic read')
     count = parser.parse_args().messages

@@ -43,7 +43,7 @@ _SWING_UP = 8.0
 @dataclass(frozen=True)
 class RealDays:
     """
-    A machine on two days.
+    Recordings and description of a real machine on two days.
 
     Attributes
     ----------
@@ -69,7 +69,7 @@ class RealDays:
 
 
 def builds(data: Path, out: Path) -> RealDays:
-    """Return builds C.0 and C.1 of the double pendulum, driven by the same commanded torques."""
+    """Return builds C.0 and C.1 of the double pendulum as the two days, with equal commands."""
     before, after = ([_pendulum(data, name, 'tau_meas') for name in names] for names in (_C0, _C1))
     return RealDays(
         'double pendulum, builds C.0 and C.1',
@@ -83,7 +83,7 @@ def builds(data: Path, out: Path) -> RealDays:
 
 
 def pushes(data: Path, out: Path, task: str = 'acrobot') -> RealDays:
-    """Return runs of the double pendulum without and with pushes that the command lacks."""
+    """Return the double pendulum without and with pushes that are not commanded."""
     before, after = {
         'acrobot': (('experiment01', 'experiment02'), ('experiment01', 'experiment04')),
         'pendubot': (('experiment02',), ('experiment02',)),
@@ -110,7 +110,7 @@ def payload(data: Path, out: Path) -> RealDays:
 
 
 def hand_guided(data: Path, out: Path) -> RealDays:
-    """Return the simple pendulum alone, and guided by a hand while its motor holds its weight."""
+    """Return the simple pendulum moving freely, and guided by a hand."""
     return _swings(
         data,
         'guided by a hand',
@@ -120,7 +120,7 @@ def hand_guided(data: Path, out: Path) -> RealDays:
 
 
 def _swings(data: Path, what: str, after: Recording, wanted: str) -> RealDays:
-    """Return the simple pendulum with its plain bob, and another recording of it."""
+    """Return the simple pendulum with its plain bob as day 1, and a recording as day 2."""
     robot = data / 'dfki_simple_pendulum' / 'parameters' / 'dfki_simple_pendulum.urdf'
     before = (
         _swing(data, 'payload_0p5kg/energy_shaping', _SWING_UP),
@@ -132,7 +132,7 @@ def _swings(data: Path, what: str, after: Recording, wanted: str) -> RealDays:
 
 
 def fr3(data: Path, out: Path, first: Sequence[int] = (0, 1)) -> RealDays:
-    """Return four motions of a Franka FR3 without a change; day 1 has those with given indices."""
+    """Return an unchanged Franka FR3; day 1 consists of the motions with given indices."""
     files = sorted((data / 'franka_fr3_teleop' / 'data').glob('*.npy.gz'))
     robot = load_robot(str(example_robot('panda_description/urdf/panda.urdf')), gravity='earth')
     runs = [_franka(path, robot.joints) for path in files]
@@ -163,7 +163,7 @@ DAYS: Mapping[str, Callable[[Path, Path], RealDays]] = MappingProxyType(
 
 
 def main() -> None:
-    """Print the true changes, and the answers below them."""
+    """Print the true change and the answer of the diagnosis for each machine."""
     texts = sys.argv[1:]
     with tempfile.TemporaryDirectory() as out:
         for name, load in DAYS.items():
@@ -189,7 +189,7 @@ def main() -> None:
 
 
 def _table(path: Path) -> dict[str, np.ndarray]:
-    """Return the columns of a CSV file with a header, by name."""
+    """Return the columns of a CSV file by their heads."""
     raw = path.read_bytes()
     text = (gzip.decompress(raw) if path.suffix == '.gz' else raw).decode()
     names = [name.strip() for name in text.partition('\n')[0].split(',')]
@@ -226,7 +226,7 @@ def _franka(path: Path, joints: tuple[str, ...]) -> Recording:
 def _recording(
     joints: tuple[str, ...], t: np.ndarray, q: np.ndarray, dq: np.ndarray, tau: np.ndarray
 ) -> Recording:
-    """Return a recording that begins at zero, without rows that repeat a stamp."""
+    """Return a recording that begins at zero, without repeated time stamps."""
     later = np.concatenate([[True], np.diff(np.maximum.accumulate(t)) > 0.0])
     t, q, dq, tau = (x[later] for x in (t, q, dq, tau))
     return Recording(joints=joints, t=t - t[0], q=q, dq=dq, tau=tau)
@@ -234,7 +234,7 @@ def _recording(
 
 def _double_pendulum(data: Path, out: Path, design: str) -> Robot:
     """
-    Load a double pendulum.
+    Return the description of a double pendulum, corrected for the recorded motion.
 
     The link 'world', which the description lacks, is added. The joints are made continuous, as
     swing-ups exceed the described limits of half a turn.

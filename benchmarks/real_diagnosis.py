@@ -69,7 +69,7 @@ LAWS: dict[str, Law] = {
 @dataclass(frozen=True)
 class Question:
     """
-    A diagnosis whose answer is known.
+    A question to the diagnosis whose answer is known.
 
     Attributes
     ----------
@@ -95,13 +95,13 @@ class Question:
 
     @property
     def label(self) -> str:
-        """Return the question in a few words."""
+        """Question in a few words."""
         where = f' in {self.joint}' if self.joint else ''
         return f'{self.machine} {self.what} {self.name}{where}'.strip()
 
 
 def questions(machines: Machines) -> Iterator[Question]:
-    """Yield all questions; an effect is added to the joint in which it is most visible."""
+    """Yield all questions; an added effect acts on the joint in which it is most visible."""
     for machine in KNOWN:
         yield Question(machine, 'from rigid')
     for machine, terms in KNOWN.items():
@@ -119,7 +119,7 @@ def questions(machines: Machines) -> Iterator[Question]:
 
 
 class Machines:
-    """Recordings and models, read once."""
+    """Cache of the recordings and models of all machines."""
 
     def __init__(self, data: Path, out: Path) -> None:
         self._data, self._out = data, out
@@ -127,7 +127,7 @@ class Machines:
         self._left: dict[str, FloatArray] = {}
 
     def bare(self, machine: str) -> tuple[ArmModel, Recording]:
-        """Return a rigid arm and its recording."""
+        """Return the rigid-body model and the recording of a machine."""
         if machine not in self._read:
             maker = getattr(real_recordings, machine)
             bags = maker(self._data) if machine == 'ur10' else maker(self._data, self._out)
@@ -146,13 +146,13 @@ class Machines:
         return diagnose(arm, [recording], rng=np.random.default_rng(0))
 
     def with_effect(self, question: Question) -> Recording:
-        """Return the recording with a torque added to the measured one in one joint."""
+        """Return the recording with the torque of an effect added to the measured torque."""
         _, recording = self.bare(question.machine)
         size = question.size / self.visible(question)
         return replace(recording, tau=recording.tau + size * self._added(question))
 
     def visible(self, question: Question) -> float:
-        """Return the share of the added torque that a fit does not absorb, rms over rms."""
+        """Return the rms share of an added torque that a refitted model does not absorb."""
         bare, recording = self.bare(question.machine)
         known = known_arm(bare, question.machine, None)
         with_it = replace(recording, tau=recording.tau + self._added(question))
@@ -166,7 +166,7 @@ class Machines:
         return float(seen[joint] / self.left(question.machine)[joint])
 
     def _added(self, question: Question) -> FloatArray:
-        """Return a torque with the rms of the residual of its joint, shape (N, n) [N m]."""
+        """Return torque of an effect, (N, n) [N m], scaled to the rms residual of its joint."""
         arm, recording = self.bare(question.machine)
         joint = arm.robot.joints.index(question.joint)
         rate = 1.0 / float(np.median(np.diff(recording.t)))
@@ -181,7 +181,7 @@ class Machines:
         return added
 
     def left(self, machine: str) -> FloatArray:
-        """Return the rms residual of the known model, or its noise if larger, (n,) [N m]."""
+        """Return the rms residual or, if larger, the noise of each joint, (n,) [N m]."""
         if machine not in self._left:
             bare, recording = self.bare(machine)
             found = diagnose(
@@ -193,7 +193,7 @@ class Machines:
 
 
 def known_arm(bare: ArmModel, machine: str, without: str | None) -> ArmModel:
-    """Return the arm with the known effects of its machine, except one."""
+    """Return the model of a machine with all known effects but one."""
     arm = bare
     for name, joints in KNOWN[machine]:
         if name != without:
@@ -202,7 +202,7 @@ def known_arm(bare: ArmModel, machine: str, without: str | None) -> ArmModel:
 
 
 def answered(question: Question, found: Diagnosis) -> str:
-    """Return whether the right effect in its joint is first, named, among rivals, or NOT."""
+    """Return 'first', 'named', 'among' or 'NOT': where the right effect is in the answer."""
     if not question.name:
         return ''
     wanted = {question.joint} if question.joint else set()
@@ -219,13 +219,13 @@ def error_percent(found: Diagnosis) -> float:
     assert found.gap is not None
     squares = np.zeros(2)
     for one in found.gap.overlays:
-        told = one.trajectory.informative
-        squares += [np.sum(x**2, where=told) for x in (one.measured - one.after, one.measured)]
+        used = one.trajectory.informative
+        squares += [np.sum(x**2, where=used) for x in (one.measured - one.after, one.measured)]
     return float(100.0 * np.sqrt(squares[0] / squares[1]))
 
 
 def main() -> None:
-    """Print the table."""
+    """Print question and answer for each machine."""
     texts = sys.argv[1:]
     with tempfile.TemporaryDirectory() as out:
         machines = Machines(real_recordings.folder(), Path(out))

@@ -48,7 +48,7 @@ TX40_PERIOD = 2e-4
 @dataclass(frozen=True)
 class RealData:
     """
-    Bags of one machine and its description.
+    Bags and description of one real machine.
 
     Attributes
     ----------
@@ -64,7 +64,7 @@ class RealData:
 
 
 def folder() -> Path:
-    """Return the folder of the recordings; without one, end the program with a line."""
+    """Return the folder of the recordings; end the program with a message without ARMID_DATA."""
     if 'ARMID_DATA' not in os.environ:
         print('ARMID_DATA names no folder with recordings of real machines', file=sys.stderr)
         raise SystemExit(0)
@@ -72,7 +72,7 @@ def folder() -> Path:
 
 
 def emps(data: Path, out: Path) -> RealData:
-    """Make bags of the electro-mechanical positioning system: motion, and motion with pulses."""
+    """Return bags of the electro-mechanical positioning system, without and with pulses."""
     robot = out / 'emps.urdf'
     robot.write_text(EMPS_URDF, encoding='utf-8')
     bags = []
@@ -85,7 +85,7 @@ def emps(data: Path, out: Path) -> RealData:
 
 
 def tx40(data: Path, out: Path) -> RealData:
-    """Make a bag of the Staubli TX40, joint side, with the coupling of its wrist resolved."""
+    """Return a bag of the Staubli TX40 on the joint side, with its wrist coupling resolved."""
     files = data / 'tx40_staubli'
     motor = np.loadtxt(files / 'pos_read_data.csv', delimiter=',', skiprows=1)
     current = np.loadtxt(files / 'curr_data.csv', delimiter=',', skiprows=1)
@@ -97,13 +97,13 @@ def tx40(data: Path, out: Path) -> RealData:
 
 
 def ur10(data: Path) -> RealData:
-    """Return the bag of the UR10, an unchanged ROS 2 recording, and its description."""
+    """Return the unchanged ROS 2 bag of the UR10, and its description."""
     robot = example_robot('ur_description/urdf/ur10_robot.urdf')
     return RealData(robot, (data / 'ur10_ros2bag' / 'ur10_exciting_trajectory.db3',))
 
 
 def example_robot(path: str) -> Path:
-    """Return a description of the package example-robot-data."""
+    """Return the URDF of a robot of the package example-robot-data."""
     package = distribution('example-robot-data')
     wanted = f'share/example-robot-data/robots/{path}'
     (found,) = [file for file in package.files or [] if str(file).endswith(wanted)]

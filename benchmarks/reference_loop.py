@@ -10,7 +10,7 @@ import numpy as np
 
 
 def loop() -> float:
-    """Return the processor time [s] of interpreted steps and of small linear algebra."""
+    """Return the processor time of a fixed loop of interpreted steps and linear algebra [s]."""
     begin, total = time.process_time(), 0.0
     for k in range(3_000_000):
         total += k * 0.5
@@ -21,7 +21,7 @@ def loop() -> float:
 
 
 def processor() -> str:
-    """Return the name of the processor."""
+    """Return the model name of the processor."""
     with open('/proc/cpuinfo', encoding='utf-8') as info:
         names = (line.split(': ')[1] for line in info if line.startswith('model name'))
         return next(names, '?').strip()

@@ -37,14 +37,14 @@ REPETITIONS = 100
 
 
 def main() -> None:
-    """Print a table per arm."""
+    """Print the simulation speed of each arm."""
     panda = str(example_robot('panda_description/urdf/panda.urdf'))
     for name, source in (('humanoid arm, 6 joints', 'humanoid_arm'), ('Panda, 7 joints', panda)):
         report(name, load_robot(source))
 
 
 def report(name: str, robot: Robot) -> None:
-    """Measure one arm and print its table."""
+    """Measure the simulation speed of one arm, and print a table."""
     reference, controller = swinging(robot), ComputedTorque(ArmModel(robot))
     plant, rng = Plant(with_friction(robot)), np.random.default_rng(0)
     sensors = Sensors(
@@ -80,7 +80,7 @@ def report(name: str, robot: Robot) -> None:
 
 
 def with_friction(robot: Robot) -> ArmModel:
-    """Return the robot with friction of a few per cent of its drive torques, and with rotors."""
+    """Return the arm with rotor inertias, and friction of a few per cent of the torque limits."""
     drive = np.minimum(robot.torque_limit, 100.0)
     arm = ArmModel(robot).with_effect(make_effect('viscous_friction', robot), 0.02 * drive)
     arm = arm.with_effect(make_effect('coulomb_friction', robot), 0.03 * drive)
@@ -88,7 +88,7 @@ def with_friction(robot: Robot) -> ArmModel:
 
 
 def swinging(robot: Robot) -> Reference:
-    """Return a motion of all joints in a quarter of their range, at different frequencies."""
+    """Return a sinusoidal motion of all joints over a quarter of their ranges."""
     t = np.linspace(0.0, SECONDS, 26)[:, np.newaxis]
     w = np.linspace(4.0, 8.0, robot.n_joints)
     middle, reach = (robot.upper + robot.lower) / 2, (robot.upper - robot.lower) / 8
@@ -99,7 +99,7 @@ def swinging(robot: Robot) -> Reference:
 
 
 def repeated(call: Callable[[], object], number: int) -> list[float]:
-    """Return the times of a call [s], each averaged over `number` calls."""
+    """Return repeated measurements of the time of a call [s], averaged over `number` calls."""
     times = []
     for _ in range(REPETITIONS):
         start = time.process_time()

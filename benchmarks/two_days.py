@@ -33,7 +33,7 @@ UNEXPLAINED = ('unknown', 'partial')
 @dataclass(frozen=True)
 class Named:
     """
-    A cause in a headline.
+    Named cause in the headline of a diagnosis.
 
     Attributes
     ----------
@@ -64,16 +64,16 @@ class Named:
 
     @property
     def names(self) -> set[str]:
-        """Names of the cause and of its rivals."""
+        """Name of the cause, then of its rivals."""
         return {self.name, *(name for name, _ in self.rivals)}
 
     def joints_of(self, name: str) -> tuple[str, ...]:
-        """Return the joints of the cause, or of its rival with a name."""
+        """Return the joints of the cause, or of a rival with the given name."""
         return self.joints if name == self.name else dict(self.rivals).get(name, self.joints)
 
     def parameter_errors(self, truth: Sequence[Parameter]) -> list[tuple[float, bool]]:
         """
-        Compare the parameters with the true ones.
+        Return the relative error of each parameter, and whether its interval is right.
 
         Returns
         -------
@@ -93,7 +93,7 @@ class Named:
         return errors
 
     def __str__(self) -> str:
-        """Return names, joints and share in a line."""
+        """Return names, joints and share as a line of text."""
         where = ','.join(self.joints) if len(self.joints) < 4 else f'{len(self.joints)} joints'
         share = '' if np.isnan(self.share) else f' {self.share:.2f}'
         return '|'.join((self.name, *dict(self.rivals))) + (f'@{where}' if where else '') + share
@@ -102,7 +102,7 @@ class Named:
 @dataclass(frozen=True)
 class Answer:
     """
-    Answer of a diagnosis.
+    Verdict and headline of a diagnosis, or its error.
 
     Attributes
     ----------
@@ -128,7 +128,7 @@ class Answer:
 
 
 def known_arm(robot: Robot, known: Sequence[Any]) -> ArmModel:
-    """Return a described arm with its known effects, with or without values."""
+    """Return the model of a described arm with known effects, with or without values."""
     arm = ArmModel(robot)
     for one in known:
         arm = arm.with_effect(CATALOGUE[one.name].on(robot, one.joints), one.values)
@@ -136,7 +136,7 @@ def known_arm(robot: Robot, known: Sequence[Any]) -> ArmModel:
 
 
 def identification_of(robot: Robot, recordings: Sequence[Recording]) -> Identification:
-    """Identify an arm as `armid identify` does with its defaults."""
+    """Identify an arm with the default settings of `armid identify`."""
     arm = ArmModel.of(robot, effects=USUAL_EFFECTS)
     return identify(arm, list(recordings), rng=np.random.default_rng(0))
 
@@ -152,7 +152,7 @@ def ask(
     contributions: Sequence[FloatArray] = (),
 ) -> Answer:
     """
-    Return the answer of the diagnosis on an arm.
+    Diagnose an arm on the second day, and return the answer.
 
     Parameters
     ----------
