@@ -50,7 +50,7 @@ def record(
 
 def walk(pair: TiedPair, gait: Gait, stiffness: float | None, tick: Tick) -> SimulatedWalk:
     """Simulate a gait cycle of exoskeleton and wearer, and joints driven by their torque."""
-    tick(0.6, 'walking a whole cycle')
+    tick(0.6, 'simulating a gait cycle')
     walkers = walking_pair(stiffness)
     cycle, rate = gait_cycle(walkers, gait), read_assumptions()['torque_rate'].value
     soft = walkers.with_stiffness((1.0 - STIFFNESS_ERROR) * walkers.stiffness)

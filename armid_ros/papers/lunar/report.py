@@ -59,25 +59,25 @@ def verdict(found: Reproduction) -> VerdictSection:
     """Return the verdict box: torque errors beside those of the paper, and the load."""
     lines, held = [], True
     for one in found.repeated:
-        slow, whole = (one.ratio(method.held_out) for method in one.methods)
+        gravity, dynamics = (one.ratio(method.held_out) for method in one.methods)
         name = f'Table {one.table.number} ({one.table.title})'
         if one.table.uniform:
             low, high = (digits(float(end)) for end in np.sort(one.table.ratio)[[0, -1]])
             lines.append(
-                f'{name}: error over noise at most {digits(float(slow.max()))} with gravity '
-                f'alone, {digits(float(whole.max()))} with the full dynamics. '
+                f'{name}: error over noise at most {digits(float(gravity.max()))} with gravity '
+                f'alone, {digits(float(dynamics.max()))} with the full dynamics. '
                 f'The paper has {low} to {high}; less is better.'
             )
-            held &= bool(slow.max() <= 0.15)  # of the noise
+            held &= bool(gravity.max() <= 0.15)  # of the noise
             continue
         noisy = one.ratio(one.methods[0].noisy)
         paper = 100.0 * float(np.mean(one.table.ratio))
-        held &= bool(100.0 * slow.mean() <= 1.0)  # % of the peak
+        held &= bool(100.0 * gravity.mean() <= 1.0)  # % of the peak
         lines += [
             f'{name}: mean torque error {digits(100.0 * float(noisy.mean()))} % of the peak '
             f'torque; the paper has {digits(paper)} %.',
-            f'Without torque noise it is {digits(100.0 * float(slow.mean()))} % with gravity '
-            f'alone, {digits(100.0 * float(whole.mean()))} % with the full dynamics.',
+            f'Without torque noise it is {digits(100.0 * float(gravity.mean()))} % with gravity '
+            f'alone, {digits(100.0 * float(dynamics.mean()))} % with the full dynamics.',
         ]
     lines.append(
         f'The {len(found.composites)} gravity parameters give a load of {_load(found)} in the '
@@ -109,7 +109,7 @@ def tables_section(repeated: Sequence[Repeated]) -> ContentSection:
 
 def _table(one: Repeated) -> DataTable:
     """Return one table of the paper, with the rows of the repetition."""
-    slow, whole = one.methods
+    gravity, dynamics = one.methods
     scale, error, share = 100.0, 'RMSE', 'RMSE over peak [%]'
     if one.table.uniform:
         scale, error, share = 1.0, 'MAE', 'MAE over noise'
@@ -117,13 +117,13 @@ def _table(one: Repeated) -> DataTable:
         scale * ratio
         for ratio in (
             one.table.ratio,
-            one.ratio(slow.noisy),
-            one.ratio(slow.held_out),
-            one.ratio(whole.held_out),
+            one.ratio(gravity.noisy),
+            one.ratio(gravity.held_out),
+            one.ratio(dynamics.held_out),
         )
     ]
     peaks = {'paper': one.table.peak, 'largest': one.peak}
-    errors = {'paper': one.table.error, 'gravity': slow.held_out, 'dynamics': whole.held_out}
+    errors = {'paper': one.table.error, 'gravity': gravity.held_out, 'dynamics': dynamics.held_out}
     rows = [
         *((f'Peak, {by} [N mm]', *_cells(1e3 * x, 3), '') for by, x in peaks.items()),
         *((f'{error}, {by} [N mm]', *_cells(1e3 * x), '') for by, x in errors.items()),
@@ -204,12 +204,12 @@ def lunar_document(found: Reproduction) -> dict[str, Any]:
     tables = []
     for one in found.repeated:
         scale = 1.0 if one.table.uniform else 100.0
-        slow, whole = one.methods
+        gravity, dynamics = one.methods
         values = {
             'paper': scale * one.table.ratio,
-            'against_noise': scale * one.ratio(slow.noisy),
-            'weight_alone': scale * one.ratio(slow.held_out),
-            'whole_dynamics': scale * one.ratio(whole.held_out),
+            'against_noise': scale * one.ratio(gravity.noisy),
+            'weight_alone': scale * one.ratio(gravity.held_out),
+            'whole_dynamics': scale * one.ratio(dynamics.held_out),
             'paper_peak': one.table.peak,
             'largest_torque': one.peak,
         }

@@ -252,7 +252,7 @@ def identify_two_inertia(
     loop : VelocityLoop
         Gains of the velocity loop of the step responses.
     steps : sequence of ElasticRun
-        Step responses for the tuning; without them there is no tuning.
+        Step responses for the tuning; without them, step 3b is omitted.
     start : TwoLinkParameters, optional
         Initial values of the tuning instead of those of step 3a; Coulomb friction is always that
         of step 1.

@@ -72,10 +72,10 @@ def exo_report(
 def verdict(found: Sequence[Interaction], walked: SimulatedWalk | None) -> VerdictSection:
     """Return the verdict box: strap stiffness with interval, and joint errors of a gait cycle."""
     overall = found[0]
-    k, reach = overall.stiffness[0], HALF_WIDTH * overall.std[0]
+    stiffness, reach = overall.stiffness[0], HALF_WIDTH * overall.std[0]
     sentences = [
-        f'Stiffness of the straps between exoskeleton and wearer: {k:.0f} ± {reach:.0f} N/m '
-        '(95 %).'
+        'Stiffness of the straps between exoskeleton and wearer: '
+        f'{stiffness:.0f} ± {reach:.0f} N/m (95 %).'
     ]
     weak = [
         name.replace('_', ' ')
@@ -84,18 +84,18 @@ def verdict(found: Sequence[Interaction], walked: SimulatedWalk | None) -> Verdi
         if HALF_WIDTH * std > _MAX_HALF_WIDTH * abs(value)
     ]
     if walked is not None:
-        each = ', '.join(f'{one.right.joint} {one.right.most:.2g}°' for one in walked.driven)
+        errors = ', '.join(f'{one.right.joint} {one.right.most:.2g}°' for one in walked.driven)
         sentences.append(
-            f'Largest error of a joint that its torque drives, over a gait cycle: {each}.'
+            f'Largest error of a joint that its torque drives, over a gait cycle: {errors}.'
         )
     beware = (
         [f'{", ".join(weak)}: the strap extension is too small for an accuracy of 10 %.']
         if weak
         else []
     )
-    if k - reach <= 0.0:
+    if stiffness - reach <= 0.0:
         return VerdictSection('no interaction', 'fair', ['No interaction was identified.'], beware)
-    sure = reach < _MAX_HALF_WIDTH * k
+    sure = reach < _MAX_HALF_WIDTH * stiffness
     return VerdictSection(
         'found' if sure else 'uncertain', 'good' if sure else 'fair', sentences, beware
     )

@@ -59,7 +59,7 @@ class SimulatedWalk(NamedTuple):
     stiffness : float
         True stiffness of all straps [N/m].
     cycle : GaitCycle
-        A whole cycle of walking.
+        Simulated gait cycle.
     driven : sequence of DrivenJoint
         Joints driven by torque.
 
