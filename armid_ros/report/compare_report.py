@@ -134,10 +134,10 @@ def change_sentences(comparison: Comparison) -> tuple[str, ...]:
             lines.append(sentence(f'{full_label(one.parameter)} {verb} from {start} to {end}'))
     lines += [_count_sentence(comparison), *_residuals(comparison), *_not_compared(comparison)]
     for group in comparison.changed_together:
-        what = f'Effects at {group.joint}' if group.joint else 'The rigid body'
+        parameters = f'The effects at {group.joint}' if group.joint else 'The inertial parameters'
         lines.append(
-            f'{what} changed as a group (p = {group.p_value:.1g}), though none of its '
-            f'{len(group.parameters)} parameters alone is significant.'
+            f'{parameters} changed as a group (p = {group.p_value:.1g}), though none of the '
+            f'{len(group.parameters)} parameters changed significantly alone.'
         )
     rigid = [c for c in comparison.changed if c.parameter.rigid]
     if comparison.load is None and len(rigid) > max(2, len(comparison.changed) / 2):
@@ -162,17 +162,19 @@ def _count_sentence(comparison: Comparison) -> str:
     """Return a sentence on how many of the compared parameters changed."""
     changed, others = comparison.changed, len(comparison.not_compared)
     count = counted(len(comparison.changes), 'parameter') + ' that both have' * bool(others)
-    also = f'; {others} more {"was" if others == 1 else "were"} not compared' if others else ''
+    not_compared = (
+        f'; {others} more {"was" if others == 1 else "were"} not compared' if others else ''
+    )
     joints = ', '.join(dict.fromkeys(c.parameter.joint for c in changed if c.parameter.joint))
-    where = f', at {joints}' if joints else ''
+    places = f', at {joints}' if joints else ''
     if comparison.load is not None and all(c.parameter.rigid for c in changed):
-        return f'The load explains the {len(changed)} changed of {count}{where}{also}.'
+        return f'The load explains the {len(changed)} changed of {count}{places}{not_compared}.'
     if changed or comparison.changed_together:
-        return f'{len(changed)} of {count} changed significantly{where}{also}.'
-    but = ', but the residuals did' if comparison.changed_residuals else ''
+        return f'{len(changed)} of {count} changed significantly{places}{not_compared}.'
+    exception = ', but the residuals did' if comparison.changed_residuals else ''
     if comparison.unusable:
-        but = ', but one model is unusable'
-    return f'None of {count} changed significantly{but}{also}.'
+        exception = ', but one model is unusable'
+    return f'None of {count} changed significantly{exception}{not_compared}.'
 
 
 def _residuals(comparison: Comparison) -> Iterator[str]:

@@ -148,8 +148,8 @@ def _at_fault(diagnosis: Diagnosis, read: Mapping[str, Sequence[Recording]]) -> 
     if diagnosis.verdict != 'bad_data':
         return []
     sources = [one.source for several in read.values() for one in several if one.source]
-    whole = r'(?<![\w/]){}(?![\w/])'
-    named = [x for x in sources if re.search(whole.format(re.escape(x)), diagnosis.summary)]
+    name = r'(?<![\w/]){}(?![\w/])'
+    named = [x for x in sources if re.search(name.format(re.escape(x)), diagnosis.summary)]
     return named or [one.source for one in read['training']]
 
 

@@ -196,8 +196,8 @@ def identifiable(design: Design, links: Sequence[str]) -> list[str]:
         return [f'{seen} of {len(names)} parameters can be identified.']
     worst = int(np.argmax(std / information.scale))
     size = np.abs(design.described)
-    sure, known = int(np.sum(std <= 0.1 * size)), int(np.sum(size > 0.0))
-    small = '; the others hardly change the torque' * (sure < known)
+    accurate, known = int(np.sum(std <= 0.1 * size)), int(np.sum(size > 0.0))
+    remark = '; the others hardly change the torque' * (accurate < known)
     grade = 'good'
     if information.condition >= GOOD_CONDITION:
         grade = 'fair' if information.condition < WEAK_CONDITION else 'weak'
@@ -205,8 +205,8 @@ def identifiable(design: Design, links: Sequence[str]) -> list[str]:
     return [
         f'All {len(names)} parameters can be identified (condition number '
         f'{plain(information.condition)}: {grade}).',
-        f'{sure} of {known} described parameters will be known to 10 %{small}. Least accurate: '
-        f'{full_label(names[worst], links)}: ± {digits(float(std[worst]))} '
+        f'{accurate} of {known} described parameters will be known to 10 %{remark}. Least '
+        f'accurate: {full_label(names[worst], links)}: ± {digits(float(std[worst]))} '
         f'{pretty(names[worst].unit)}.',
     ]
 
@@ -216,15 +216,15 @@ def _input_section(
     arm: ArmModel,
     robot: str,
     obstacles: Sequence[Obstacle],
-    whole: Run,
+    approached: Run,
     start_reason: str,
 ) -> ContentSection:
     """Return the section with robot, settings of the design, and obstacles."""
     settings, run = design.settings, design.excitation
     criterion = f'{settings.criterion}: {CRITERIA[settings.criterion]}'
     focus = f'; focus on {", ".join(settings.focus)}' if settings.focus else ''
-    pose = ', '.join(f'{q:.3g}' for q in whole.approach.q[0])
-    start = f'{pose}, with an approach of {whole.approach.duration:.1f} s'
+    pose = ', '.join(f'{q:.3g}' for q in approached.approach.q[0])
+    start = f'{pose}, with an approach of {approached.approach.duration:.1f} s'
     if start_reason:
         start += f'; {start_reason}'
     name = settings.speed

@@ -43,8 +43,8 @@ def digits(value: float, count: int = 2) -> str:
 
 def plain(value: float, count: int = 3) -> str:
     """Format a number without trailing zeros; with an exponent below 1e-4 and from 1e7."""
-    whole = 10.0**count - 0.5 <= abs(value) < 1e7
-    return f'{value:.0f}' if whole else f'{value:.{count}g}'
+    rounded = 10.0**count - 0.5 <= abs(value) < 1e7
+    return f'{value:.0f}' if rounded else f'{value:.{count}g}'
 
 
 def sentence(text: str) -> str:
@@ -97,9 +97,9 @@ def probability(p: float) -> str:
     return f'{p:.1g}' if p < 0.1 else f'{p:.2f}'
 
 
-def counted(number: int, what: str) -> str:
+def counted(number: int, noun: str) -> str:
     """Return a number with its noun: '1 joint', '2 joints'."""
-    return f'{number} {what if number == 1 else what + "s"}'
+    return f'{number} {noun if number == 1 else noun + "s"}'
 
 
 def robot_label(source: str) -> str:

@@ -1,6 +1,6 @@
 // Copyright 2026 The armid_ros developers
 // SPDX-License-Identifier: Apache-2.0
-// Draws the charts of a report: every figure.chart holds its data as JSON.
+// Draws the charts of a page: each figure.chart contains its data as JSON.
 'use strict';
 (() => {
   const root = document.documentElement;
@@ -9,7 +9,7 @@
   const widths = {measured: 4, faint: 1.3, trend: 2};
   const font = '12px system-ui, sans-serif';
   const charts = new Map();  // figure -> {plot, spec}
-  const hovers = matchMedia('(hover: hover)').matches;  // without, its buttons are always there
+  const hovers = matchMedia('(hover: hover)').matches;  // touch screens always show the buttons
   let colour = {};
 
   const readColours = () => {
@@ -30,7 +30,7 @@
     return {stroke, fill: null};
   }
 
-  // A model that fits is dashed, so that what was measured shows beneath it.
+  // The curve of a fitted model is dashed, so that the measured curve below it remains visible.
   function seriesOf(entry, measured) {
     const paint = () => colour[entry.role];
     const series = {
@@ -66,7 +66,7 @@
         high = Math.max(Math.abs(low), Math.abs(high));
         low = -high;
       }
-      // What differs by rounding alone is flat: six digits of a tick would all be alike.
+      // Differences of rounding count as zero: six digits of the tick labels would be equal.
       const span = high - low > 1e-5 * Math.max(Math.abs(low), Math.abs(high)) ? high - low : 0;
       const pad = 0.07 * span || 0.1 * Math.abs(high) || 1;
       const flat = (edge) => edge === 0 && !spec.symmetric;
@@ -84,7 +84,7 @@
     };
   }
 
-  // 1, 2 and 5 times powers of ten; equal steps where fewer than two of them are in sight.
+  // Ticks at 1, 2 and 5 times powers of ten; equal steps if fewer than two of them are visible.
   function decades(u, index, low, high) {
     const found = [];
     for (let power = 10 ** Math.floor(Math.log10(low)); power <= high; power *= 10) {
@@ -101,7 +101,7 @@
       label: label || null, side, font, labelFont: font, labelSize: 18, labelGap: 0, gap: 4,
       stroke: () => colour.soft,
       size: vertical ? (u, values) => 16 + 7 * Math.max(6, ...(values || []).map((v) => v.length)) : 26,
-      // A quarter of a low axis, so that at least two ticks are in sight.
+      // At most a quarter of the axis, so that at least two ticks are visible.
       space: vertical ? (u, index, low, high, length) => Math.min(22, length / 4) : 60,
       values: (u, splits) => splits.map((value) => (value == null ? '' : String(Number(value.toPrecision(6))))),
       grid: {stroke: () => colour.grid, width: 1},
@@ -116,7 +116,7 @@
     ctx.font = `${10 * uPlot.pxRatio}px system-ui, sans-serif`;
   }
 
-  // Text that can be read on top of a curve.
+  // Writes text with an outline, readable on top of a curve.
   function write(ctx, text, x, y) {
     ctx.save();
     ctx.strokeStyle = colour.paper;
@@ -161,7 +161,7 @@
         ctx.lineTo(bbox.left + bbox.width, y);
         ctx.stroke();
         ctx.setLineDash([]);
-        // Near the top, the text is below the line and at the left, clear of the buttons.
+        // Near the top, the text is below the line and on the left, away from the buttons.
         const top = y - bbox.top < 16 * uPlot.pxRatio;
         ctx.textAlign = top ? 'left' : 'right';
         ctx.textBaseline = top ? 'top' : 'bottom';
@@ -175,7 +175,7 @@
   const peers = (spec) => [...charts.values()].filter((chart) => spec.link && chart.spec.link === spec.link);
   const whole = (spec) => ({min: spec.x[0], max: spec.x[spec.x.length - 1]});
 
-  // Hands a zoom on to the charts it is linked with; equal ranges end the round.
+  // Applies the zoom of a chart to its linked charts; equal ranges end the recursion.
   function share(spec, figure) {
     return (u, key) => {
       if (key !== 'x') return;
@@ -192,7 +192,7 @@
     };
   }
 
-  // Two fingers zoom, one moves along what is zoomed; a double tap shows it all again.
+  // Two fingers zoom, one finger moves the zoomed range; a double tap shows the full range.
   function touch(u, spec) {
     const fingers = new Map();
     let lastTap = 0;
@@ -328,7 +328,7 @@
     repaint();
   });
 
-  // A button below each table copies it as CSV; a field above those of parameters filters rows.
+  // A button below each table copies the table as CSV; a field filters rows of parameters.
   const csv = (table) => [...table.rows].map(
     (row) => [...row.cells].map((cell) => quoted(cell.innerText.replaceAll('\u00a0', ' '))).join(',')).join('\n');
 
@@ -374,7 +374,7 @@
     section.querySelector('details').before(...tools);
   }
 
-  // A number and its unit stay on one line.
+  // Keeps a number and its unit on one line.
   function keepUnits() {
     for (const block of document.querySelectorAll('p, li, dd, td')) {
       const walk = document.createTreeWalker(block, NodeFilter.SHOW_TEXT);

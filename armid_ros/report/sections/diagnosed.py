@@ -124,7 +124,7 @@ def named_section(findings: Sequence[Finding]) -> ContentSection:
 def evidence_section(diagnosis: Diagnosis) -> ContentSection:
     """Return the section with residuals of the given model against motion, worst joints first."""
     folds = []
-    whole = 'the explained part' if diagnosis.findings else 'the difference'
+    total = 'the explained part' if diagnosis.findings else 'the difference'
     for number, place in enumerate(diagnosis.where[:3]):
         blocks: list[Templated] = []
         if place.axes and place.mean_share >= 0.005:
@@ -151,7 +151,7 @@ def evidence_section(diagnosis: Diagnosis) -> ContentSection:
         named = [
             name_in_words(one.name) for one in diagnosis.findings if place.joint in one.joints
         ]
-        line = f'{place.joint}: {100 * place.share_of_gap:.0f} % of {whole}, '
+        line = f'{place.joint}: {100 * place.share_of_gap:.0f} % of {total}, '
         line += ' and '.join(named) or place.signature
         folds.append(Fold(line, [*blocks, Panels(panels)], opened=number == 0))
     return ContentSection('Residual by variable', folds)
@@ -170,13 +170,13 @@ def minor_section(diagnosis: Diagnosis, patched: bool) -> ContentSection:
         for one in diagnosis.minor
     ]
     share = 'Share of the difference' if diagnosis.findings else 'Share of the remaining error'
-    outside = '' if patched else ' None of them is in model.yaml.'
+    not_in_model = '' if patched else ' None of them is in model.yaml.'
     return ContentSection(
         'Minor effects',
         [
             Paragraph(
                 'Statistically significant but negligible, or not confirmed by held-out data.'
-                f'{outside} A value may stand for another effect with a similar torque.'
+                f'{not_in_model} A value may stand for another effect with a similar torque.'
             ),
             DataTable(('Effect', 'Joints', 'Value, 95 %', share, 'p value'), rows, (0, 1)),
         ],
@@ -318,15 +318,16 @@ def _candidate_value(diagnosis: Diagnosis, trial: CauseResult) -> str:
 
 def gap_section(diagnosis: Diagnosis, gap: Gap) -> ContentSection:
     """Return the section with the error of each joint before and after the named effects."""
-    floor, harmful = diagnosis.baseline, bool(diagnosis.harmful)
-    where = 'recordings not used for the fit' if gap.predicted else gap.data
-    kept = ' The model in model.yaml does not have the named cause.' * harmful
+    usual_error, harmful = diagnosis.baseline, bool(diagnosis.harmful)
+    recordings = 'recordings not used for the fit' if gap.predicted else gap.data
+    unpatched = ' The model in model.yaml does not have the named cause.' * harmful
     return ContentSection(
         'Error of each joint',
         [
             Paragraph(
-                f'Root mean square error of each joint on {where}, the worst joint first. '
-                f'Bars are in units of the usual error of the joint, which is {floor}.{kept}'
+                f'Root mean square error of each joint on {recordings}, the worst joint first. '
+                'Bars are in units of the usual error of the joint, which is '
+                f'{usual_error}.{unpatched}'
             ),
             gap_bars(diagnosis, gap),
         ],

@@ -84,7 +84,7 @@ def fit_section(
     """
     groups = {'held-out': validation, 'training': training}
     least = int(np.argmax(reach))
-    certainty = f'±{digits(float(reach[least]))} {robot.torque_units[least]}'
+    uncertainty = f'±{digits(float(reach[least]))} {robot.torque_units[least]}'
     blocks: list[Templated] = []
     errors = [
         (name, role, error)
@@ -115,22 +115,22 @@ def fit_section(
             text = f'residual {digits(score.rms[joint])} {unit} rms, {share} %'
             charts = _fit_charts(group[worst], joint, unit, f'{role}-{joint}')
             panels.append((robot.joints[joint], text, charts))
-        which = f'{role} recording{" predicted worst" * several}: {worst}'
+        recording = f'{role} recording{" predicted worst" * several}: {worst}'
         if role == errors[0][1]:
             name, text, charts = panels.pop(0)
             blocks += [Paragraph(f'{name} is the worst joint: {text}.'), *charts, hint]
-            which = f'other joints of the {which}'
+            recording = f'other joints of the {recording}'
         else:
-            which = f'torques of the {which}'
+            recording = f'torques of the {recording}'
         if panels:
-            blocks.append(Fold(which[0].upper() + which[1:], [Panels(panels)]))
+            blocks.append(Fold(recording[0].upper() + recording[1:], [Panels(panels)]))
     if several:
         rows = [(name, role, f'{digits(error)} %') for name, role, error in errors]
         table = DataTable(('Recording', 'Used for', 'Error'), rows, (0, 1))
         blocks.append(Fold(f'{counted(len(errors), "recording")} one by one', [table]))
     blocks.append(
         Paragraph(
-            f'Parameter errors change the predicted torque by at most {certainty}, at '
+            f'Parameter errors change the predicted torque by at most {uncertainty}, at '
             f'{robot.joints[least]} (95 %, rms over the motion). Larger residuals come from noise '
             'or from missing effects.'
         )
