@@ -23,9 +23,6 @@ def test_each_has_a_value_and_a_reason():
     found = rows(page)
     assert {field.name for field in fields(Thresholds)} <= {row[0].strip('`') for row in found}
     assert not [row for row in found if not (row[1] and row[2])]
-
-
-def test_what_decides_is_few():
     assert len(fields(Thresholds)) <= 45
 
 

@@ -91,11 +91,8 @@ def test_pages_have_no_dialect(path):
     assert [match.group() for match in REFUSED.finditer(text)] == []
 
 
-def test_the_glossary_stays_short():
+def test_glossary_and_documentation_stay_short():
     text = (ROOT / 'docs' / 'reference' / 'glossary.md').read_text(encoding='utf-8')
     assert len(re.findall(r'^: {3}', text, re.MULTILINE)) <= 45
-
-
-def test_the_documentation_stays_short():
     pages = (ROOT / 'docs').rglob('*.md')
     assert sum(len(page.read_text(encoding='utf-8').split()) for page in pages) <= 20_000

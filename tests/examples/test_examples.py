@@ -35,10 +35,6 @@ FOUND = {
 LONGEST = 60
 
 
-def test_there_are_enough_of_them():
-    assert len(EXAMPLES) >= 10
-
-
 @pytest.mark.parametrize('path', EXAMPLES, ids=lambda path: path.stem)
 def test_an_example_is_short_and_says_what_it_is_about(path):
     text = path.read_text()
@@ -60,11 +56,8 @@ def test_an_example_finds_what_it_is_about(name, tmp_path):
     assert re.search(FOUND[name], done.stdout, re.MULTILINE | re.DOTALL), done.stdout
 
 
-def test_every_example_is_run():
+def test_every_example_is_run_and_listed():
     assert {path.stem for path in EXAMPLES} == {*FOUND, 'online'}
-
-
-def test_every_example_is_in_the_list_of_them():
     listed = (ROOT / 'examples' / 'README.md').read_text()
     assert [path.name for path in EXAMPLES if f'| {path.name} |' not in listed] == []
 
