@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 from armid_ros.arm import ArmModel, Misfit
@@ -13,7 +13,7 @@ from armid_ros.diagnosis.data.baseline import Baseline
 from armid_ros.diagnosis.data.evidence import Evidence, joints_that_do_not_repeat, noise_floor
 from armid_ros.diagnosis.data.trajectory import trajectories, Trajectory
 from armid_ros.diagnosis.prepare import choose_filters, prepare, repaired, with_friction
-from armid_ros.diagnosis.search.explainer import Explainer
+from armid_ros.diagnosis.search.explainer import Explainer, Progress
 from armid_ros.diagnosis.search.explanation import Explanation, NOISE
 from armid_ros.diagnosis.search.spans import acting_spans
 from armid_ros.diagnosis.settings import DiagnosisSettings
@@ -34,6 +34,7 @@ from armid_ros.errors import IdentificationError
 from armid_ros.estimate import name_in_words
 from armid_ros.identification.assess.data_faults import check_data, mistaken_recordings
 from armid_ros.identification.assess.grade_limits import LIMITS
+from armid_ros.identification.rows.regression import Stretch
 from armid_ros.identification.rows.signals import Conditioning
 from armid_ros.recording import Recording
 import numpy as np
@@ -41,9 +42,6 @@ import numpy.typing as npt
 
 #: Verdicts of a residual that no named effect explains completely.
 OPEN = ('unknown', 'partial')
-#: Callback with the completed share of the work and the name of the present step.
-Progress = Callable[[float, str], None]
-
 #: Note on recordings without two equal periods, whose difference would measure the noise.
 _ASSUMED = (
     'noise of recordings without two equal periods is estimated from differences between '
@@ -117,8 +115,11 @@ def diagnose(
     recordings, validate, baseline, repairs = repaired(recordings, validate, baseline, settings)
     used = choose_filters(arm, recordings, baseline, settings, rng.spawn(1)[0])
     data: Sequence[Trajectory] = trajectories(recordings, used, arm)
-    stretches = [part.stretch for part in data]
-    faults, notes = check_data(arm, recordings, used, stretches, baseline)
+    checked = [
+        Stretch(part.source, part.at_rows.with_torque(part.torque), part.informative)
+        for part in data
+    ]
+    faults, notes = check_data(arm, recordings, used, checked, baseline)
     notes += repairs
     if faults:
         return _bad_data(given, data, faults, notes)
@@ -208,7 +209,7 @@ def _of_spans(
 def _with_unfitted_joints(
     arm: ArmModel, day: Sequence[Recording], used: Conditioning
 ) -> Iterator[tuple[Recording, npt.NDArray[np.bool_]]]:
-    """Yield a recording and a mask of its joints whose torque fits the model only elsewhere."""
+    """Yield recordings with a mask of the joints that fit the model in other recordings only."""
     unit = np.ones(arm.robot.n_joints)
     bad, sound = np.zeros((2, len(day), len(unit)), dtype=bool)
     for k, one in enumerate(day):
@@ -296,7 +297,7 @@ def _with_shares(
     shares : Attribution
         Their shares in held-out recordings, or cross-validated without any.
     unseen : Evidence or None
-        Held-out recordings, with the floor of the gap as deviation.
+        Held-out recordings, weighted by the floor of the gap.
 
     """
     settings, data, unseen = explainer.settings, explainer.held_out, None

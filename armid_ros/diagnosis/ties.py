@@ -13,6 +13,7 @@ remaining residual.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
 from armid_ros.arm import ArmModel
@@ -150,26 +151,24 @@ class _Ties:
         free = [(p.name, p.joint) not in stiffness for p in whole.parameters]
         bare = whole.with_theta(whole.theta * free)
         joints = {tie.joints[0] for tie in ties}
-        known, fitted = (self._springs(bare, which, joints) for which in ('known', 'free'))
-        if fitted is None:
+        inertias: list[Inertias] = ['known', 'free']
+        fits = dict[Inertias, Interaction]()
+        for which in inertias:
+            with suppress(IdentificationError):
+                problem = self._problem(bare, which)
+                kept = [k for k, joint in enumerate(problem.spring_joints) if joint in joints]
+                fits[which] = identify_interaction(problem.with_springs(np.array(kept)))
+        if 'free' not in fits:
             return found
-        springs, inertias = fitted, len(fitted.estimate.values) - len(fitted.segments)
-        limit = _MAX_GAIN_PER_INERTIA * inertias * max(1.0, fitted.misfit / fitted.residual.size)
-        if known is not None and known.misfit - fitted.misfit < limit:
+        known, springs = fits.get('known'), fits['free']
+        count = len(springs.estimate.values) - len(springs.segments)
+        limit = _MAX_GAIN_PER_INERTIA * count * max(1.0, springs.misfit / springs.residual.size)
+        if known is not None and known.misfit - springs.misfit < limit:
             assert found.problem is not None
-            springs, problem = known, found.problem.as_described()
-            again = problem.fit(found.fitted.named)
-            found = replace(found, fitted=again, reference=problem.fit(), problem=problem)
+            springs, described = known, found.problem.as_described()
+            again = described.fit(found.fitted.named)
+            found = replace(found, fitted=again, reference=described.fit(), problem=described)
         return replace(found, fitted=_with_springs(found, springs))
-
-    def _springs(self, bare: ArmModel, inertias: Inertias, joints: set[str]) -> Interaction | None:
-        """Identify the ties of these joints without bias, or return None if that is impossible."""
-        try:
-            problem = self._problem(bare, inertias)
-            kept = [k for k, joint in enumerate(problem.spring_joints) if joint in joints]
-            return identify_interaction(problem.with_springs(np.array(kept)))
-        except IdentificationError:
-            return None
 
     def _problem(
         self, bare: ArmModel, inertias: Inertias, slack: float = 0.0
@@ -249,7 +248,7 @@ def _as_one_cause(
     kept = tuple(range(0, each * len(whole.joints), each))
     arm, nuisance = memoized_arm(explainer.arm), comparison.nuisance
     columns = [part.columns(arm, whole)[:, :, list(kept)] for part in nuisance.rows.data]
-    cause = comparison.catalogue.candidate_cause(whole, kept, columns)
+    cause = comparison.catalogue.candidate(whole, kept, columns)
     assert cause is not None
     one = comparison.rank(cause, nuisance)
     ranking, material = result.first, settings.material

@@ -12,10 +12,10 @@ from armid_ros.diagnosis.search.hyperparameters import Hyperparameters
 from armid_ros.diagnosis.search.nuisance import Nuisance
 from armid_ros.diagnosis.search.odds import (
     CauseFit,
+    fit_cause,
     log_probability_in_bounds,
     marginalised,
     NO_SPREAD,
-    odds,
 )
 from armid_ros.diagnosis.settings import DiagnosisSettings, SIZES, THERE
 from armid_ros.effects import CATALOGUE
@@ -100,7 +100,7 @@ def test_the_factor_of_a_cause_is_the_ratio_of_densities(nuisance):
         nothing = density(nuisance, hyperparameters, [(there, THERE)])
         each = [density(nuisance, hyperparameters, [(there, THERE), (today, s)]) for s in SIZES]
         expected = np.logaddexp.reduce(each) - np.log(len(SIZES)) - nothing
-        fit = odds(cause, nuisance, posterior, 0.0, NO_SPREAD)
+        fit = fit_cause(cause, nuisance, posterior, 0.0, NO_SPREAD)
         assert fit.factor == pytest.approx(expected, rel=1e-3, abs=1e-2)
 
 
@@ -110,7 +110,7 @@ def test_an_accepted_cause_is_explained_as_if_it_were_data_of_the_model(nuisance
     posterior = nuisance.posterior(hyperparameters)
     first, _ = causes_of(nuisance, posterior, 'torque_offset')
     beside = nuisance.and_cause(first, 1.0)
-    again = odds(first, beside, beside.posterior(hyperparameters))
+    again = fit_cause(first, beside, beside.posterior(hyperparameters))
     assert again.explained < 0.5
     assert beside.without_cause(0).accepted == ()
 
@@ -146,7 +146,7 @@ def test_a_family_has_the_joints_of_the_largest_evidence(upright, joints):
     wanted = tuple(upright.robot.joints[k] for k in joints)
     assert [one.effect.joints for one in families] == ([wanted] if len(joints) > 1 else [])
     for one in families:
-        assert odds(one, nuisance, posterior).values == pytest.approx(size[joints], abs=0.02)
+        assert fit_cause(one, nuisance, posterior).values == pytest.approx(size[joints], abs=0.02)
 
 
 def test_every_value_of_a_cause_has_to_be_possible(upright):

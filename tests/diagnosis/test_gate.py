@@ -12,6 +12,7 @@ from armid_ros.errors import IdentificationError
 from armid_ros.identification import identify
 from armid_ros.identification.assess.data_faults import check_data
 from armid_ros.identification.assess.sensor_faults import torque_faults
+from armid_ros.identification.rows.regression import Stretch
 from armid_ros.identification.rows.signals import conditioning, SignalSettings
 import numpy as np
 import pytest
@@ -21,7 +22,10 @@ from tests.diagnosis.conftest import Bench, URDF
 
 def stretches(recordings, used):
     """Return recordings in rows."""
-    return [part.stretch for part in trajectories(recordings, used)]
+    return [
+        Stretch(part.source, part.at_rows.with_torque(part.torque), part.informative)
+        for part in trajectories(recordings, used)
+    ]
 
 
 @pytest.mark.parametrize('stated', ['damping="0.3"', 'friction="0.5"'])
@@ -180,7 +184,7 @@ def test_a_model_of_another_arm_is_doubted(bench):
         baseline=bench.recordings(seed=4),
         rng=np.random.default_rng(0),
     )
-    assert 'this arm?' in found.summary
+    assert 'this arm' in found.summary
 
 
 def test_a_model_that_is_worse_than_none_is_refused(bench):
@@ -188,7 +192,7 @@ def test_a_model_that_is_worse_than_none_is_refused(bench):
     days = [bench.recordings(seed=3), bench.recordings(seed=4)]
     found = diagnose(heavy, days[1], baseline=days[0], rng=np.random.default_rng(0))
     assert found.verdict == 'bad_data'
-    assert 'no model' in found.summary
+    assert 'another arm' in found.summary
 
 
 def test_torques_of_which_none_was_measured_are_one_fault(bench):

@@ -126,17 +126,6 @@ def test_a_changed_effect_has_its_old_and_its_new_value(bench):
     assert 'from' not in sentence(replace(friction, added_to=(0.01,)))  # inside its interval
 
 
-def test_the_first_sentence_has_the_two_largest_causes(bench):
-    spring = finding(bench, 0.3, 'joint_spring', (1.5,))
-    doubtful = replace(spring, rivals=(Rival('torque_offset', ('elbow',), 0.1),), probability=0.8)
-    for second in (spring, doubtful):
-        first, *_ = verdict(bench, finding(bench, 0.7), second).summary.split('. ')
-        facts = 'Encoder offset', '70 %', 'joint spring', '30 %'
-        assert all(fact in first for fact in facts)
-    assert all(fact in first for fact in ('(probability 80 %)', '(10 %)', 'another cause (10 %)'))
-    assert 'torque offset of elbow' in first
-
-
 def test_the_same_body_on_another_link_is_no_ambiguity(bench):
     same = Rival('payload', ('shoulder',), 0.4, same_body=True)
     load = finding(bench, 0.9, 'payload', (0.7,), weighs=True, rivals=(same,))
@@ -154,17 +143,6 @@ def test_rivals_of_every_name_are_stated_whatever_is_left(bench, ratio, word):
     assert found.word == word
     assert 'payload' in found.summary and 'torque gain' in found.summary
     assert ('2.0 times' in found.summary) == (word == 'partial')
-
-
-def test_an_experiment_names_the_joints_of_both(bench):
-    def experiment(name, rival, joint):
-        rivals = (Rival(rival, (joint,)),)
-        return finding(bench, name=name, rivals=rivals).experiment
-
-    same = experiment('payload', 'link_inertia', 'elbow')
-    assert all(fact in same for fact in ('link inertia', 'elbow', 'Weigh'))
-    other = experiment('torque_offset', 'link_inertia', 'wrist')
-    assert all(fact in other for fact in ('offset', 'elbow', 'inertia', 'wrist'))
 
 
 def test_what_does_not_repeat_has_to_matter(bench):

@@ -61,7 +61,7 @@ class Evidence:
 
     @classmethod
     def over_noise(cls, data: Sequence[Trajectory], noise: Sequence[FloatArray]) -> Evidence:
-        """Divide the residuals of trajectories by their noise alone, (n,) each [N m]."""
+        """Return recordings whose residuals are weighted by their noise, (n,) each [N m]."""
         return cls(tuple(data), tuple(noise), tuple(noise))
 
     @cached_property

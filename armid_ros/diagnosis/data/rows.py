@@ -49,7 +49,7 @@ class Rows:
         return cls(evidence.data, evidence.sigma, 0, amplitude).above_rounding()
 
     def above_rounding(self) -> Rows:
-        """Return the rows with deviations of at least 1e-4 of the rms torque (rounding error)."""
+        """Raise `sigma` and `amplitude` to 1e-4 of the rms torque, its rounding error."""
         least = 1e-4 * self.torque
         return replace(
             self,
@@ -68,29 +68,19 @@ class Rows:
         """Return whether each recording is a diagnosed one, and no baseline, shape (K,)."""
         return np.arange(max(part.fold for part in self.data) + 1) >= self.n_baseline
 
-    @property
-    def repeated(self) -> bool:
-        """Return whether there are a baseline and at least three recordings in total."""
-        return 0 < self.n_baseline and len(self.diagnosed) > 2
-
     @cached_property
     def diagnosed_parts(self) -> list[int]:
         """Return the indices of the diagnosed trajectories."""
         return [k for k, part in enumerate(self.data) if self.diagnosed[part.fold]]
 
-    @cached_property
-    def informative(self) -> FloatArray:
-        """Return the number of diagnosed rows in which each joint moves, at least 1, (n,)."""
-        count = np.sum([(self.weight[k] > 0.0).sum(axis=0) for k in self.diagnosed_parts], axis=0)
-        return np.asarray(np.maximum(count, 1), dtype=float)
-
     def rms_of_diagnosed(self, columns: Sequence[FloatArray]) -> FloatArray:
         """Return the rms of columns (M, n, p) over the diagnosed rows in motion, (n, p)."""
-        squares = np.zeros(columns[0].shape[1:])
+        squares, count = np.zeros(columns[0].shape[1:]), np.zeros((columns[0].shape[1], 1))
         for k in self.diagnosed_parts:
             moving = self.weight[k][:, :, np.newaxis] > 0.0
             squares += np.sum(columns[k] ** 2, axis=0, where=moving)
-        return np.asarray(np.sqrt(squares / self.informative[:, np.newaxis]))
+            count += moving.sum(axis=0)
+        return np.asarray(np.sqrt(squares / np.maximum(count, 1.0)))
 
     @cached_property
     def torque(self) -> FloatArray:

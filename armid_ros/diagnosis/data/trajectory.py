@@ -19,7 +19,6 @@ from armid_ros.arm.memoized_arm import rigid_rows
 from armid_ros.effects import Effect
 from armid_ros.identification.rows.checks import moving
 from armid_ros.identification.rows.period import find_period
-from armid_ros.identification.rows.regression import Stretch
 from armid_ros.identification.rows.signals import (
     Conditioning,
     decimate,
@@ -94,14 +93,9 @@ class Trajectory:
         """Return the motion at the samples of the rows."""
         return self.motion.select(self.rows)
 
-    @property
-    def stretch(self) -> Stretch:
-        """Return motion and torque at the rows, for the checks of the data."""
-        return Stretch(self.source, self.at_rows.with_torque(self.torque), self.informative)
-
     @cached_property
     def period(self) -> tuple[int, slice] | None:
-        """Return the lag of the repeated period and its samples, or None; see `find_period`."""
+        """Return lag and samples of the repeated period, or None without; see `find_period`."""
         return find_period(self.motion.t, self.motion.q)
 
     @property

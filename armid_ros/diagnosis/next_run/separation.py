@@ -134,7 +134,7 @@ def separation(
     motion = trajectory.motion(np.arange(2.0 * trajectory.period * _RATE) / _RATE)
     arms = [diagnosis.arm, *([] if load is None else [load.on(diagnosis.arm)])]
     used = diagnosis.data[0].used
-    # the unit of the gap is assumed to be the same in the next run
+    # the floor of the gap is assumed to be the same in the next run
     sigma = np.sqrt(np.mean(np.square(diagnosis.explanation.evidence.sigma), axis=0))
     weight = informative_weight(motion, used.rate_hz / used.decimation / _RATE, sigma)
 

@@ -46,11 +46,8 @@ def next_steps(
 
     """
     findings, verdict = diagnosis.findings, diagnosis.verdict
-    looks = [text for finding in findings for text in _inspections(finding, diagnosis)]
-    steps = list(dict.fromkeys(looks))
-    if steps and verdict != 'ambiguous':
-        head, _, what = steps[0].rpartition(':')
-        steps[0] = f'{head} first:{what}'
+    inspections = (text for one in findings for text in _inspections(one, diagnosis))
+    steps = list(dict.fromkeys(inspections))
     if verdict == 'bad_data':
         steps.append(
             'Check the recording with armid inspect. Correct it or the description, and '

@@ -23,7 +23,7 @@ from armid_ros.diagnosis.data.trajectory import Trajectory
 from armid_ros.diagnosis.search.cause import Cause
 from armid_ros.diagnosis.search.hyperparameters import NuisancePosterior
 from armid_ros.diagnosis.search.nuisance import Nuisance
-from armid_ros.diagnosis.search.odds import cause_fits, CauseInformation
+from armid_ros.diagnosis.search.odds import CauseInformation, fit_causes
 from armid_ros.diagnosis.settings import HOW_OFTEN, log_prior
 from armid_ros.effects import Effect, Shape
 from armid_ros.effects.base import Unexplained
@@ -34,8 +34,8 @@ from armid_ros.robots import Robot
 import numpy as np
 from scipy import optimize
 
-#: Smallest share of samples in which an effect that rests has no torque; a strap that is always
-#: taut fits as a spring.
+#: Smallest share of samples in which an effect with slack has no torque: a strap that is taut in
+#: all samples fits as a spring.
 _MIN_SHARE_AT_REST = 0.1
 #: Reference temperatures where none is measured.
 _NO_REFERENCE: Mapping[str, float] = MappingProxyType({})
@@ -119,7 +119,7 @@ class Causes:
             values = np.add.outer(size * np.array(members), np.arange(size)).ravel()
             effect = replace(first, joints=tuple(whole.joints[k] for k in members))
             cause = every.among(effect, values, comb(count, len(members)))
-            (fit,) = cause_fits([cause], nuisance, known.among(values))
+            (fit,) = fit_causes([cause], nuisance, known.among(values))
             return fit.factor + cause.prior, cause
 
         chosen = tuple(range(count))
@@ -140,7 +140,7 @@ class Causes:
             yield from (one for one in members if (one.name, one.joints) not in self.fitted)
 
     def _single_causes(self, effect: Effect, singles: Sequence[Effect]) -> Iterator[Cause]:
-        """Yield a cause for each effect of `singles`; `effect` is the same law on all joints."""
+        """Yield a cause for each single-joint effect; `effect` is the same law on all joints."""
         robot, start = self.nuisance.arm.robot, 0
         places: list[tuple[Effect, tuple[int, ...], list[int]]] = []
         for one in singles:
@@ -155,9 +155,7 @@ class Causes:
             except ModelError:
                 return
             for key, (one, kept, span) in zip(keys, places, strict=True):
-                self._known[key] = self.candidate_cause(
-                    one, kept, [x[:, :, span] for x in columns]
-                )
+                self._known[key] = self.candidate(one, kept, [x[:, :, span] for x in columns])
         yield from filter(None, (self._known[key] for key in keys))
 
     @cached_property
@@ -177,14 +175,12 @@ class Causes:
             columns = self._columns(effect)
         except ModelError:
             return None
-        other = self.candidate_cause(
-            effect, cause.kept, [x[:, :, list(cause.kept)] for x in columns]
-        )
+        other = self.candidate(effect, cause.kept, [x[:, :, list(cause.kept)] for x in columns])
         if other is None or other.kept != cause.kept:
             return None
         return replace(other, shapes=cause.shapes)
 
-    def candidate_cause(
+    def candidate(
         self, effect: Effect, kept: tuple[int, ...], columns: Sequence[FloatArray]
     ) -> Cause | None:
         """
@@ -306,12 +302,12 @@ def _unexplained(nuisance: Nuisance, posterior: NuisancePosterior) -> Unexplaine
         [nuisance.residual_at(values, k) for k in range(len(rows.diagnosed))], axis=1
     ).T
     columns = np.concatenate([x[:, :, : nuisance.rank] for x in nuisance.columns], axis=1)
-    asked = np.concatenate([np.full(len(p.rows), rows.diagnosed[p.fold]) for p in rows.data])
+    diagnosed = np.concatenate([np.full(len(p.rows), rows.diagnosed[p.fold]) for p in rows.data])
     return Unexplained(
         Motion(motions[0].joints, *arrays),
         np.concatenate([part.at_rows.q for part in rows.data]),
         residual / scale,
-        weight * asked[:, np.newaxis],
+        weight * diagnosed[:, np.newaxis],
         columns.swapaxes(0, 1) / scale[:, :, np.newaxis],
     )
 
@@ -319,7 +315,7 @@ def _unexplained(nuisance: Nuisance, posterior: NuisancePosterior) -> Unexplaine
 def candidate_effects(
     robot: Robot, kinds: Sequence[type[Effect]], reference: Mapping[str, float] = _NO_REFERENCE
 ) -> Iterator[tuple[Effect, list[Effect]]]:
-    """Yield each effect on all joints, with the same effect on each joint, pair or whole arm."""
+    """Yield each effect on all joints, and its copies on one joint, one pair or the whole arm."""
     for kind in with_exact_vector(kinds):
         try:
             places = kind.places(robot)
@@ -339,7 +335,7 @@ def candidate_effects(
 def with_starting_shapes(
     effect: Effect, members: list[Effect], arm: ArmModel, unexplained: Unexplained
 ) -> Iterator[tuple[Effect, list[Effect]]]:
-    """Yield an effect and its single-joint effects for each starting shape, or once without."""
+    """Yield an effect and its copies on single joints with each starting shape, if it has any."""
     if not effect.shapes:
         yield effect, members
         return

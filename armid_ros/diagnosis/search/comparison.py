@@ -16,6 +16,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import product
 import math
+from typing import TypeAlias
 
 from armid_ros.diagnosis.search.candidates import Causes, line_search
 from armid_ros.diagnosis.search.cause import Cause
@@ -26,10 +27,10 @@ from armid_ros.diagnosis.search.hyperparameters import (
 )
 from armid_ros.diagnosis.search.nuisance import Nuisance
 from armid_ros.diagnosis.search.odds import (
-    cause_fits,
     CauseInformation,
+    fit_cause,
+    fit_causes,
     IMPOSSIBLE,
-    odds,
     OWN_SPREADS,
     typical_spread_of,
 )
@@ -45,8 +46,8 @@ _SHARED, _OWN = (0.1, 0.2, 0.4, 0.8, 1.6, 3.2, 6.4), (0.2, 0.4, 0.8)
 _NOISE = (0.15, 0.3, 0.5, 0.8, 1.1)
 #: Candidate standard deviations of d0 and d_k without a baseline, over the rms torque; log prior.
 _SHARES = ((0.0, 0.0), (0.02, -1.0), (0.06, -2.0), (0.15, -3.0))
-#: Candidate errors of the described links without a baseline, as shares of the largest expected
-#: errors: none, a tenth (masses off by 10 %, centres of mass by 1 cm), and all.
+#: Candidate standard deviations of errors of the described links without a baseline, over the
+#: largest expected errors: none, a tenth (masses off by 10 %, centres of mass by 1 cm), and all.
 _BODIES = (0.0, 0.1, 1.0)
 #: Standard deviations of the noise without a baseline, over that of equal periods; log prior.
 _FACTORS = ((1.0, 0.0), (1.3, -1.0), (2.0, -3.0), (4.0, -5.0))
@@ -54,12 +55,14 @@ _FACTORS = ((1.0, 0.0), (1.3, -1.0), (2.0, -3.0), (4.0, -5.0))
 _REFINED, _COMPARED, _MOST = 5, 14, 5
 #: Every eighth cause is used to estimate the typical spread.
 _SAMPLED = 8
+#: Results of the accepted causes, and the regression problem that includes these causes.
+Accepted: TypeAlias = tuple[list[CauseResult], Nuisance]
 
 
 @dataclass(frozen=True)
-class Result:
+class Selection:
     """
-    Result of the forward selection of causes.
+    Causes that the forward selection accepted, and the regression problem with them.
 
     Attributes
     ----------
@@ -112,19 +115,17 @@ class CauseComparison:
 
     @cached_property
     def typical_spread(self) -> float:
-        """Return the typical variance of fitted values between recordings; see `odds`."""
-        posterior = self._likeliest(self.nuisance)
-        return typical_spread_of(
-            self._causes_of(self.nuisance)[::_SAMPLED], self.nuisance, posterior
-        )
+        """Return the typical variance of fitted values between baseline recordings."""
+        some = self._causes_of(self.nuisance)[::_SAMPLED]
+        return typical_spread_of(some, self.nuisance, self._likeliest(self.nuisance))
 
-    def initial(self) -> Result:
+    def initial(self) -> Selection:
         """Return the ranking of all causes, with none accepted."""
         ranking = self.rank_all(self.nuisance)
         effects = tuple(self.catalogue.effects)
-        return Result((), self.nuisance, ranking.posterior, ranking, effects)
+        return Selection((), self.nuisance, ranking.posterior, ranking, effects)
 
-    def refit_whole_arm_causes(self, before: Result) -> Result:
+    def refit_whole_arm_causes(self, before: Selection) -> Selection:
         """Accept the whole-arm causes of another selection, and refit them to this problem."""
         accepted = tuple(trial for trial in before.accepted if not trial.effect.joints)
         nuisance = self.nuisance
@@ -136,13 +137,13 @@ class CauseComparison:
         posterior = self._likeliest(nuisance)
         return replace(before, accepted=accepted, nuisance=nuisance, posterior=posterior)
 
-    def select(self, begun: Result | None = None) -> Result:
+    def select(self, begun: Selection | None = None) -> Selection:
         """
         Accept the best cause until none is significant; drop causes that became redundant.
 
         Parameters
         ----------
-        begun : Result, optional
+        begun : Selection, optional
             Selection whose accepted causes are kept.
 
         """
@@ -153,9 +154,7 @@ class CauseComparison:
         posterior = self._likeliest(nuisance)
         return replace(result, accepted=tuple(accepted), nuisance=nuisance, posterior=posterior)
 
-    def _add_causes(
-        self, accepted: list[CauseResult], ranking: Ranking
-    ) -> tuple[list[CauseResult], Nuisance]:
+    def _add_causes(self, accepted: list[CauseResult], ranking: Ranking) -> Accepted:
         """Add the best cause to the accepted ones until no further cause is significant."""
         nuisance = ranking.nuisance
         while len(accepted) < _MOST:
@@ -168,9 +167,7 @@ class CauseComparison:
             ranking = self.rank_all(nuisance)
         return accepted, nuisance
 
-    def _exchange_causes(
-        self, accepted: list[CauseResult], nuisance: Nuisance
-    ) -> tuple[list[CauseResult], Nuisance]:
+    def _exchange_causes(self, accepted: list[CauseResult], nuisance: Nuisance) -> Accepted:
         """Replace a cause that resembles several others by these if they are likelier."""
         # the last cause was selected with all others in the model
         for k, one in enumerate(accepted[:-1]):
@@ -180,10 +177,8 @@ class CauseComparison:
             if best is None or best[1].key == one.key:
                 continue
             found = self._add_causes(others, ranking)
-            if (
-                self._log_posterior(found[1])
-                > self._log_posterior(nuisance) + self.settings.thresholds.tie
-            ):
+            gained = self._log_posterior(found[1]) - self._log_posterior(nuisance)
+            if gained > self.settings.thresholds.tie:
                 return self._exchange_causes(*found)
         return accepted, nuisance
 
@@ -214,8 +209,8 @@ class CauseComparison:
             return None
         first = able[0]
         name, joints = first.cause.effect.name, set(first.cause.effect.joints)
-        # the same law on some of the joints, unless the lead of all is more than laws are inexact;
-        # or the same law by a more usual name
+        # the winner may be the best law on fewer joints, or an equal law with larger prior odds,
+        # unless the lead of the best cause exceeds the error of torque laws
         parts = [
             one
             for one in able
@@ -225,25 +220,19 @@ class CauseComparison:
         ]
         winner = min(parts, key=lambda one: first.log_odds_over(one, levels))
         others = [one for one in able if one is not winner]
-        # The log odds of a rival are the larger ones of those with and without a small lead.
-        leads = [
+        # log odds of rivals over the winner: the larger of those with and without a small lead
+        full = [
             -math.inf if x is first else x.log_posterior - winner.log_posterior for x in others
         ]
-        behind = np.array(
-            [
-                min(max(-winner.log_odds_over(x, levels), lead), 0.0)
-                for x, lead in zip(others, leads, strict=True)
-            ]
-        )
+        reduced = [-winner.log_odds_over(x, levels) for x in others]
+        behind = np.minimum(np.maximum(reduced, full), 0.0)
         total = np.logaddexp.reduce(np.append(behind, 0.0)) + np.logaddexp(0.0, -winner.odds)
         total -= np.log1p(-UNLISTED)
         material = self.settings.material
         rivals = [
-            replace(
-                ranking.tested(one, material), probability=float(np.exp(odds_to_winner - total))
-            )
-            for one, odds_to_winner in zip(others, behind, strict=True)
-            if odds_to_winner > -levels.tie
+            replace(ranking.tested(one, material), probability=float(np.exp(own - total)))
+            for one, own in zip(others, behind, strict=True)
+            if own > -levels.tie
         ]
         trial = ranking.tested(winner, material)
         found = replace(trial, probability=float(np.exp(-total)), rivals=tuple(rivals))
@@ -256,6 +245,7 @@ class CauseComparison:
         return self._posteriors[id(nuisance)][1]
 
     def _likeliest(self, nuisance: Nuisance) -> NuisancePosterior:
+        """Return the posterior for the likeliest hyperparameters."""
         return max(self._all_posteriors(nuisance), key=lambda one: one.evidence)
 
     def _causes_of(self, nuisance: Nuisance) -> list[Cause]:
@@ -268,9 +258,8 @@ class CauseComparison:
     def rank_all(self, nuisance: Nuisance) -> Ranking:
         """Rank the causes that are not accepted yet, and optimise the shapes of the best ones."""
         settings, likeliest = self._all_posteriors(nuisance), self._likeliest(nuisance)
-        tried = list[
-            NuisancePosterior
-        ]()  # the best one, and noise only, of each size of link errors
+        # for each size of link errors, the likeliest posterior and the one with noise only
+        tried: list[NuisancePosterior] = []
         for body in dict.fromkeys(one.hyperparameters.body for one in settings):
             own = [one for one in settings if one.hyperparameters.body == body]
             best = max(own, key=lambda one: one.evidence)
@@ -281,7 +270,7 @@ class CauseComparison:
         first: dict[object, tuple[float, Cause, NuisancePosterior]] = {}
         for one, group in product(tried, groups.values()):
             information = CauseInformation.of(group, nuisance, one, by_day=True)
-            for cause, fit in zip(group, cause_fits(group, nuisance, information), strict=True):
+            for cause, fit in zip(group, fit_causes(group, nuisance, information), strict=True):
                 log_posterior = fit.factor + one.evidence + cause.prior
                 if cause.key not in first or log_posterior > first[cause.key][0]:
                     first[cause.key] = log_posterior, cause, one
@@ -298,29 +287,30 @@ class CauseComparison:
     def rank(self, cause: Cause, nuisance: Nuisance) -> RankedCause:
         """Return the Bayes factor of a cause, averaged over the hyperparameters."""
         settings = self._all_posteriors(nuisance)
-        fits = [(odds(cause, nuisance, one), one) for one in settings]
+        fits = [(fit_cause(cause, nuisance, one), one) for one in settings]
         nothing = np.logaddexp.reduce([posterior.evidence for _, posterior in fits])
         total = np.logaddexp.reduce([fit.factor + posterior.evidence for fit, posterior in fits])
         fit, posterior = max(fits, key=lambda pair: pair[0].factor + pair[1].evidence)
         data = float(total - nothing)
         there = data + cause.prior
-        if nuisance.rows.repeated:
+        # values vary between recordings of one kind if there are at least three in total
+        if nuisance.rows.n_baseline and len(nuisance.rows.diagnosed) > 2:
             places = max(len(cause.effect.places(nuisance.arm.robot)), 1)
-            surely = odds(cause, nuisance, settings[0], self.typical_spread, OWN_SPREADS).factor
-            there = surely - float(np.log(cause.shapes * places))
+            surely = fit_cause(cause, nuisance, settings[0], self.typical_spread, OWN_SPREADS)
+            there = surely.factor - float(np.log(cause.shapes * places))
         return RankedCause(cause, fit, data, there, posterior)
 
     def _with_best_shape(
         self, cause: Cause, nuisance: Nuisance, posterior: NuisancePosterior
     ) -> Cause:
         """Return a cause with the shape that maximises its Bayes factor."""
-        best = [(odds(cause, nuisance, posterior).factor, cause)]
+        best = [(fit_cause(cause, nuisance, posterior).factor, cause)]
 
         def gain(shape: FloatArray) -> float:
             other = self.catalogue.reshaped(cause, shape)
             if other is None:
                 return IMPOSSIBLE
-            best.append((odds(other, nuisance, posterior).factor, other))
+            best.append((fit_cause(other, nuisance, posterior).factor, other))
             return best[-1][0]
 
         shape = np.array(cause.effect.shape)
@@ -328,20 +318,18 @@ class CauseComparison:
             shape = line_search(gain, shape, k, kind)
         return max(best, key=lambda one: one[0])[1]
 
-    def _drop_redundant(
-        self, accepted: list[CauseResult], nuisance: Nuisance
-    ) -> tuple[list[CauseResult], Nuisance]:
+    def _drop_redundant(self, accepted: list[CauseResult], nuisance: Nuisance) -> Accepted:
         """Drop accepted causes whose log odds fell below the alarm, except the last cause."""
         while len(accepted) > 1:
             values, covariance = nuisance.moments(self._likeliest(nuisance))
-            log_posterior = []
+            log_odds = []
             for one, span in zip(nuisance.accepted, nuisance.value_slices, strict=True):
                 mean, own = values[span], covariance[span, span]
                 gain = float(mean @ np.linalg.solve(own, mean)) + np.linalg.slogdet(own)[1]
                 gain -= 2.0 * float(np.sum(np.log(one.size * one.unit)))
-                log_posterior.append(0.5 * gain + one.prior)
-            least = int(np.argmin(log_posterior[:-1]))
-            if log_posterior[least] > self.settings.thresholds.alarm:
+                log_odds.append(0.5 * gain + one.prior)
+            least = int(np.argmin(log_odds[:-1]))
+            if log_odds[least] > self.settings.thresholds.alarm:
                 break
             accepted = [*accepted[:least], *accepted[least + 1 :]]
             nuisance = nuisance.without_cause(least)
@@ -355,10 +343,8 @@ def hyperparameters_of_baseline(nuisance: Nuisance) -> tuple[Hyperparameters, ..
     for _ in range(2):
         tried = list[NuisancePosterior]()
         for own, noise in product(_OWN, _NOISE):
-            grid = [
-                Hyperparameters(1.0, shared, own, noise, correlated_rows) for shared in _SHARED
-            ]
-            tried += nuisance.posteriors(grid, before)
+            sets = [Hyperparameters(1.0, x, own, noise, correlated_rows) for x in _SHARED]
+            tried += nuisance.posteriors(sets, before)
         found = max(tried, key=lambda one: one.evidence)
         correlated_rows = nuisance.correlation_length(found, before, CORRELATED_ROWS)
     return (replace(found.hyperparameters, correlated_rows=correlated_rows),)
@@ -371,12 +357,4 @@ def grid_without_baseline() -> tuple[Hyperparameters, ...]:
         for body in _BODIES
         for share, odds in _SHARES
         for factor, more in _FACTORS
-    )
-
-
-def grid_of_misfit(body: float) -> tuple[Hyperparameters, ...]:
-    """Return hyperparameters to average over if only the size of the misfit is known."""
-    return tuple(
-        Hyperparameters(body, share, share, noise, CORRELATED_ROWS)
-        for share, noise in product(_OWN, (0.5, 1.1))
     )

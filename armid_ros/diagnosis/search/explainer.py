@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from itertools import product
 
 from armid_ros.arm import ArmModel, Misfit
 from armid_ros.arm.memoized_arm import memoized_arm, plain_arm
@@ -25,10 +26,9 @@ from armid_ros.diagnosis.prepare import Prepared, with_friction
 from armid_ros.diagnosis.search.candidates import Causes
 from armid_ros.diagnosis.search.comparison import (
     CauseComparison,
-    grid_of_misfit,
     grid_without_baseline,
     hyperparameters_of_baseline,
-    Result,
+    Selection,
 )
 from armid_ros.diagnosis.search.explanation import (
     ESTIMATED,
@@ -38,7 +38,7 @@ from armid_ros.diagnosis.search.explanation import (
     OWN_MISFIT,
     WRITTEN_MISFIT,
 )
-from armid_ros.diagnosis.search.hyperparameters import Hyperparameters
+from armid_ros.diagnosis.search.hyperparameters import CORRELATED_ROWS, Hyperparameters
 from armid_ros.diagnosis.search.joint_fit import JointFit
 from armid_ros.diagnosis.search.nuisance import Nuisance
 from armid_ros.diagnosis.settings import DiagnosisSettings
@@ -46,13 +46,14 @@ from armid_ros.identification.rows.temperature import mean_temperatures
 from armid_ros.motion import FloatArray
 import numpy as np
 
+#: Callback with the completed share of the work and the name of the present step.
 Progress = Callable[[float, str], None]
 #: Smallest share of a misfit that is not noise. Of 20 effects that appeared in a running arm, 20
 #: were named, and only 15 with a share of 1.
 _MIN_MISFIT_SHARE = 0.3
 #: Relative difference of gravity below which the regressor of the rigid body is not recomputed.
 _SAME_GRAVITY = 0.003
-#: Advice on recordings that separate a change from a misfit, if there is at most one a day.
+#: Advice if the recordings do not separate a change from the misfit of another motion.
 _NO_BASELINE = (
     'Without a baseline, an error of the model in this motion is not excluded: give recordings '
     'from before (--baseline).'
@@ -165,7 +166,7 @@ class Explainer:
         """
         Find the changes since an identification if only the size of its misfit is known.
 
-        Without its recordings, any cause may explain a part of this misfit; see `odds`.
+        Without its recordings, any cause may explain a part of this misfit; see `fit_causes`.
 
         """
         prepared, known = self.prepared, written.information
@@ -177,7 +178,11 @@ class Explainer:
         part = np.maximum(rest, (_MIN_MISFIT_SHARE * misfit) ** 2)
         amplitude = (np.sqrt(part),) * count_recordings(prepared.data)
         rows = Rows(prepared.data, evidence.sigma, 0, amplitude, misfit_only=True)
-        grid = grid_of_misfit(float(known is not None))
+        body = float(known is not None)
+        grid = [
+            Hyperparameters(body, share, share, amplitude, CORRELATED_ROWS)
+            for share, amplitude in product((0.2, 0.4, 0.8), (0.5, 1.1))
+        ]
         result = self.comparison(rows, grid, known).select()
         found = self._fit_changes(result, evidence, 0.0)
         return replace(found, floor=WRITTEN_MISFIT, misfit=misfit, untested=_NO_BASELINE)
@@ -214,7 +219,7 @@ class Explainer:
         notes = (untested,) if untested else ()
         return replace(found, floor=OWN_MISFIT, misfit=misfit, notes=notes, untested=untested)
 
-    def _fit_changes(self, result: Result, evidence: Evidence, spread: float) -> Explanation:
+    def _fit_changes(self, result: Selection, evidence: Evidence, spread: float) -> Explanation:
         """Fit the accepted causes as changes of the given model."""
         nuisance = replace(result.nuisance, accepted=())
         fitted = tuple(range(nuisance.rows.n_baseline + count_recordings(self.prepared.data)))

@@ -12,7 +12,7 @@ from armid_ros.arm import ArmModel
 from armid_ros.arm.memoized_arm import plain_arm
 from armid_ros.diagnosis.data.evidence import Evidence
 from armid_ros.diagnosis.search.cause import NamedEffect
-from armid_ros.diagnosis.search.comparison import Result
+from armid_ros.diagnosis.search.comparison import Selection
 from armid_ros.diagnosis.search.joint_fit import Fitted, JointFit
 from armid_ros.diagnosis.search.ranking import CauseResult, Key, Ranking
 from armid_ros.diagnosis.settings import DiagnosisSettings, HOW_OFTEN, SIZES
@@ -40,7 +40,7 @@ class Explanation:
     steps : tuple of CauseResult
         The named causes, in the order of ``fitted``.
     evidence : Evidence
-        The recordings, with the floor of the gap as deviation.
+        The recordings, weighted by the floor of the gap.
     problem : JointFit or None
         Least-squares problem of the values; None in a finished diagnosis.
     minor : tuple of CauseResult
@@ -86,7 +86,8 @@ class Explanation:
     @property
     def refitted(self) -> bool:
         """Whether the rigid body is refitted; False in a finished diagnosis, which states it."""
-        return self.problem is not None and self.problem.refits_body
+        problem = self.problem
+        return problem is not None and problem.patches_body and problem.hyperparameters.body > 0.0
 
     def without(self, *names: int) -> Explanation:
         """Move causes with these indices to the minor causes, and refit the other causes."""
@@ -130,7 +131,7 @@ def has_no_gap(explanation: Explanation, settings: DiagnosisSettings) -> bool:
 def explain(
     problem: JointFit,
     evidence: Evidence,
-    result: Result,
+    result: Selection,
     settings: DiagnosisSettings,
     unknown: Sequence[Effect] = (),
     known: tuple[Fitted, Sequence[CauseResult]] | None = None,
@@ -143,8 +144,8 @@ def explain(
     problem : JointFit
         Least-squares problem of the values.
     evidence : Evidence
-        The recordings, with the floor of the gap as deviation.
-    result : Result
+        The recordings, weighted by the floor of the gap.
+    result : Selection
         The accepted causes.
     settings : DiagnosisSettings
         Thresholds, and the share of a torque that is material.
@@ -192,7 +193,7 @@ def explain(
 
 
 def _unset(
-    result: Result, unknown: Sequence[Effect], settings: DiagnosisSettings
+    result: Selection, unknown: Sequence[Effect], settings: DiagnosisSettings
 ) -> Iterator[CauseResult]:
     """
     Yield the result of each friction and offset that is fitted because the model lacks its value.
@@ -242,7 +243,7 @@ def _unset(
 
 
 def survey(
-    result: Result,
+    result: Selection,
     settings: DiagnosisSettings,
     unknown: Sequence[Effect] = (),
     named: Collection[Key] = (),

@@ -21,7 +21,7 @@ from armid_ros.diagnosis.data.evidence import Evidence
 from armid_ros.diagnosis.data.rows import Rows
 from armid_ros.diagnosis.data.trajectory import Trajectory
 from armid_ros.diagnosis.search.candidates import cause_of, value_unit
-from armid_ros.diagnosis.search.cause import bounds_of_change, Cause, NamedEffect
+from armid_ros.diagnosis.search.cause import bounds_of_change, NamedEffect
 from armid_ros.diagnosis.search.hyperparameters import CORRELATED_ROWS, Hyperparameters
 from armid_ros.diagnosis.search.nuisance import Nuisance
 from armid_ros.effects import Effect, TorqueReading
@@ -112,11 +112,6 @@ class JointFit:
         hyperparameters = Hyperparameters(1.0, 0.0, 0.0, 1.0, CORRELATED_ROWS)
         return cls(nuisance.arm, nuisance, hyperparameters, every, patches_body=True)
 
-    @property
-    def refits_body(self) -> bool:
-        """Whether the body of the arm is refitted."""
-        return self.patches_body and self.hyperparameters.body > 0.0
-
     def fit(self, named: Sequence[NamedEffect] = ()) -> Fitted:
         """
         Fit the values and shapes of named effects by Gauss-Newton steps with a line search.
@@ -204,23 +199,23 @@ class JointFit:
 
     def with_model(self, model: ArmModel) -> Nuisance:
         """Return the regression problem with the residual of a model in diagnosed recordings."""
-        return self.nuisance.with_residual(self._weighted_residual(model))
-
-    def _weighted_residual(self, model: ArmModel) -> list[FloatArray]:
-        """Return the weighted residuals (n, M): of a model in diagnosed recordings only."""
         rows = self.nuisance.rows
+        unchanged = [np.zeros_like(part.unsure) for part in rows.data]
+        return self.nuisance.with_residual(self._weighted_residual(model, unchanged))
+
+    def _weighted_residual(
+        self, model: ArmModel, torque: Sequence[FloatArray]
+    ) -> list[FloatArray]:
+        """Return weighted residuals (n, M), of a model minus `torque` in diagnosed recordings."""
+        rows, residual = self.nuisance.rows, list(self.nuisance.residual)
         rest = [
-            part.residual(model) if rows.diagnosed[part.fold] else np.zeros_like(part.unsure)
-            for part in rows.data
+            own + part.residual(model) if rows.diagnosed[part.fold] else own
+            for own, part in zip(torque, rows.data, strict=True)
         ]
-        joints = range(rest[0].shape[1])
-        weighted = rows.weighted([own[:, :, np.newaxis] for own in rest], joints)
-        return [
-            own[:, :, 0] if today else before
-            for own, before, today in zip(
-                weighted, self.nuisance.residual, rows.diagnosed, strict=True
-            )
-        ]
+        weighted = rows.weighted([own[:, :, np.newaxis] for own in rest], range(len(rows.torque)))
+        for k in np.flatnonzero(rows.diagnosed).tolist():
+            residual[k] = weighted[k][:, :, 0]
+        return residual
 
     def _loss(self, named: Sequence[NamedEffect]) -> float:
         """Return the negative log likelihood of the effects, with fitted nuisance parameters."""
@@ -254,8 +249,7 @@ class JointFit:
         rows, result = self.nuisance.rows, self.nuisance
         fitted = [k for k, part in enumerate(rows.data) if part.fold in self.recordings]
         blocks = {k: patch_columns(self.arm, named, rows.data[k]) for k in fitted}
-        made = list[Cause]()
-        torque = [np.zeros((*part.unsure.shape, 1)) for part in rows.data]
+        torque = [np.zeros_like(part.unsure) for part in rows.data]
         for n, own in enumerate(named):
             count, kept = blocks[fitted[0]][n].shape[2], list(own.kept)
             columns = [
@@ -270,20 +264,11 @@ class JointFit:
             # the comparison has refined the shape, so its prior deviation is small
             shapes = 0.3 * np.maximum(np.abs(own.effect.shape), size)
             unit = np.concatenate([unit, shapes])
-            made.append(cause_of(result, own.effect, own.kept, columns, unit))
-            for total, x in zip(torque, only, strict=True):
-                total[:, :, 0] += x @ own.values[kept]
-        for cause in made:
+            cause = cause_of(self.nuisance, own.effect, own.kept, columns, unit)
             result = result.and_cause(cause)
-        present = rows.weighted(torque, range(len(rows.torque)))
-        return result.with_residual(
-            [
-                rest + x[:, :, 0] if today else rest
-                for rest, x, today in zip(
-                    self._weighted_residual(model), present, rows.diagnosed, strict=True
-                )
-            ]
-        )
+            for total, x in zip(torque, only, strict=True):
+                total += x @ own.values[kept]
+        return result.with_residual(self._weighted_residual(model, torque))
 
 
 def patched_arm(arm: ArmModel, named: Sequence[NamedEffect]) -> ArmModel:

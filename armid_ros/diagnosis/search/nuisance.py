@@ -174,10 +174,7 @@ class Nuisance:
         border = np.concatenate([self._acting(x) * x.products for x in self.accepted], axis=2)
         pairs = [self._acting(x) * self._among_accepted(x) for x in self.accepted]
         within = np.concatenate(pairs, axis=2)
-        below = np.concatenate([border.swapaxes(1, 2), within], axis=2)
-        return np.concatenate(
-            [np.concatenate([self.column_products[0], border], axis=2), below], axis=1
-        )
+        return np.block([[self.column_products[0], border], [border.swapaxes(1, 2), within]])
 
     @cached_property
     def cross(self) -> FloatArray:

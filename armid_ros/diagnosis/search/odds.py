@@ -101,19 +101,9 @@ class CauseInformation:
         by_day: bool = False,
     ) -> CauseInformation:
         """
-        Integrate out the nuisance parameters for causes with equal numbers of values.
+        Return the information on causes with equal numbers of values.
 
-        Parameters
-        ----------
-        causes : sequence of Cause
-            The causes.
-        nuisance : Nuisance
-            The regression problem.
-        posterior : NuisancePosterior
-            Posterior of the nuisance parameters without the causes.
-        by_day : bool
-            Whether values are equal in all baseline and in all diagnosed recordings; otherwise
-            each recording is a group.
+        Each recording is a group; with `by_day`, the baseline and the diagnosed recordings are.
 
         """
         today, scale = nuisance.rows.diagnosed, posterior.hyperparameters.precision
@@ -175,7 +165,7 @@ class CauseInformation:
         return replace(self, matrix=matrix, vector=self.vector[..., kept])
 
     def difference_root(self, spread: float) -> list[FloatArray]:
-        """Return a root R of the prior covariance RR' of the u_k in a list; empty for spread 0."""
+        """Return [R], where RR' is the prior covariance of all u_k; empty without spread."""
         if not spread:
             return []
         p, groups = self.size, len(self.diagnosed)
@@ -186,7 +176,7 @@ class CauseInformation:
         return [_block_diagonal(np.stack([root] * groups, axis=-3))]
 
     def baseline_root(self) -> FloatArray:
-        """Return a root R of the prior covariance RR' of g0, which is equal in all groups."""
+        """Return R, where RR' is the prior covariance of g0, which is equal in all groups."""
         return np.tile(THERE * np.eye(self.size), (len(self.diagnosed), 1))
 
 
@@ -199,7 +189,7 @@ def _block_diagonal(blocks: FloatArray) -> FloatArray:
     return whole.reshape(*shape, groups * p, groups * p)
 
 
-def odds(
+def fit_cause(
     cause: Cause,
     nuisance: Nuisance,
     posterior: NuisancePosterior,
@@ -208,10 +198,10 @@ def odds(
 ) -> CauseFit:
     """Return the log Bayes factor of a cause and the posterior of its values."""
     information = CauseInformation.of([cause], nuisance, posterior, by_day=not spreads.any())
-    return cause_fits([cause], nuisance, information, typical_spread, spreads)[0]
+    return fit_causes([cause], nuisance, information, typical_spread, spreads)[0]
 
 
-def cause_fits(
+def fit_causes(
     causes: Sequence[Cause],
     nuisance: Nuisance,
     information: CauseInformation,
@@ -248,7 +238,7 @@ def cause_fits(
         baseline_root = [
             np.tile(np.eye(p) * largest[:, np.newaxis], (len(information.diagnosed), 1))
         ]
-    asked = np.kron(acts.astype(float)[:, np.newaxis], np.eye(p))
+    acting = np.kron(acts.astype(float)[:, np.newaxis], np.eye(p))
     prior = -0.5 * np.log((spreads + 1.0) / (typical_spread + 1.0)) ** 2
     prior -= np.logaddexp.reduce(prior)
     nothing, changed = np.tile(prior, (2, count, 1))
@@ -259,7 +249,7 @@ def cause_fits(
         for root in [*information.difference_root(spread), *baseline_root]:
             square, aim, more = marginalised(square, aim, root)
             nothing[:, n] += more
-        own, to = asked.T @ square @ asked, aim @ asked
+        own, to = acting.T @ square @ acting, aim @ acting
         value, axes = np.linalg.eigh(own)
         wide = 1.0 + squares * np.maximum(value, 0.0)[:, np.newaxis]
         along = squares * ((to[:, np.newaxis] @ axes) ** 2)

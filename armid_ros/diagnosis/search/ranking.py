@@ -11,7 +11,7 @@ from typing import TypeAlias
 from armid_ros.diagnosis.search.cause import Cause
 from armid_ros.diagnosis.search.hyperparameters import NuisancePosterior
 from armid_ros.diagnosis.search.nuisance import Nuisance
-from armid_ros.diagnosis.search.odds import cause_fits, CauseFit, CauseInformation
+from armid_ros.diagnosis.search.odds import CauseFit, CauseInformation, fit_causes
 from armid_ros.diagnosis.settings import Thresholds
 from armid_ros.effects import Effect
 from armid_ros.motion import FloatArray
@@ -177,7 +177,7 @@ class Ranking:
 
     def tested(self, one: RankedCause | Cause, material: float) -> CauseResult:
         """
-        Fit the values of a cause, and summarise its visibility, log odds and share.
+        Fit the values of a cause; return them with visibility, log odds and share.
 
         Parameters
         ----------
@@ -193,7 +193,7 @@ class Ranking:
         )
         information = CauseInformation.of([cause], nuisance, posterior)
         spread = np.array([typical_spread * (nuisance.rows.n_baseline > 0)])
-        (fit,) = cause_fits([cause], nuisance, information, typical_spread, spread)
+        (fit,) = fit_causes([cause], nuisance, information, typical_spread, spread)
         groups, size, visible = (
             len(information.diagnosed),
             information.size,

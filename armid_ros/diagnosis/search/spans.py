@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import TypeAlias
 
 from armid_ros.diagnosis.search.cause import Cause
-from armid_ros.diagnosis.search.odds import cause_fits, CauseInformation, OWN_SPREADS
+from armid_ros.diagnosis.search.odds import CauseInformation, fit_causes, OWN_SPREADS
 from armid_ros.diagnosis.search.ranking import RankedCause, Ranking
 from armid_ros.diagnosis.settings import Thresholds
 from armid_ros.motion import FloatArray
@@ -114,7 +114,7 @@ class _TimedCause:
             causes.append(replace(cause, products=products, own=own, aim=aim))
         # Earlier values act throughout, so that all spans are compared with the same null model.
         information = CauseInformation.of(causes, nuisance, self.ranked.posterior, by_day=True)
-        fits = cause_fits(causes, nuisance, information.of_day(diagnosed=True))
+        fits = fit_causes(causes, nuisance, information.of_day(diagnosed=True))
         return [
             replace(self.ranked, cause=timed, fit=fit, log_bayes_factor=fit.factor - choice)
             for timed, choice, fit in zip(causes, choices, fits, strict=True)
@@ -198,10 +198,9 @@ def acting_spans(ranking: Ranking, thresholds: Thresholds) -> tuple[Span, ...]:
     best, spans, own = max(found, key=lambda one: one[0].log_posterior)
     throughout = max((one.throughout for one in timed), key=lambda one: one.log_posterior)
     nuisance = ranking.nuisance
-    information = CauseInformation.of([best.cause], nuisance, best.posterior).of_day(
-        diagnosed=True
-    )
-    (there,) = cause_fits([best.cause], nuisance, information, ranking.typical_spread, OWN_SPREADS)
+    every = CauseInformation.of([best.cause], nuisance, best.posterior)
+    information, spread = every.of_day(diagnosed=True), ranking.typical_spread
+    (there,) = fit_causes([best.cause], nuisance, information, spread, OWN_SPREADS)
     lead = best.log_odds_over(throughout, thresholds)
     if min(lead, there.factor) <= thresholds.alarm:
         return ()

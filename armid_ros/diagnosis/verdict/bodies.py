@@ -94,7 +94,7 @@ def as_bodies(explanation: Explanation) -> tuple[Explanation, tuple[str, ...]]:
 
     """
     problem, fitted = explanation.problem, explanation.fitted
-    if problem is None or not problem.refits_body:
+    if problem is None or not explanation.refitted:
         return explanation, ()
     base, arm = problem.nuisance.base, problem.arm
     if not base.rank or base.independent.min() >= len(arm.robot.rigid_parameters):

@@ -220,14 +220,14 @@ class Gap:
     @classmethod
     def of(cls, explanation: Explanation, unseen: Evidence | None) -> Gap:
         """
-        Measure the residuals in held-out recordings, or in the fitted ones without any.
+        Measure the residuals in held-out recordings, or in fitted ones if none is held out.
 
         Parameters
         ----------
         explanation : Explanation
             The fitted causes.
         unseen : Evidence or None
-            Held-out recordings, with the floor as deviation.
+            Held-out recordings, weighted by the floor of the gap.
 
         """
         before, after = explanation.reference.arm, explanation.fitted.arm

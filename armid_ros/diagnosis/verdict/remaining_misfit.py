@@ -39,8 +39,8 @@ from armid_ros.motion import FloatArray, Motion
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
-#: Largest residual at rest, divided by dry friction in motion. Breakaway friction adds two, and
-#: the model's friction, whose direction is arbitrary at rest, adds one.
+#: Largest residual at rest, divided by dry friction in motion: two of breakaway friction, and one
+#: of the model's friction, whose direction is arbitrary at rest.
 _MAX_REST_OVER_FRICTION = 3.0
 #: Signature of a blocked joint.
 _WHERE = 'torque beyond friction at rest or in a reversal: a stop, a brake or a contact'

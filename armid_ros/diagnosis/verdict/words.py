@@ -99,8 +99,6 @@ def decide(
         return Verdict('consistent', f'{refit}{text}')
     causes = _sentences(findings)
     if open_gap:
-        if sum(group[0].share for group in by_cause(findings)) < 0.5:
-            causes = causes.replace(' explains ', ' explains only ')
         return Verdict('partial', f'{causes} {refit}An error remains: {error} is {size}.')
     if any(one.other_causes for one in findings):
         return Verdict('ambiguous', f'{causes} {refit}'.rstrip())
@@ -121,7 +119,7 @@ def _refit(given_body: Excess | None, robot: Robot, floor: str) -> str:
 
 
 def larger(ratio: float) -> str:
-    """Return a ratio in words, such as '2.5 times as large as'."""
+    """Return the ratio of two errors in words, such as '2.5 times as large as'."""
     if ratio < 1.05:
         return 'a little larger than'
     return f'{ratio:.0f} times as large as' if ratio >= 100.0 else f'{ratio:.1f} times as large as'
