@@ -283,10 +283,7 @@ def identify(
         estimate=Estimate(fit.base.parameters, fit.values, fit.solution.covariance),
         condition_number=fit.solution.condition_number,
         joint_std=fit.solution.joint_std,
-        training=tuple(
-            Fit(part.source, part.motion, part.informative, torque)
-            for part, torque in zip(fit.problem, fit.predicted, strict=True)
-        ),
+        training=fit.fits,
         used=used,
         settings=settings,
         notes=notes + _remarks(fit, theory),

@@ -20,6 +20,7 @@ from armid_ros.arm import ArmModel
 from armid_ros.identification.fitting.identifiability import bounds
 from armid_ros.identification.fitting.least_squares import Method, Solution, solve
 from armid_ros.identification.rows.regression import (
+    Fit,
     predictions,
     Regression,
     regressions,
@@ -75,6 +76,14 @@ class FittedValues:
     predicted: Torques
     passes: int = 1
     converged: bool = True
+
+    @property
+    def fits(self) -> tuple[Fit, ...]:
+        """Measured and predicted torques of the training data, per stretch."""
+        return tuple(
+            Fit(part.source, part.motion, part.informative, torque)
+            for part, torque in zip(self.problem, self.predicted, strict=True)
+        )
 
 
 def fit_values(
