@@ -80,7 +80,7 @@ class SignalSettings:
 @dataclass(frozen=True)
 class Conditioning:
     """
-    Low-pass of positions and decimation of rows, for recordings of one sampling rate.
+    Cut-off of positions, and decimation, for recordings of one sampling rate.
 
     Attributes
     ----------

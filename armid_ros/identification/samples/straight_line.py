@@ -101,7 +101,7 @@ class ErrorModel:
     quantile: float
 
     def growth(self, noise: Factor, acceleration: Factor) -> FloatArray:
-        """Return the growth of errors by both causes together, shape (m,) or (N, m)."""
+        """Return the growth of errors by noise and acceleration together, (m,) or (N, m)."""
         squares = acceleration**2
         return np.asarray(np.sqrt(squares + self.white * (noise**2 - squares)))
 
@@ -112,7 +112,7 @@ class ErrorModel:
 
     def limits(self, noise: Factor, acceleration: Factor) -> FloatArray:
         """
-        Return the largest allowed prediction errors for growth factors, shape (m,) or (N, m).
+        Return the largest allowed prediction errors, given their growth by noise and acceleration.
 
         The acceleration of an arm is bounded, unlike noise, which has tails. The limit of a smooth
         signal is therefore a small multiple of its usual error, not a quantile of the normal
@@ -149,7 +149,7 @@ class Innovation(NamedTuple):
 
 
 def growth_over(step: Time, ahead: Time, period: float) -> tuple[Time, Time]:
-    """Return the growth of errors, by noise and by acceleration, with the time ahead [s]."""
+    """Return the growth of prediction errors, by noise and by acceleration, with time ahead."""
     ratio = ahead / step
     noise: Time = ((1.0 + (1.0 + ratio) ** 2 + ratio**2) / 6.0) ** 0.5
     return noise, 0.5 * ahead * (ahead + step) / period**2

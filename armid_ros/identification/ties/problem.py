@@ -37,7 +37,7 @@ _COMMON = ('motion_lags', 'torque_lags', 'torque_noise', 'described', 'precision
 @dataclass(frozen=True)
 class InteractionProblem:
     """
-    Regression tau = known + columns theta, with the noise of torques and of both motions.
+    Regression of torques on springs between two machines, tau = known + columns theta.
 
     Attributes
     ----------
