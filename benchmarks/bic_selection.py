@@ -16,7 +16,7 @@ from collections.abc import Sequence
 
 from armid_ros.arm import ArmModel
 from armid_ros.arm.memoized_arm import memoized_arm
-from armid_ros.diagnosis.data.baseline import excited, refitted
+from armid_ros.diagnosis.data.baseline import excited_parameters, refitted_arm
 from armid_ros.diagnosis.data.evidence import Evidence
 from armid_ros.diagnosis.data.rows import Rows
 from armid_ros.diagnosis.data.trajectory import trajectories
@@ -62,10 +62,10 @@ def bic_selection(
     """
     used = choose_filters(arm, recordings, (), settings, rng)
     data = trajectories(recordings, used)
-    base, _ = excited(arm, arm.base_parameters(rng), data)
+    base, _ = excited_parameters(arm, arm.base_parameters(rng), data)
     one = [np.ones(arm.robot.n_joints)] * len(data)
     pooled_rows = Evidence.over_noise(data, one)
-    alike = np.sqrt(pooled_rows.power(pooled_rows.residuals(refitted(arm, base, data, one))))
+    alike = np.sqrt(pooled_rows.power(pooled_rows.residuals(refitted_arm(arm, base, data, one))))
     rows = Rows.over_noise(Evidence.over_noise(data, [alike] * len(data)))
     nuisance = Nuisance.of(rows, memoized_arm(arm), rng)
     catalogue = Causes(settings.kinds, nuisance, False, frozenset())
@@ -77,7 +77,7 @@ def bic_selection(
         squares = nuisance.squares_of_diagnosed(posterior)
         best, cause = 0.0, None
         for candidate in catalogue.causes(nuisance, posterior):
-            known = CauseInformation.of([candidate], nuisance, posterior, by_day=True)
+            known = CauseInformation.of([candidate], nuisance, posterior, pooled=True)
             if known.visible[0] < _LEAST_VISIBLE:
                 continue
             matrix, vector = known.matrix[0], known.vector[0]

@@ -150,8 +150,8 @@ def diagnose(
         timed = _of_spans(explanation, explainer, recordings, validate, notes, doubt)
         result = timed or result
     if (result.verdict in OPEN or result.doubt) and settings.partner is None:
-        days = [*recordings, *validate], baseline
-        apart = [one for day in days for one in _with_unfitted_joints(arm, day, used)]
+        groups = [*recordings, *validate], baseline
+        apart = [one for group in groups for one in _with_unfitted_joints(arm, group, used)]
         alone = mistaken_recordings(arm, apart, used)
         return _bad_data(given, result.data, alone, result.notes) if alone else result
     return result
@@ -207,17 +207,17 @@ def _of_spans(
 
 
 def _with_unfitted_joints(
-    arm: ArmModel, day: Sequence[Recording], used: Conditioning
+    arm: ArmModel, recordings: Sequence[Recording], used: Conditioning
 ) -> Iterator[tuple[Recording, npt.NDArray[np.bool_]]]:
     """Yield recordings with a mask of the joints that fit the model in other recordings only."""
     unit = np.ones(arm.robot.n_joints)
-    bad, sound = np.zeros((2, len(day), len(unit)), dtype=bool)
-    for k, one in enumerate(day):
+    bad, sound = np.zeros((2, len(recordings), len(unit)), dtype=bool)
+    for k, one in enumerate(recordings):
         parts = trajectories([one], used, arm)
         rows = Evidence.over_noise(parts, [unit] * len(parts))
         bad[k] = 100.0 * rows.relative_errors(rows.residuals(arm)) > LIMITS.unusable
         sound[k] = (rows.count > 0.0) & ~bad[k]
-    for one, own in zip(day, bad & sound.any(axis=0), strict=True):
+    for one, own in zip(recordings, bad & sound.any(axis=0), strict=True):
         if own.any():
             yield one, own
 
@@ -264,6 +264,7 @@ def _as_diagnosis(
     share = settings.thresholds.headline
     small = [one for one in found if settings.everything and one.share < share]
     remarks = _remarks(found, worse, explanation, word.word, doubt, explainer)
+    untested = explanation.untested if before is not None else ''
     return Diagnosis(
         verdict=word.word,
         summary=' '.join([word.summary, *remarks]),
@@ -277,7 +278,7 @@ def _as_diagnosis(
         data=tuple(evidence.data),
         not_visible=_not_visible(explanation, found, explainer),
         refitted=explanation.refitted,
-        notes=tuple(x for x in (*notes, *explanation.notes, *of_bodies) if x not in remarks),
+        notes=tuple(x for x in (*notes, untested, *of_bodies) if x and x not in remarks),
         baseline=explanation.floor,
         harmful=bool(found and worse),
         doubt=doubt,

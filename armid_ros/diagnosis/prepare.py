@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from armid_ros.arm import ArmModel
-from armid_ros.diagnosis.data.baseline import excited, refitted
+from armid_ros.diagnosis.data.baseline import excited_parameters, refitted_arm
 from armid_ros.diagnosis.data.evidence import noise_floor, NoiseFloor
 from armid_ros.diagnosis.data.trajectory import MAX_UNCERTAIN_SHARE, thinnable, Trajectory
 from armid_ros.diagnosis.settings import DiagnosisSettings
@@ -110,8 +110,8 @@ def prepare(
     if misfit:
         return prepared
     fuller, _ = with_friction(arm, settings.library)
-    base, _ = excited(fuller, fuller.base_parameters(rng.spawn(1)[0]), data)
-    fuller = refitted(fuller, base, data, prepared.sigma)
+    base, _ = excited_parameters(fuller, fuller.base_parameters(rng.spawn(1)[0]), data)
+    fuller = refitted_arm(fuller, base, data, prepared.sigma)
     friction = fuller.action().dry_friction
     allowed = np.full(arm.robot.n_joints, np.inf)
     if friction is not None:
@@ -139,8 +139,8 @@ def _measured(
     arm: ArmModel, used: Conditioning, data: Sequence[Trajectory], theory: BaseParameters
 ) -> Prepared:
     """Measure the noise twice: in the residual of the given arm, then of the refitted arm."""
-    base, _ = excited(arm, theory, data)
-    refit = refitted(arm, base, data, [noise_floor(part, arm).sigma for part in data])
+    base, _ = excited_parameters(arm, theory, data)
+    refit = refitted_arm(arm, base, data, [noise_floor(part, arm).sigma for part in data])
     return Prepared(used, tuple(data), tuple(noise_floor(part, refit) for part in data))
 
 

@@ -24,7 +24,7 @@ from armid_ros.diagnosis.search.cause import NamedEffect
 from armid_ros.diagnosis.search.comparison import grid_without_baseline
 from armid_ros.diagnosis.search.explainer import Explainer
 from armid_ros.diagnosis.search.explanation import explain, Explanation, has_no_gap, survey
-from armid_ros.diagnosis.search.joint_fit import Fitted, JointFit, patched_arm, places
+from armid_ros.diagnosis.search.joint_fit import Fitted, JointFit, parameter_ranges, patched_arm
 from armid_ros.diagnosis.search.ranking import CauseResult
 from armid_ros.effects.tied import Partner, Tied, TiedInteraction, TiedSlack
 from armid_ros.errors import IdentificationError
@@ -218,7 +218,7 @@ def _with_springs(explanation: Explanation, found: Interaction) -> Fitted:
     if any(not isinstance(name.effect, Tied) for name in fitted.named):
         wider = np.maximum(wider, 1.0)
     named = list[NamedEffect]()
-    for own, place in zip(fitted.named, places(fitted.named), strict=True):
+    for own, place in zip(fitted.named, parameter_ranges(fitted.named), strict=True):
         replaced = own.values.copy()
         replaced[list(own.kept)] = values[list(place[0])]
         named.append(replace(own, values=replaced))

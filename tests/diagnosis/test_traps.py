@@ -53,7 +53,7 @@ def significant(arm, data, sigma, names):
     causes = Causes(kinds, nuisance, False, frozenset()).causes(nuisance, posterior)
     p = {}
     for cause in causes:
-        known = CauseInformation.of([cause], nuisance, posterior, by_day=True)
+        known = CauseInformation.of([cause], nuisance, posterior, pooled=True)
         matrix, vector = known.matrix[0], known.vector[0]
         gain = float(vector @ np.linalg.lstsq(matrix, vector, rcond=1e-6)[0])
         name = cause.effect.name

@@ -34,7 +34,7 @@ import numpy as np
 import scipy.linalg
 
 
-def excited(
+def excited_parameters(
     arm: ArmModel, theory: BaseParameters, data: Sequence[Trajectory]
 ) -> tuple[BaseParameters, list[FloatArray]]:
     """Return the base parameters that are identifiable in the data, and their columns."""
@@ -92,7 +92,7 @@ def described_precision(
     return np.asarray(kept @ scaled_inverse(within @ covariance @ within.T) @ kept.T)
 
 
-def refitted(
+def refitted_arm(
     arm: ArmModel, base: BaseParameters, data: Sequence[Trajectory], sigma: Sequence[FloatArray]
 ) -> ArmModel:
     """Return the arm with base parameters fitted to trajectories of noise sigma (n,) [N m]."""
@@ -135,7 +135,7 @@ class Baseline:
     def of(cls, arm: ArmModel, data: Sequence[Trajectory], rng: np.random.Generator) -> Baseline:
         """Measure the misfit of a model in baseline recordings, by cross-validation."""
         residuals = [part.residual(arm) for part in data]
-        base, columns = excited(arm, arm.base_parameters(rng), data)
+        base, columns = excited_parameters(arm, arm.base_parameters(rng), data)
         prior = described_precision(base, arm)
         informative = np.concatenate([part.informative for part in data])
         informative[:, ~informative.any(axis=0)] = True  # all rows of a joint that never moved

@@ -113,7 +113,7 @@ class Causes:
         size = len(first.quantities)
         whole = replace(first, joints=tuple(one.effect.joints[0] for one in singles))
         (every,) = self._single_causes(whole, [whole])
-        known = CauseInformation.of([every], nuisance, posterior, by_day=True)
+        known = CauseInformation.of([every], nuisance, posterior, pooled=True)
 
         def among(members: tuple[int, ...]) -> tuple[float, Cause]:
             values = np.add.outer(size * np.array(members), np.arange(size)).ravel()

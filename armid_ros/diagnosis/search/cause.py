@@ -67,9 +67,9 @@ class Cause:
         """Name, joints and parameter indices, which identify the cause in any shape."""
         return self.effect.name, self.effect.joints, self.kept
 
-    def acts(self, today: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
+    def acts(self, diagnosed: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
         """Return whether the cause acts in each recording, given which are diagnosed, (K,)."""
-        return np.ones_like(today) if self.always or self.effect.lasting else today
+        return np.ones_like(diagnosed) if self.always or self.effect.lasting else diagnosed
 
     def at(self, values: FloatArray, robot: Robot) -> NamedEffect:
         """Return the effect with these values of its fitted parameters; the others are zero."""

@@ -269,7 +269,7 @@ class CauseComparison:
             groups.setdefault((len(cause.unit), cause.effect.lasting), []).append(cause)
         first: dict[object, tuple[float, Cause, NuisancePosterior]] = {}
         for one, group in product(tried, groups.values()):
-            information = CauseInformation.of(group, nuisance, one, by_day=True)
+            information = CauseInformation.of(group, nuisance, one, pooled=True)
             for cause, fit in zip(group, fit_causes(group, nuisance, information), strict=True):
                 log_posterior = fit.factor + one.evidence + cause.prior
                 if cause.key not in first or log_posterior > first[cause.key][0]:

@@ -216,8 +216,7 @@ class Explainer:
         result = self.comparison(rows.above_rounding(), None).select()
         found = self._fit_changes(result, evidence, result.first.typical_spread)
         untested = _ONE_EACH if found.steps and first == second + third == 1 else ''
-        notes = (untested,) if untested else ()
-        return replace(found, floor=OWN_MISFIT, misfit=misfit, notes=notes, untested=untested)
+        return replace(found, floor=OWN_MISFIT, misfit=misfit, untested=untested)
 
     def _fit_changes(self, result: Selection, evidence: Evidence, spread: float) -> Explanation:
         """Fit the accepted causes as changes of the given model."""

@@ -55,8 +55,6 @@ class Explanation:
         Floor of the gap, in words.
     misfit : ndarray, shape (n,), or float
         Misfit that the floor contains; zero if the floor is noise alone [N m].
-    notes : tuple of str
-        Notes for the reader of the report.
     untested : str
         Sentence on the recordings that would separate a change from the misfit of another motion.
         If it is not empty, and there is a baseline, named causes have to explain most of the gap.
@@ -75,7 +73,6 @@ class Explanation:
     ranking: Ranking | None = None
     floor: str = NOISE
     misfit: FloatArray | float = 0.0
-    notes: tuple[str, ...] = ()
     untested: str = ''
 
     @property
@@ -205,7 +202,7 @@ def _unset(
     """
     nuisance = result.nuisance
     means, covariance = nuisance.moments(result.posterior)
-    today, joints = np.flatnonzero(nuisance.rows.diagnosed).tolist(), nuisance.arm.robot.joints
+    diagnosed, joints = np.flatnonzero(nuisance.rows.diagnosed).tolist(), nuisance.arm.robot.joints
     residual = nuisance.squares_of_diagnosed(result.posterior)
     names = [(one.name, one.joint) for one in nuisance.base.parameters]
     for effect in unknown:
@@ -213,7 +210,7 @@ def _unset(
         if (parameter.name, parameter.joint) not in names:
             continue
         k = names.index((parameter.name, parameter.joint))
-        columns = [nuisance.columns[j][:, :, k] for j in today]
+        columns = [nuisance.columns[j][:, :, k] for j in diagnosed]
         square = float(sum(np.sum(x**2) for x in columns))
         count = max(sum(np.count_nonzero(x) for x in columns), 1)
         joint = joints.index(parameter.joint)
@@ -238,7 +235,7 @@ def _unset(
             2.0 * odds,
             odds,
             min(means[k] ** 2 * square / max(residual, 1e-300), 1.0),
-            len(today),
+            len(diagnosed),
         )
 
 

@@ -129,11 +129,11 @@ class JointFit:
         for _ in range(4 if named else 0):
             means = linear.means(posterior)
             step = means[linear.value_slices[0].start : linear.value_slices[len(named) - 1].stop]
-            for own, (kept, _) in zip(named, places(named), strict=True):
+            for own, (kept, _) in zip(named, parameter_ranges(named), strict=True):
                 step[kept.start : kept.stop] -= own.values[list(own.kept)]
             before = loss
             for share in (1.0, 0.5, 0.2):  # line search
-                tried = moved(self.arm, named, share * step)
+                tried = step_within_bounds(self.arm, named, share * step)
                 loss = self._loss(tried)
                 if loss < before:
                     break
@@ -278,12 +278,12 @@ def patched_arm(arm: ArmModel, named: Sequence[NamedEffect]) -> ArmModel:
     return arm
 
 
-def moved(
+def step_within_bounds(
     arm: ArmModel, named: Sequence[NamedEffect], change: FloatArray
 ) -> tuple[NamedEffect, ...]:
     """Return the named effects after a step of their fitted parameters, within bounds."""
     found = []
-    for own, (place, shapes) in zip(named, places(named), strict=True):
+    for own, (place, shapes) in zip(named, parameter_ranges(named), strict=True):
         effect = own.effect
         lower, upper = bounds_of_change(effect, arm)
         values = own.values.copy()
@@ -299,7 +299,7 @@ def moved(
     return tuple(found)
 
 
-def places(named: Sequence[NamedEffect]) -> list[tuple[range, range]]:
+def parameter_ranges(named: Sequence[NamedEffect]) -> list[tuple[range, range]]:
     """Return the index ranges of the values and of the shapes of each effect in the estimate."""
     found, start = [], 0
     for own in named:

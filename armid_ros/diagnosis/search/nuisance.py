@@ -22,7 +22,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 from armid_ros.arm import ArmModel
-from armid_ros.diagnosis.data.baseline import described_precision, excited
+from armid_ros.diagnosis.data.baseline import described_precision, excited_parameters
 from armid_ros.diagnosis.data.discrepancy import discrepancy_columns
 from armid_ros.diagnosis.data.rows import Rows
 from armid_ros.diagnosis.search.cause import Cause
@@ -113,7 +113,7 @@ class Nuisance:
         """
         free = np.setdiff1d(np.arange(len(arm.parameters)), constant)
         felt = arm if gravity is None else replace(arm, robot=arm.robot.with_gravity(gravity))
-        base, columns = excited(felt, felt.base_parameters(rng, free), rows.data)
+        base, columns = excited_parameters(felt, felt.base_parameters(rng, free), rows.data)
         prior_precision = described_precision(base, arm, information)
         rigid = len(arm.robot.rigid_parameters)
         values = arm.theta[base.independent]
@@ -390,8 +390,8 @@ class Nuisance:
 
     def squares_of_diagnosed(self, posterior: NuisancePosterior) -> float:
         """Return the sum of squared weighted residuals of the diagnosed recordings."""
-        values, today = self.means(posterior), np.flatnonzero(self.rows.diagnosed).tolist()
-        return float(sum(np.sum(self.residual_at(values, k) ** 2) for k in today))
+        values, diagnosed = self.means(posterior), np.flatnonzero(self.rows.diagnosed).tolist()
+        return float(sum(np.sum(self.residual_at(values, k) ** 2) for k in diagnosed))
 
     def noise_at(self, values: FloatArray, hyperparameters: Hyperparameters, k: int) -> FloatArray:
         """Return the weighted residual of recording k for given parameters, d_k fitted, (n, M)."""

@@ -98,17 +98,17 @@ class CauseInformation:
         causes: Sequence[Cause],
         nuisance: Nuisance,
         posterior: NuisancePosterior,
-        by_day: bool = False,
+        pooled: bool = False,
     ) -> CauseInformation:
         """
         Return the information on causes with equal numbers of values.
 
-        Each recording is a group; with `by_day`, the baseline and the diagnosed recordings are.
+        Each recording is a group; with `pooled`, the baseline and the diagnosed recordings are.
 
         """
-        today, scale = nuisance.rows.diagnosed, posterior.hyperparameters.precision
-        count, recordings, p = len(causes), len(today), len(causes[0].unit)
-        first = np.unique([0, nuisance.rows.n_baseline]) if by_day else np.arange(recordings)
+        diagnosed, scale = nuisance.rows.diagnosed, posterior.hyperparameters.precision
+        count, recordings, p = len(causes), len(diagnosed), len(causes[0].unit)
+        first = np.unique([0, nuisance.rows.n_baseline]) if pooled else np.arange(recordings)
         products = np.concatenate([nuisance.products(one) for one in causes], axis=2) * scale
         own = np.array([one.own for one in causes]) * scale
         aim = np.array([one.aim for one in causes]) * scale
@@ -141,7 +141,7 @@ class CauseInformation:
         return cls(
             0.5 * (whole + whole.swapaxes(1, 2)) + held,
             (aim.reshape(count, size) - posterior.values @ border) * unit,
-            today[first],
+            diagnosed[first],
             np.sqrt(np.clip(seen, 0.0, 1.0)),
         )
 
@@ -150,7 +150,7 @@ class CauseInformation:
         """Return the number p of values of a cause."""
         return int(self.vector.shape[-1]) // len(self.diagnosed)
 
-    def of_day(self, diagnosed: bool) -> CauseInformation:
+    def only(self, diagnosed: bool) -> CauseInformation:
         """Return the information of the diagnosed groups only, or of the baseline groups only."""
         of_it = self.diagnosed == diagnosed
         found = self._at(np.flatnonzero(np.repeat(of_it, self.size)))
@@ -197,7 +197,7 @@ def fit_cause(
     spreads: FloatArray = NO_SPREAD,
 ) -> CauseFit:
     """Return the log Bayes factor of a cause and the posterior of its values."""
-    information = CauseInformation.of([cause], nuisance, posterior, by_day=not spreads.any())
+    information = CauseInformation.of([cause], nuisance, posterior, pooled=not spreads.any())
     return fit_causes([cause], nuisance, information, typical_spread, spreads)[0]
 
 
@@ -312,7 +312,7 @@ def typical_spread_of(
     for cause in causes:
         if cause.effect.traits.external:
             continue
-        information = CauseInformation.of([cause], nuisance, posterior).of_day(diagnosed=False)
+        information = CauseInformation.of([cause], nuisance, posterior).only(diagnosed=False)
         found = []
         for spread in _USUAL_SPREADS:
             square, aim, total = information.matrix, information.vector, 0.0

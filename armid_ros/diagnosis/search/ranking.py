@@ -205,8 +205,8 @@ class Ranking:
             2.0 * x @ information.vector.reshape(groups, size)[g] - x @ blocks[g, :, g] @ x
             for g in np.flatnonzero(information.diagnosed)
         ]
-        today = np.flatnonzero(nuisance.rows.diagnosed).tolist()
-        explained = float(sum(fit.values @ cause.own[k] @ fit.values for k in today))
+        diagnosed = np.flatnonzero(nuisance.rows.diagnosed).tolist()
+        explained = float(sum(fit.values @ cause.own[k] @ fit.values for k in diagnosed))
         torque = cause.torque * visible / nuisance.rows.torque[:, np.newaxis]
         if isinstance(one, RankedCause):
             factor, log_odds = one.log_bayes_factor, one.odds

@@ -113,8 +113,8 @@ class _TimedCause:
                     choices[-1] += float(np.log(0.5 * count * (count - 1)))
             causes.append(replace(cause, products=products, own=own, aim=aim))
         # Earlier values act throughout, so that all spans are compared with the same null model.
-        information = CauseInformation.of(causes, nuisance, self.ranked.posterior, by_day=True)
-        fits = fit_causes(causes, nuisance, information.of_day(diagnosed=True))
+        information = CauseInformation.of(causes, nuisance, self.ranked.posterior, pooled=True)
+        fits = fit_causes(causes, nuisance, information.only(diagnosed=True))
         return [
             replace(self.ranked, cause=timed, fit=fit, log_bayes_factor=fit.factor - choice)
             for timed, choice, fit in zip(causes, choices, fits, strict=True)
@@ -199,7 +199,7 @@ def acting_spans(ranking: Ranking, thresholds: Thresholds) -> tuple[Span, ...]:
     throughout = max((one.throughout for one in timed), key=lambda one: one.log_posterior)
     nuisance = ranking.nuisance
     every = CauseInformation.of([best.cause], nuisance, best.posterior)
-    information, spread = every.of_day(diagnosed=True), ranking.typical_spread
+    information, spread = every.only(diagnosed=True), ranking.typical_spread
     (there,) = fit_causes([best.cause], nuisance, information, spread, OWN_SPREADS)
     lead = best.log_odds_over(throughout, thresholds)
     if min(lead, there.factor) <= thresholds.alarm:

@@ -128,8 +128,8 @@ def _products(problem: JointFit, fitted: Fitted) -> tuple[FloatArray, float]:
     then, now = (base.values(x.theta[: len(base.standard)]) for x in (problem.arm, fitted.arm))
     patched = problem.with_model(fitted.arm)
     products = np.zeros((rank + 1, rank + 1))
-    for k, today in enumerate(nuisance.rows.diagnosed):
-        values = now if today else then
+    for k, diagnosed in enumerate(nuisance.rows.diagnosed):
+        values = now if diagnosed else then
         square = patched.column_products[0][k][:rank, :rank]
         residual = patched.column_products[1][k][:rank]
         target = residual + square @ values

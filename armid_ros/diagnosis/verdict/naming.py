@@ -10,7 +10,7 @@ from typing import NamedTuple
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.search.cause import bounds_of_change, NamedEffect
 from armid_ros.diagnosis.search.explanation import Explanation
-from armid_ros.diagnosis.search.joint_fit import places
+from armid_ros.diagnosis.search.joint_fit import parameter_ranges
 from armid_ros.diagnosis.search.ranking import CauseResult
 from armid_ros.diagnosis.verdict.attribution import Attribution
 from armid_ros.diagnosis.verdict.bodies import is_same_body
@@ -129,7 +129,7 @@ def _in_catalogue(explanation: Explanation, arm: ArmModel) -> list[list[_Transla
     """Return for each fitted cause the effects of the catalogue that it stands for."""
     fitted, estimate = explanation.fitted, explanation.fitted.estimate
     result = []
-    for own, (kept, shapes) in zip(fitted.named, places(fitted.named), strict=True):
+    for own, (kept, shapes) in zip(fitted.named, parameter_ranges(fitted.named), strict=True):
         span = slice(kept.start, shapes.stop)
         covariance = estimate.covariance[span, span]
         translations = own.effect.named_as(own.values, arm)
