@@ -202,6 +202,14 @@ def data_remarks(
         for word, joints in changes.items()
         if joints
     )
+    named = any(CATALOGUE[one.name].lasting for one in found if one.name in CATALOGUE)
+    within = max(_temperature_spread(now), _temperature_spread(then))
+    # a fifth of the difference within the recordings separates a law of temperature from wear
+    if named and within < 0.2 * max(map(abs, warmer.values())):
+        yield (
+            'The temperature differs from the baseline but hardly changes within the recordings, '
+            'so wear of the same size is not excluded: record a range of temperatures.'
+        )
     equal = {joint for joint, more in warmer.items() if abs(more) < _MIN_DIFFERENCE}
     yield from _wear(found, equal.union(*(law.joints for law in laws)))
 
@@ -222,6 +230,12 @@ def _wear(found: Sequence[Finding], equal: Collection[str]) -> Iterator[str]:
             f'{text[0].upper()}{text[1:]} changed at equal temperature: wear or another grease, '
             'not a cold start.'
         )
+
+
+def _temperature_spread(data: Sequence[Trajectory]) -> float:
+    """Return the largest standard deviation of a joint temperature over recordings [K]."""
+    found = [part.motion.temperature.at(part.t) for part in data if part.motion.temperature]
+    return float(np.nanmax(np.concatenate(found).std(axis=0))) if found else 0.0
 
 
 def _friction_changes(
