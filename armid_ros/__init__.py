@@ -46,40 +46,27 @@ if TYPE_CHECKING:
     from armid_ros.recording import Recording, write_recording
     from armid_ros.robots import load_robot, Robot, shipped_robots
 
-#: Public names and their modules.
-_HOMES = {
-    'load_robot': 'armid_ros.robots',
-    'shipped_robots': 'armid_ros.robots',
-    'Robot': 'armid_ros.robots',
-    'ArmModel': 'armid_ros.arm',
-    'load_model': 'armid_ros.arm',
-    'save_model': 'armid_ros.arm',
-    'Effect': 'armid_ros.effects',
-    'Quantity': 'armid_ros.effects',
-    'make_effect': 'armid_ros.effects',
-    'register': 'armid_ros.effects',
-    'regressor': 'armid_ros.model',
-    'Motion': 'armid_ros.motion',
-    'Recording': 'armid_ros.recording',
-    'read_recording': 'armid_ros.api.arguments',
-    'write_recording': 'armid_ros.recording',
-    'inspect': 'armid_ros.api.inspection',
-    'InspectionResult': 'armid_ros.api.inspection',
-    'identify': 'armid_ros.api.identification',
-    'IdentificationResult': 'armid_ros.api.identification',
-    'OnlineIdentifier': 'armid_ros.identification.online.identifier',
-    'diagnose': 'armid_ros.api.diagnosis',
-    'DiagnosisResult': 'armid_ros.api.diagnosis',
-    'check': 'armid_ros.api.inspection',
-    'compare': 'armid_ros.api.comparison',
-    'ComparisonResult': 'armid_ros.api.comparison',
-    'simulate': 'armid_ros.api.simulation',
-    'design_excitation': 'armid_ros.api.design',
-    'excite': 'armid_ros.api.design',
-    'ExcitationResult': 'armid_ros.api.excitation',
-    'Estimate': 'armid_ros.estimate',
-    'ArmidError': 'armid_ros.errors',
+#: Public names by their module.
+_NAMES = {
+    'armid_ros.robots': ('load_robot', 'shipped_robots', 'Robot'),
+    'armid_ros.arm': ('ArmModel', 'load_model', 'save_model'),
+    'armid_ros.effects': ('Effect', 'Quantity', 'make_effect', 'register'),
+    'armid_ros.model': ('regressor',),
+    'armid_ros.motion': ('Motion',),
+    'armid_ros.recording': ('Recording', 'write_recording'),
+    'armid_ros.api.arguments': ('read_recording',),
+    'armid_ros.api.inspection': ('inspect', 'InspectionResult', 'check'),
+    'armid_ros.api.identification': ('identify', 'IdentificationResult'),
+    'armid_ros.identification.online.identifier': ('OnlineIdentifier',),
+    'armid_ros.api.diagnosis': ('diagnose', 'DiagnosisResult'),
+    'armid_ros.api.comparison': ('compare', 'ComparisonResult'),
+    'armid_ros.api.simulation': ('simulate',),
+    'armid_ros.api.design': ('design_excitation', 'excite'),
+    'armid_ros.api.excitation': ('ExcitationResult',),
+    'armid_ros.estimate': ('Estimate',),
+    'armid_ros.errors': ('ArmidError',),
 }
+_HOMES = {name: module for module, names in _NAMES.items() for name in names}
 
 __all__ = [
     'load_robot',
