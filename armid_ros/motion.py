@@ -55,6 +55,12 @@ def freeze_samples(where: str, samples: Any, *names: str) -> None:
         )
 
 
+def selected(instance: object, samples: Samples, *names: str) -> dict[str, Any]:
+    """Return array attributes of an object at selected samples, by name; None if missing."""
+    arrays = {name: getattr(instance, name) for name in names}
+    return {name: None if array is None else array[samples] for name, array in arrays.items()}
+
+
 @dataclass(frozen=True)
 class MovingPoints:
     """
@@ -79,7 +85,7 @@ class MovingPoints:
 
     def select(self, samples: Samples) -> MovingPoints:
         """Return the positions and velocities at selected samples."""
-        return replace(self, position=self.position[samples], velocity=self.velocity[samples])
+        return replace(self, **selected(self, samples, 'position', 'velocity'))
 
 
 @dataclass(frozen=True, eq=False)
@@ -177,15 +183,9 @@ class Motion:
 
     def select(self, samples: Samples) -> Motion:
         """Return the motion at selected samples, on the same time base."""
-        return replace(
-            self,
-            t=self.t[samples],
-            q=self.q[samples],
-            dq=self.dq[samples],
-            ddq=self.ddq[samples],
-            tau=None if self.tau is None else self.tau[samples],
-            partner=None if self.partner is None else self.partner.select(samples),
-        )
+        partner = None if self.partner is None else self.partner.select(samples)
+        arrays = selected(self, samples, 't', 'q', 'dq', 'ddq', 'tau')
+        return replace(self, **arrays, partner=partner)
 
     def at_rest(self) -> Motion:
         """Return the motion with the same positions, and with zero velocity and acceleration."""

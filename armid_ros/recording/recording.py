@@ -10,7 +10,15 @@ from importlib import import_module
 from typing import Literal, TYPE_CHECKING
 
 from armid_ros.errors import RecordingError
-from armid_ros.motion import FloatArray, freeze, freeze_samples, Motion, Samples, Temperatures
+from armid_ros.motion import (
+    FloatArray,
+    freeze,
+    freeze_samples,
+    Motion,
+    Samples,
+    selected,
+    Temperatures,
+)
 from armid_ros.recording.curves import draw_joints
 from armid_ros.robots import Robot
 import numpy as np
@@ -358,15 +366,8 @@ class Recording:
 
     def select(self, samples: Samples) -> Recording:
         """Return the recording at selected samples, on the same time base."""
-        partner = self.partner
-        return replace(
-            self,
-            t=self.t[samples],
-            q=self.q[samples],
-            dq=None if self.dq is None else self.dq[samples],
-            tau=None if self.tau is None else self.tau[samples],
-            partner=partner and replace(partner, q=partner.q[samples]),
-        )
+        partner = self.partner and replace(self.partner, q=self.partner.q[samples])
+        return replace(self, **selected(self, samples, 't', 'q', 'dq', 'tau'), partner=partner)
 
 
 def recorded_together(
@@ -423,11 +424,6 @@ def given_twice(fitted: Sequence[Recording], held_out: Sequence[Recording] = ())
     ----------
     fitted, held_out : sequence of Recording
         Recordings that the model is fitted to, and held-out recordings.
-
-    Returns
-    -------
-    str
-        Names of the repeated recordings and of their originals; empty if there are none.
 
     """
 
