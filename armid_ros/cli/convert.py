@@ -101,7 +101,6 @@ def _convert_bag(path: Path, out: Path | None) -> None:
     """Copy a ROS 1 bag to a ROS 2 bag, and print the copied topics."""
     from armid_ros.cli import options
     from armid_ros.recording import copy_bag, topics
-    from armid_ros.recording.bag import is_ros1
     from armid_ros.recording.columns import refuse_columns
 
     refuse_columns(path, columns.settings(), copied=True)
@@ -109,7 +108,7 @@ def _convert_bag(path: Path, out: Path | None) -> None:
         raise RecordingError(
             f'{path}: this is a bag, but --dry-run shows tables only; use armid inspect {path}'
         )
-    if not is_ros1(path):
+    if path.suffix.lower() != '.bag':  # the suffix of ROS 1
         topics(path)  # raises an error if the path is not a bag
         raise RecordingError(f'{path}: this is a bag of ROS 2 already; it needs no conversion')
     copied = copy_bag(path, out, options.read_settings())

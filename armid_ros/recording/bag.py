@@ -197,11 +197,6 @@ class Bag(Source):
         return source
 
 
-def is_ros1(path: Path) -> bool:
-    """Return whether a path has the suffix of a ROS 1 bag, .bag."""
-    return path.suffix.lower() == '.bag'
-
-
 def _storage_suffix(file: Path) -> str:
     """Return the suffix of a storage file, such as '.mcap' for BAG_0.mcap.zstd."""
     return Path(file.stem).suffix if file.suffix in _COMPRESSED else file.suffix
@@ -209,7 +204,7 @@ def _storage_suffix(file: Path) -> str:
 
 def is_bag_file(path: Path) -> bool:
     """Return whether a path has the suffix of a storage file of a ROS 2 or ROS 1 bag."""
-    return _storage_suffix(path) in _STORAGES or is_ros1(path)
+    return _storage_suffix(path) in _STORAGES or path.suffix.lower() == '.bag'
 
 
 def _files_of(path: Path) -> BagMetadata:

@@ -91,10 +91,7 @@ def store_for(described: MessageType) -> Typestore:
     if not described.definition:
         store = get_typestore(Stores.ROS2_JAZZY)
         if described.name not in store.fielddefs:
-            raise RecordingError(
-                f'type {described.name}: the bag does not have the definition of this type; '
-                'record again with ros2 bag record'
-            )
+            raise RecordingError(f'type {described.name}: the bag does not have its definition')
         return store
     store = Typestore()
     if described.encoding == 'ros2idl':
@@ -115,8 +112,7 @@ def _register(store: Typestore, name: str, definition: str | None) -> None:
         try:
             types = dict(get_types_from_msg(text, name))
         except (TypesysError, ValueError) as error:
-            problem = f'type {name}: the text is not a message definition: {error}'
-            raise RecordingError(problem) from error
+            raise RecordingError(f'type {name}: no valid message definition: {error}') from error
         if name not in types:
             raise RecordingError(f'type {name}: the given text defines {", ".join(types)} instead')
     store.register(types)

@@ -35,32 +35,23 @@ def joint_trajectory_cdr(motion: Motion | Reference) -> bytes:
     """
     store = get_typestore(Stores.ROS2_JAZZY)
     types = store.types
+    duration = types['builtin_interfaces/msg/Duration']
     nothing = np.empty((len(motion.t), 0))
     dq, ddq, tau = (
         nothing if values is None else values for values in (motion.dq, motion.ddq, motion.tau)
     )
-    points: list[Any] = []
-    for sample, time in enumerate(np.rint(motion.t * 1e9).astype(np.int64).tolist()):
-        seconds, nanoseconds = divmod(time, 10**9)
-        points.append(
-            types['trajectory_msgs/msg/JointTrajectoryPoint'](
-                positions=motion.q[sample],
-                velocities=dq[sample],
-                accelerations=ddq[sample],
-                effort=tau[sample],
-                time_from_start=types['builtin_interfaces/msg/Duration'](
-                    sec=seconds, nanosec=nanoseconds
-                ),
-            )
+    points = [
+        types['trajectory_msgs/msg/JointTrajectoryPoint'](
+            positions=motion.q[sample],
+            velocities=dq[sample],
+            accelerations=ddq[sample],
+            effort=tau[sample],
+            time_from_start=duration(*divmod(time, 10**9)),
         )
-    message = types[JOINT_TRAJECTORY](
-        header=types['std_msgs/msg/Header'](
-            stamp=types['builtin_interfaces/msg/Time'](sec=0, nanosec=0),
-            frame_id='',
-        ),
-        joint_names=list(motion.joints),
-        points=points,
-    )
+        for sample, time in enumerate(np.rint(motion.t * 1e9).astype(np.int64).tolist())
+    ]
+    header = types['std_msgs/msg/Header'](types['builtin_interfaces/msg/Time'](0, 0), '')
+    message = types[JOINT_TRAJECTORY](header, list(motion.joints), points)
     return bytes(store.serialize_cdr(message, JOINT_TRAJECTORY))
 
 
@@ -141,8 +132,7 @@ def read_waypoints(
         try:
             message: Any = store_for(chosen.message_type).deserialize_cdr(cdr, JOINT_TRAJECTORY)
         except SerdeError as error:
-            problem = f'the JointTrajectory message cannot be decoded: {error}'
-            raise RecordingError(problem) from error
+            raise RecordingError(f'the message cannot be decoded: {error}') from error
         found = waypoints_of(message)
     missing = [joint for joint in joints if joint not in found.joints]
     if missing:
@@ -151,9 +141,7 @@ def read_waypoints(
             f'{", ".join(found.joints)}'
         )
     if len(found.t) < 2:
-        raise RecordingError(
-            f'{where}: the trajectory needs two points or more, but has {len(found.t)}'
-        )
+        raise RecordingError(f'{where}: a trajectory needs two points, but has {len(found.t)}')
     return found.of_joints(tuple(joints))
 
 

@@ -25,13 +25,7 @@ from armid_ros.files import write_file
 from armid_ros.recording.mcap.records import MESSAGE, RECORD_HEADER
 from armid_ros.recording.mcap.writer import Compression, McapWriter, message_record
 from armid_ros.recording.message_types import message_type, MessageType, STRING, string_cdr
-from armid_ros.recording.metadata import (
-    bag_information,
-    FILE_NAME,
-    LATCHED,
-    VOLATILE,
-    yaml_text,
-)
+from armid_ros.recording.metadata import bag_information, FILE_NAME, LATCHED, VOLATILE, yaml_text
 from armid_ros.recording.source import IntArray, Source, Topic, UNREADABLE
 from armid_ros.version import __version__
 from mcap.opcode import Opcode
@@ -136,8 +130,7 @@ class BagWriter:
         try:
             self.path.mkdir(parents=True)
         except OSError as error:
-            problem = f'{self.path}: the directory cannot be created: {error.strerror}'
-            raise RecordingError(problem) from error
+            raise RecordingError(f'{self.path}: cannot be created: {error.strerror}') from error
         self.file = self.path / f'{self.path.resolve().name}_0.mcap'
         self._chunk_size = chunk_size
         self.chunk_age = chunk_age

@@ -10,12 +10,7 @@ import re
 
 from armid_ros.errors import RecordingError
 from armid_ros.recording.bag import Bag
-from armid_ros.recording.message_types import (
-    JOINT_STATE,
-    JOINT_STATE_HASH,
-    MessageType,
-    store_for,
-)
+from armid_ros.recording.message_types import JOINT_STATE, JOINT_STATE_HASH, MessageType, store_for
 from armid_ros.recording.source import MessageBlock, Topic
 
 _JOINT_STATE_FIELD = re.compile(r'^\s*sensor_msgs/(?:msg/)?JointState\s+(\w+)', re.MULTILINE)

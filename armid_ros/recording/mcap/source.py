@@ -19,13 +19,7 @@ from pathlib import Path
 
 from armid_ros.errors import RecordingError
 from armid_ros.files import open_regular
-from armid_ros.recording.mcap.contents import (
-    heads,
-    message_block,
-    messages_in,
-    read_chunks,
-    walk,
-)
+from armid_ros.recording.mcap.contents import heads, message_block, messages_in, read_chunks, walk
 from armid_ros.recording.mcap.records import add_definition, Chunk, FileMap, map_file
 from armid_ros.recording.message_types import MessageType
 from armid_ros.recording.metadata import parse_qos

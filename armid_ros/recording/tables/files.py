@@ -67,9 +67,7 @@ def open_table(path: Path, *, episode: int | None = None) -> Table:
     lerobot = (path / INFO).is_file()
     if not lerobot and _suffix(path) not in _READERS:
         known = ', '.join(_READERS)
-        raise RecordingError(
-            f'{path}: the file is not a table; tables are {known} and LeRobot datasets'
-        )
+        raise RecordingError(f'{path}: is not a table; tables are {known} and LeRobot datasets')
     if not lerobot:
         with open_regular(path, RecordingError):  # opening a FIFO would block
             pass
@@ -282,9 +280,7 @@ def read_lerobot(path: Path, episode: int | None = None) -> Table:
             table = table_of_arrays(str(path), arrays, 'LeRobot dataset', names)
             notes = (f'episode {chosen} of 0 to {total - 1}',)
             return replace(table, rate_hz=rate, notes=notes)
-    raise RecordingError(
-        f'{path}: the dataset has no episode {chosen}; its episodes are 0 to {total - 1}'
-    )
+    raise RecordingError(f'{path}: has no episode {chosen}; its episodes are 0 to {total - 1}')
 
 
 def _columns(path: Path) -> tuple[Arrays, dict[str, Sequence[str]]]:

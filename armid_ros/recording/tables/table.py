@@ -136,11 +136,6 @@ class Table:
         """Return the number of rows."""
         return len(self.columns[0].values)
 
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Return the names of the columns."""
-        return tuple(column.name for column in self.columns)
-
     def column(self, name: str) -> TableColumn | None:
         """
         Return the column with a name, given with or without unit; None if there is none.
@@ -268,7 +263,7 @@ def side_by_side(tables: Sequence[Table]) -> Table:
         raise RecordingError(
             f'{counted}; files that are read together need the same number of rows'
         )
-    shared = Counter(name for table in tables for name in dict.fromkeys(table.names))
+    shared = Counter(name for table in tables for name in {c.name for c in table.columns})
     columns: list[TableColumn] = []
     for table in tables:
         stem = table.source.rpartition('/')[2].split('.')[0]

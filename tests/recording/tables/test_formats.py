@@ -187,7 +187,7 @@ def test_files_side_by_side_hold_columns_of_the_same_rows(motion, tmp_path):
             tmp_path / f'{name}.csv', values, delimiter=',', header='Joint_1,Joint_2', comments=''
         )
     joined = side_by_side([open_table(tmp_path / f'{n}.csv') for n in ('positions', 'currents')])
-    assert joined.names[0] == 'positions:Joint_1'
+    assert joined.columns[0].name == 'positions:Joint_1'
     np.testing.assert_allclose(joined.column('currents:Joint_2').values, tau[:, 1])
     (tmp_path / 'short.csv').write_text('a\n1\n2\n')
     with pytest.raises(RecordingError, match=r'positions.csv.*200.*short.csv.*2'):
