@@ -2,12 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Rigid-body model of an arm: inverse dynamics, regressor, base parameters and link frames."""
 
-from armid_ros.model.base_parameters import (
-    BaseParameters,
-    group_columns,
-    levelled,
-    regroup,
-)
+from armid_ros.model.base_parameters import BaseParameters, group_columns, levelled, regroup
 from armid_ros.model.kinematics import LinkFrames, points_motion
 from armid_ros.model.rigid_body import (
     gravity_sensitivity,

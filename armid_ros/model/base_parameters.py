@@ -24,7 +24,6 @@ import numpy.typing as npt
 #: Rounding gives dependent columns 1e-15 to 1e-13; independent columns rarely have below 1e-5.
 RANK_TOLERANCE = 1e-9
 
-
 #: Order in which the parameters of a link are kept: inertia first, mass last. Masses are then
 #: grouped with moments, and moments of later links with those of earlier links.
 _KEEP_ORDER = ('Ixx', 'Ixy', 'Ixz', 'Iyy', 'Iyz', 'Izz', 'mx', 'my', 'mz', 'm')

@@ -59,10 +59,9 @@ class _Prepared(threading.local):
 
     def data_of(self, robot: Robot) -> pin.Data:
         """Return the work space of Pinocchio for a robot."""
-        data = self.data.get(robot)
-        if data is None:
-            data = self.data[robot] = robot.model.createData()
-        return data
+        if robot not in self.data:
+            self.data[robot] = robot.model.createData()
+        return self.data[robot]
 
     def body_of(self, robot: Robot) -> BodyOfKernel | None:
         """Return a robot in the format of the kernel; None without a kernel."""

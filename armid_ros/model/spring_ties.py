@@ -146,17 +146,15 @@ def tie_columns_derivatives(
         Derivatives by the other machine's positions; without slack exact, -J^T J of the two ends.
 
     """
-    by_q = np.empty((len(q), robot.n_joints, len(ties), robot.n_joints))
-    for j, step in enumerate(_DIFFERENCE_STEP * np.eye(robot.n_joints)):
-        after = tie_geometry(robot, q + step, other, other_q, ties).pulled(slack)
-        before = tie_geometry(robot, q - step, other, other_q, ties).pulled(slack)
-        by_q[..., j] = (after - before) / (2.0 * _DIFFERENCE_STEP)
+    own, others = (_DIFFERENCE_STEP * np.eye(one.n_joints) for one in (robot, other))
+
+    def difference(step: FloatArray | float, other_step: FloatArray | float) -> FloatArray:
+        after = tie_geometry(robot, q + step, other, other_q + other_step, ties).pulled(slack)
+        before = tie_geometry(robot, q - step, other, other_q - other_step, ties).pulled(slack)
+        return (after - before) / (2.0 * _DIFFERENCE_STEP)
+
+    by_q = np.stack([difference(step, 0.0) for step in own], axis=-1)
     if np.any(slack):
-        by_other = np.empty((*by_q.shape[:3], other.n_joints))
-        for j, step in enumerate(_DIFFERENCE_STEP * np.eye(other.n_joints)):
-            after = tie_geometry(robot, q, other, other_q + step, ties).pulled(slack)
-            before = tie_geometry(robot, q, other, other_q - step, ties).pulled(slack)
-            by_other[..., j] = (after - before) / (2.0 * _DIFFERENCE_STEP)
-        return by_q, by_other
+        return by_q, np.stack([difference(0.0, step) for step in others], axis=-1)
     here = tie_geometry(robot, q, other, other_q, ties)
     return by_q, -np.einsum('nsxi,nsxj->nisj', here.jacobian, here.other_jacobian)

@@ -15,11 +15,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from xml.dom import expatbuilder, minidom
 
 from armid_ros.errors import ModelError
-from armid_ros.model.pseudo_inertia import (
-    Consistency,
-    pseudo_inertia,
-    require_consistent,
-)
+from armid_ros.model.pseudo_inertia import Consistency, pseudo_inertia, require_consistent
 from armid_ros.motion import FloatArray
 from armid_ros.robots import Robot, robot_from_urdf
 from armid_ros.robots.meshes import find_mesh
