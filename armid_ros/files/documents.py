@@ -107,10 +107,7 @@ def load_yaml(text: str) -> Any:
     for event in yaml.parse(text, Loader=_Loader):
         if isinstance(event, yaml.AliasEvent):
             if event.anchor not in sizes:
-                raise ValueError(
-                    f"line {_line(event)}: the alias '*{event.anchor}' has no anchor "
-                    f"'&{event.anchor}' before it"
-                )
+                raise ValueError(f"line {_line(event)}: the alias '{event.anchor}' has no anchor")
             total += sizes[event.anchor]
         elif isinstance(event, (yaml.SequenceStartEvent, yaml.MappingStartEvent)):
             total += 1

@@ -126,8 +126,7 @@ def write_file(path: str | Path, content: str | bytes) -> None:
     except OSError as error:
         with suppress(OSError):
             temporary.unlink(missing_ok=True)
-        problem = f'{final_path(path)}: the file cannot be written: {error.strerror}'
-        raise OutputError(problem) from error
+        raise OutputError(f'{final_path(path)}: cannot be written: {error.strerror}') from error
 
 
 def json_text(document: Any, indent: int | None = None) -> str:
@@ -203,8 +202,7 @@ def locked(path: Path) -> Iterator[None]:
             f'{path}: the path is a file, or inside a file; give a folder with --out'
         ) from error
     except OSError as error:
-        problem = f'{path}: the folder cannot be created or opened: {error.strerror}'
-        raise OutputError(problem) from error
+        raise OutputError(f'{path}: the folder cannot be opened: {error.strerror}') from error
     try:
         fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError as error:
@@ -237,15 +235,12 @@ def _refuse_other_results(path: Path, schema: str, robot: str) -> None:
         fits = kind.startswith('armid/model/') if name == _MODEL else kind == schema
         hint = 'give another folder, or overwrite the results with --force'
         if not fits:
-            raise OutputError(
-                f'{path}: the folder has {_in_words(kind)}, not {_in_words(schema)}; {hint}'
-            )
+            raise OutputError(f'{path}: has {_in_words(kind)}, not {_in_words(schema)}; {hint}')
         # '-' is the description in the bag, which may be any robot
         same = '-' in (robot, other) or Path(robot).absolute() == Path(other).absolute()
         if robot and other and not same:
             raise OutputError(
-                f'{path}: the folder has {_in_words(kind)} of the robot {other}, not of {robot}; '
-                f'{hint}'
+                f'{path}: has {_in_words(kind)} of robot {other}, not of {robot}; {hint}'
             )
 
 

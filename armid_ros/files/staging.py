@@ -90,8 +90,7 @@ class Staged:
                 else:
                     source.replace(target)
         except OSError as error:
-            problem = f'{self.out}: the results cannot be written: {error.strerror}'
-            raise OutputError(problem) from error
+            raise OutputError(f'{self.out}: cannot be written to: {error.strerror}') from error
 
     def _exchanged(self, names: Collection[str]) -> bool:
         """Exchange the folder for one with the result and all other files; False if impossible."""
@@ -159,8 +158,7 @@ def staged(
         _remove(folder)  # remains of a killed run
         folder.mkdir()
     except OSError as error:
-        problem = f'{out}: the folder cannot be created or written to: {error.strerror}'
-        raise OutputError(problem) from error
+        raise OutputError(f'{out}: the folder cannot be created: {error.strerror}') from error
     with ExitStack() as locks:
         try:
             yield Staged(out, folder, tuple(replaced), tuple(spared), _locks=locks)
