@@ -113,9 +113,8 @@ class Estimate:
         object.__setattr__(self, 'covariance', read_only(self.covariance))
         if self.values.shape != (count,) or self.covariance.shape != (count, count):
             raise ModelError(
-                f'estimate: {count} parameters need {count} values and a covariance of shape '
-                f'{(count, count)}, but the values have shape {self.values.shape} and the '
-                f'covariance has shape {self.covariance.shape}'
+                f'{count} parameters need {count} values with covariances, but the values have '
+                f'shape {self.values.shape}, and the covariance has {self.covariance.shape}'
             )
 
     def __repr__(self) -> str:
@@ -156,10 +155,7 @@ class Estimate:
         own = [one for one in self.parameters if one.joint == joint] or self.parameters
         known = ', '.join(f'{p.name} [{p.joint}]' if p.joint else p.name for p in own)
         guess = meant(name, [one.name for one in own])
-        raise ModelError(
-            f"the estimate has no parameter '{name}' of joint '{joint}'; its parameters are "
-            f'{known}{guess}'
-        )
+        raise ModelError(f"no parameter '{name}' of joint '{joint}'; parameters: {known}{guess}")
 
 
 def parameter_table(

@@ -57,7 +57,8 @@ def arm_urdf(arm: ArmModel) -> Exported:
 
     """
     found, missing = place_values(arm, lambda effect: effect.traits.urdf_attribute)
-    text = export_urdf(arm.body, found, _remarks('a URDF', missing))
+    remarks = ('identified by armid_ros; a URDF has no place for', *missing) if missing else ()
+    text = export_urdf(arm.body, found, remarks)
     left_out = ('ros2_control',) if '<ros2_control' in arm.robot.urdf else ()
     robot = arm.robot.tree  # friction without identified values keeps the described ones
     described = {'damping': robot.urdf_damping, 'friction': robot.urdf_friction}
@@ -79,7 +80,8 @@ def arm_mjcf(arm: ArmModel) -> Exported:
 
     """
     found, missing = place_values(arm, lambda effect: effect.traits.mjcf_attribute)
-    text, left_out = export_mjcf(arm.body, found, _remarks('MuJoCo', missing))
+    remarks = ('identified by armid_ros; MuJoCo has no place for', *missing) if missing else ()
+    text, left_out = export_mjcf(arm.body, found, remarks)
     found['friction'] = found.pop('frictionloss', {})
     return Exported(text, missing, left_out, found)
 
@@ -110,13 +112,6 @@ def place_values(
                 text = f'{effect.name}: {parameter.name}{where} = {float(value)!r}'
                 missing.append(f'{text} {parameter.unit}'.rstrip())
     return found, tuple(missing)
-
-
-def _remarks(form: str, missing: tuple[str, ...]) -> tuple[str, ...]:
-    """Return the lines of a comment on parameters that a file format cannot contain."""
-    if not missing:
-        return ()
-    return (f'identified by armid_ros; {form} has no place for', *missing)
 
 
 def torque_check(exported: Exported, arm: ArmModel) -> dict[str, Any]:

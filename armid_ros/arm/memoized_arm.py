@@ -42,11 +42,9 @@ class _Memoized(ArmModel):
         """Return the cached results, by name of the quantity and identity of the motion."""
         return {}
 
-    def _once(
-        self, quantity: str, motion: Motion, compute: Callable[[Motion], _Result]
-    ) -> _Result:
+    def _once(self, name: str, motion: Motion, compute: Callable[[Motion], _Result]) -> _Result:
         """Return a quantity along a motion, computed at the first call."""
-        key = quantity, id(motion)
+        key = name, id(motion)
         if key not in self._known:
             self._known[key] = motion, compute(motion)
         result: _Result = self._known[key][1]

@@ -113,8 +113,7 @@ class Misfit:
         residual = np.array([self.rms[joint] for joint in robot.joints])
         if torque_rms is None or self.torque_rms is None:
             return residual
-        before = np.array([self.torque_rms[joint] for joint in robot.joints])
-        return residual * growth(torque_rms, before)
+        return residual * growth(torque_rms, np.array([self.torque_rms[j] for j in robot.joints]))
 
 
 def growth(now: FloatArray, before: FloatArray) -> FloatArray:
@@ -130,17 +129,12 @@ def misfit_of_block(block: Any) -> Misfit:
         data, error = str(block['data']), block['relative_error_percent']
         filters = None
         if 'filters' in block:
-            found = {
-                name: finite(block['filters'][name], f'misfit: {name}')
-                for name in RowFilters._fields
-            }
-            for name, value in found.items():
-                if value <= 0.0:
-                    raise ModelError(f'misfit: {name} is {value:g}, but has to be positive')
-            filters = RowFilters(found['rate_hz'], found['cutoff_hz'], round(found['decimation']))
+            found = [finite(block['filters'][n], f'misfit: {n}') for n in RowFilters._fields]
+            if min(found) <= 0.0:
+                raise ModelError(f'misfit: {", ".join(RowFilters._fields)} have to be positive')
+            filters = RowFilters(found[0], found[1], round(found[2]))
     except (AttributeError, KeyError, TypeError) as fault:
-        problem = f'misfit: the block is not valid: {type(fault).__name__} {fault}'
-        raise ModelError(problem) from fault
+        raise ModelError(f'misfit: invalid content: {type(fault).__name__} {fault}') from fault
     if data not in _DATA:
         raise ModelError(f"misfit: 'data' is '{data}', but has to be {' or '.join(_DATA)}")
     if loud is not None and not loud.keys() >= rms.keys():

@@ -26,15 +26,7 @@ from armid_ros.effects.quantities import written_units
 from armid_ros.effects.tied import tied_as_written
 from armid_ros.errors import ModelError
 from armid_ros.estimate import Estimate, parameter_table, ParameterName
-from armid_ros.files import (
-    finite,
-    is_file,
-    load_yaml,
-    read_text,
-    reading,
-    write_file,
-    yaml_line,
-)
+from armid_ros.files import finite, is_file, load_yaml, read_text, reading, write_file, yaml_line
 from armid_ros.model.rigid_body import link_unit
 from armid_ros.motion import FloatArray
 from armid_ros.robots import load_robot, Robot
@@ -339,16 +331,13 @@ def _rows(
 
 def _problem(row: Any, units: tuple[str, ...]) -> tuple[str, str]:
     """Return the key and the error message of an invalid parameter; empty if it is valid."""
+    keys = ', '.join(_KEYS_OF_PARAMETER)
     if not isinstance(row, dict):
-        keys = ', '.join(_KEYS_OF_PARAMETER)
         return '', f'a parameter has {keys}, but this entry is {str(row)[:40]!r}'
     called = _called(row)
     strange = [str(key) for key in row if key not in _KEYS_OF_PARAMETER]
     if strange:
-        known = ', '.join(_KEYS_OF_PARAMETER)
-        return strange[0], (
-            f"{called}: the key '{strange[0][:40]}' is not known; the keys are {known}"
-        )
+        return strange[0], f"{called}: unknown key '{strange[0][:40]}'; the keys are {keys}"
     missing = [key for key in _NEEDED_OF_PARAMETER if key not in row]
     if missing:
         return 'name', f"{called}: '{missing[0]}' is missing"

@@ -22,7 +22,7 @@ FAULTS = {
     'a key of a parameter': (
         'joint: shoulder_roll\n  value:',
         'joint: shoulder_roll\n  valu:',
-        "'m2' .*'shoulder_roll'.* 'valu' .*value",
+        "'m2' .*'shoulder_roll'.* 'valu'.*value",
     ),
     'no number': (
         'joint: shoulder_roll\n  value: ',
