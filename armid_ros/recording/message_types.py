@@ -91,7 +91,10 @@ def store_for(described: MessageType) -> Typestore:
     if not described.definition:
         store = get_typestore(Stores.ROS2_JAZZY)
         if described.name not in store.fielddefs:
-            raise RecordingError(f'type {described.name}: the bag does not have its definition')
+            raise RecordingError(
+                f'type {described.name}: the bag lacks the definition of this type; record again '
+                'with ros2 bag record'
+            )
         return store
     store = Typestore()
     if described.encoding == 'ros2idl':

@@ -275,6 +275,6 @@ class JointStateMessages:
         sec, nanosec = layout.stamp.unpack_from(data, 4)
         position, velocity, effort = [
             np.frombuffer(data, layout.number, count, begin) if count else _NONE
-            for count, (_, begin) in zip(layout.counts, layout.places, strict=True)
+            for count, begin in layout.values  # cached, as every live message is read here
         ]
         return JointStateValues(sec, nanosec, layout.names, position, velocity, effort)

@@ -185,6 +185,11 @@ class JointStateLayout:
         return np.dtype(self.order + 'f8')
 
     @cached_property
+    def values(self) -> tuple[tuple[int, int], ...]:
+        """Return the number of values and the position of the first value of each quantity."""
+        return tuple((n, begin) for n, (_, begin) in zip(self.counts, self.places, strict=True))
+
+    @cached_property
     def fixed(self) -> tuple[npt.NDArray[np.void], npt.NDArray[np.void]]:
         """Return the bytes that all messages of this layout share, and their bit mask, (1,)."""
         expected, mask = np.zeros((2, 1), self.record)

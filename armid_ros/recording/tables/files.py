@@ -280,7 +280,7 @@ def read_lerobot(path: Path, episode: int | None = None) -> Table:
             table = table_of_arrays(str(path), arrays, 'LeRobot dataset', names)
             notes = (f'episode {chosen} of 0 to {total - 1}',)
             return replace(table, rate_hz=rate, notes=notes)
-    raise RecordingError(f'{path}: has no episode {chosen}; its episodes are 0 to {total - 1}')
+    raise RecordingError(f'{path}: the dataset has no episode {chosen}, only 0 to {total - 1}')
 
 
 def _columns(path: Path) -> tuple[Arrays, dict[str, Sequence[str]]]:

@@ -305,7 +305,7 @@ def _time_unit(table: Table, column: TableColumn, given: str | None) -> str:
         return given or column.unit
     steps = steps[steps > 0.0]
     if not len(steps):
-        raise RecordingError(f'{where}: time does not increase; give --rate instead')
+        raise RecordingError(f'{where}: time does not increase; give the rate with --rate')
     step = float(np.median(steps))
     # sampling periods of 20 us to 0.5 s
     fitting = [unit for unit, scale in TIME_UNITS.items() if 2e-5 <= step * scale <= 0.5]

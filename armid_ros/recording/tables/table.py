@@ -259,9 +259,9 @@ def side_by_side(tables: Sequence[Table]) -> Table:
     if len(tables) == 1:
         return tables[0]
     if len({len(table) for table in tables}) > 1:
-        counted = ', '.join(f'{table.source} has {len(table)} rows' for table in tables)
+        lengths = ', '.join(f'{table.source} has {len(table)} rows' for table in tables)
         raise RecordingError(
-            f'{counted}; files that are read together need the same number of rows'
+            f'files that are read together need the same number of rows, but {lengths}'
         )
     shared = Counter(name for table in tables for name in {c.name for c in table.columns})
     columns: list[TableColumn] = []
