@@ -293,8 +293,7 @@ class OnlineIdentifier:
             same = getattr(settings, setting.name) == getattr(self.settings, setting.name)
             if setting.name not in self.CHANGEABLE and not same:
                 raise IdentificationError(
-                    f'the setting {setting.name} cannot change during the identification; restart '
-                    'the identification'
+                    f'the setting {setting.name} cannot change now; restart the identification'
                 )
         if self._watch is None and settings.false_alarm_time is not None:
             raise IdentificationError(
