@@ -198,7 +198,7 @@ def fit_rests(
         scales,
         len(y),
         poses,
-        int(np.sum(_approached(rests) & ~solved.used)),
+        solved.outliers,
     )
 
 
@@ -209,11 +209,6 @@ def _predicted(
     pairs = [(a.with_theta(a.theta + x), motion) for a, motion in zip(arms, rests, strict=True)]
     torque = np.concatenate([arm.torque(motion) for arm, motion in pairs])
     return torque, np.concatenate([arm.columns(motion) for arm, motion in pairs])
-
-
-def _approached(rests: Sequence[Motion]) -> npt.NDArray[np.bool_]:
-    """Return the mask (K, n) of readings after a motion of the joint."""
-    return np.concatenate([one.dq for one in rests]).astype(bool)
 
 
 class _Solution(NamedTuple):
@@ -231,6 +226,7 @@ class _Solution(NamedTuple):
     scattered: FloatArray
     information: FloatArray
     used: npt.NDArray[np.bool_]
+    outliers: int
     freedom: float
 
 
@@ -238,7 +234,9 @@ def _solved(
     arms: Sequence[ArmModel], rests: Sequence[Motion], prior: FloatArray, scales: FloatArray
 ) -> _Solution:
     """Fit by Gauss-Newton iterations, with estimated variances and without outliers."""
-    y, approached = np.concatenate([np.asarray(one.tau) for one in rests]), _approached(rests)
+    y = np.concatenate([np.asarray(one.tau) for one in rests])
+    # readings without a motion of the joint before only bound its dry friction
+    approached = np.concatenate([one.dq for one in rests]).astype(bool)
     x, free, used, sigma = np.zeros(len(prior)), np.flatnonzero(prior), approached, 0.02 * scales
     for _ in range(60):
         torque, columns = _predicted(arms, rests, x)
@@ -261,7 +259,9 @@ def _solved(
     leverage = np.minimum(np.einsum('kjp,pr,kjr->kj', w, covariance, w), 0.9)
     rest = (y - _predicted(arms, rests, x)[0]) / sigma / (1.0 - leverage)
     moved = np.einsum('kjp,kj->kp', w, rest) @ covariance
-    return _Solution(x, free, covariance, moved.T @ moved, information, used, float(freedom.min()))
+    outliers, redundant = int(np.sum(approached & ~used)), float(freedom.min())
+    scattered = moved.T @ moved
+    return _Solution(x, free, covariance, scattered, information, used, outliers, redundant)
 
 
 def _quantities(
