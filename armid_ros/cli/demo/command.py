@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from armid_ros.estimate import Estimate
     from armid_ros.motion import FloatArray
     from armid_ros.nodes.lockstep import Progress
+    from armid_ros.report.provenance import ResultOrigin
 
 #: Files of an earlier demo, which the output folder may contain.
 OUTPUTS = ('bag', 'excitation.yaml', 'model.yaml', 'identification.json', 'report.html', 'story')
@@ -94,10 +95,13 @@ def demo(gravity: str, rate: float, hide: str, out: Path, seed: int, as_json: bo
         found = identify(nominal, recording, physical=False, rng=rng, progress=tick)
     offline = Agreement.of(found.estimate, found.core.base.values(truth.theta))
     online = Agreement.of(identifier.estimate(), target)
-    found.fill(new, ResultOrigin(steps.ROBOT, steps.ROBOT))
-    write_file(new / 'report.html', _page(found, truth, history, target))
+    origin = ResultOrigin(steps.ROBOT, steps.ROBOT, options.provenance([], seed=seed))
+    found.fill(new, origin)
+    write_file(new / 'report.html', _page(found, truth, history, target, origin))
     rng = np.random.default_rng([seed, 1])
-    diagnosed = steps.diagnose_hidden(new / 'story', changed, found.arm, recording, rng, rate)
+    diagnosed = steps.diagnose_hidden(
+        new / 'story', changed, found.arm, recording, rng, rate, origin
+    )
     document: dict[str, Any] = {
         **found.document(),
         'robot': steps.ROBOT,
@@ -125,22 +129,18 @@ def _page(
     truth: ArmModel,
     history: list[tuple[float, Estimate]],
     target: FloatArray,
+    origin: ResultOrigin,
 ) -> str:
     """Return report.html with true values and the convergence of the online estimate."""
-    from armid_ros.report.identification_report import (
-        convergence_section,
-        identification_report,
-        parameter_sections,
-    )
-    from armid_ros.report.provenance import ResultOrigin
+    from armid_ros.report import identification_report as page
 
-    parameters = parameter_sections(found.core, truth, name='truth')
-    return identification_report(
+    parameters = page.parameter_sections(found.core, truth, name='truth')
+    return page.identification_report(
         found.core,
         found.graded,
         description=found.description,
         recordings=found.recordings,
         validation={},
-        parameters=[*parameters, convergence_section(history, target)],
-        origin=ResultOrigin(truth.robot.name),
+        parameters=[*parameters, page.convergence_section(history, target)],
+        origin=origin,
     )

@@ -88,6 +88,7 @@ def diagnose_hidden(
     baseline: Recording,
     rng: np.random.Generator,
     rate: float,
+    origin: ResultOrigin,
 ) -> DiagnosisResult:
     """
     Record an arm with a hidden effect over ROS topics, and diagnose it with the earlier model.
@@ -106,6 +107,8 @@ def diagnose_hidden(
         Draws motions and noise.
     rate : float
         Joint states per second.
+    origin : ResultOrigin
+        Robot, versions, command and seed for the page.
 
     """
     limits = Limits.of(known.robot)
@@ -135,7 +138,7 @@ def diagnose_hidden(
             progress=tick,
         )
         core = replace(found.core, summary=f'{found.core.summary} {outcome(changed, found)}')
-        replace(found, core=core).fill(out, ResultOrigin(known.robot.name, known.robot.name))
+        replace(found, core=core).fill(out, origin)
     return found
 
 
