@@ -112,11 +112,6 @@ class Chart(Templated):
         return cls(t[kept], drawn, 'time [s]', ylabel, **others)
 
     @property
-    def label(self) -> str:
-        """Description of the chart for screen readers."""
-        return f'{self.ylabel} over {self.xlabel}' if self.xlabel else self.ylabel
-
-    @property
     def json(self) -> Markup:
         """Data of the chart as JSON for assets/report.js."""
         data = {
