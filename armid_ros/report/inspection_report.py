@@ -92,7 +92,8 @@ def inspection_report(found: Inspection, origin: ResultOrigin = DEFAULT_ORIGIN) 
     name = Path(recording.source).name or 'recording'
     subtitle = ' · '.join(
         filter(
-            None, (Path(origin.robot).name, recording.topic, counted(recording.n_joints, 'joint'))
+            None,
+            (robot_label(origin.robot), recording.topic, counted(recording.n_joints, 'joint')),
         )
     )
     return Page(f'Inspection of {name}', subtitle, sections, names=recording.joints).html()
