@@ -34,7 +34,8 @@ _BEGINNING = """# Architecture
 Each diagram shows the function calls of one armid command, from top to bottom. Each vertical lane
 stands for a room, which is a folder of the package. The dot of a function lies in the lane of its
 room; a line connects the function to its caller. The text to the right of a function is the first
-line of its docstring. Each function is shown once; helper functions are left out.
+line of its docstring. Each function is shown once; private functions and functions that only check
+their arguments (`require_...`) are left out.
 """
 
 
@@ -110,7 +111,7 @@ def steps(package: Path, dotted: str, name: str) -> list[Step]:
             room = place[0].removeprefix('armid_ros.')
             if place[0] == dotted and called.startswith('_'):
                 yield from follow(*place, depth)
-            elif not _EVERYWHERE.match(room) and not called.startswith('_'):
+            elif not _EVERYWHERE.match(room) and not called.startswith(('_', 'require_')):
                 theirs = module(package, place[0])
                 assert theirs is not None
                 text = ast.get_docstring(theirs.defined[place[1]]) or ''
