@@ -209,14 +209,12 @@ class CauseComparison:
             return None
         first = able[0]
         name, joints = first.cause.effect.name, set(first.cause.effect.joints)
-        # the winner may be the best law on fewer joints, or an equal law with larger prior odds,
-        # unless the lead of the best cause exceeds the error of torque laws
+        # the winner may be the best law on fewer joints, unless the lead exceeds the error of laws
         parts = [
             one
             for one in able
             if one is first
             or (one.cause.effect.name == name and set(one.cause.effect.joints) < joints)
-            or (one.cause.prior > first.cause.prior and one.is_same_law(first, levels.inexact))
         ]
         winner = min(parts, key=lambda one: first.log_odds_over(one, levels))
         others = [one for one in able if one is not winner]

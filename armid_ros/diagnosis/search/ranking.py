@@ -121,14 +121,11 @@ class RankedCause:
         Return the log odds of this cause over another cause; positive if this cause is likelier.
 
         As torque laws are inexact, a difference of the explained squares is ignored below the
-        share `inexact` of them, or below the share `same_fit` - 1 of the smaller residual. So is
-        the difference of two laws with equal columns, such as Coulomb friction and presliding over
-        a very short distance. The number of values and the prior odds decide then.
+        share `inexact` of them, or below the share `same_fit` - 1 of the smaller residual. The
+        number of values and the prior odds decide then.
 
         """
         lead = self.fit.explained - other.fit.explained
-        if self.is_same_law(other, levels.inexact):
-            lead = 0.0
         slack = min(
             levels.inexact * max(self.fit.explained, other.fit.explained),
             (levels.same_fit - 1.0) * max(min(self.remaining_loss, other.remaining_loss), 0.0),
@@ -139,14 +136,6 @@ class RankedCause:
             + (self.log_posterior - self.fit.explained)
             - (other.log_posterior - other.fit.explained)
         )
-
-    def is_same_law(self, other: RankedCause, inexact: float) -> bool:
-        """Return whether two causes with one value each have nearly parallel columns."""
-        one, two = self.cause, other.cause
-        if one.joints != two.joints or max(len(one.unit), len(two.unit)) > 1:
-            return False
-        cross = sum(float(np.vdot(a, b)) for a, b in zip(one.columns, two.columns, strict=True))
-        return bool(cross**2 >= (1.0 - inexact) * one.own.sum() * two.own.sum() > 0.0)
 
 
 @dataclass(frozen=True)
