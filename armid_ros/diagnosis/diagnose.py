@@ -47,6 +47,11 @@ _ASSUMED = (
     'noise of recordings without two equal periods is estimated from differences between '
     'neighbouring samples'
 )
+#: Note on a model without the covariance of its identification.
+_AS_EXACT = (
+    'intervals do not include errors of the given values: their covariance is unknown, because '
+    'identification.json of the model is missing'
+)
 #: Note if a cause acts temporarily and its time span in held-out recordings is unknown.
 _NOT_TIMED = (
     'held-out recordings are not used: without a baseline, the seconds in which the cause acts in '
@@ -132,6 +137,8 @@ def diagnose(
     prepared = prepare(arm, used, data, settings, rng, by_misfit)
     if any(floor.period is None for floor in prepared.floors):
         notes.append(_ASSUMED)
+    if misfit is not None and misfit.information is None and not baseline:
+        notes.append(_AS_EXACT)
     before = trajectories(baseline, prepared.used, arm, prepared.allowed)
     known = Baseline.of(arm, before, rng) if baseline else None
     if known is not None and known.errors[0] > 1.0:

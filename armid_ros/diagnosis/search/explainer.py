@@ -185,10 +185,7 @@ class Explainer:
         ]
         result = self.comparison(rows, grid, known).select()
         found = self._fit_changes(result, evidence, 0.0)
-        notes = (_AS_EXACT,) if found.steps and known is None else ()
-        return replace(
-            found, floor=WRITTEN_MISFIT, misfit=misfit, notes=notes, untested=_NO_BASELINE
-        )
+        return replace(found, floor=WRITTEN_MISFIT, misfit=misfit, untested=_NO_BASELINE)
 
     def _explain_since_baseline(self, baseline: Baseline) -> Explanation:
         """Find the changes since the baseline recordings."""
