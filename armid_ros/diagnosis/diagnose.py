@@ -128,10 +128,7 @@ def diagnose(
     notes += repairs
     if faults:
         return _bad_data(given, data, faults, notes)
-    prior = settings.prior.items()
-    notes += [
-        f'prior odds set by the user: {effect} is {frequency}' for effect, frequency in prior
-    ]
+    notes += [f'prior odds set by the user: {k} is {odds}' for k, odds in settings.prior.items()]
     tell(0.1, 'noise floor')
     by_misfit = bool(baseline) and settings.partner is None
     prepared = prepare(arm, used, data, settings, rng, by_misfit)
