@@ -249,7 +249,15 @@ class ArmModel:
         return inverse_dynamics_derivatives(self.body, self.rigid_body_motion(motion))
 
     def link_torque_derivatives(self, motion: Motion) -> tuple[FloatArray, FloatArray] | None:
-        """Differentiate effects' torques on the links by q and dq, (N, n, n); None without any."""
+        """
+        Return derivatives of the torque of effects that act on the links, by q and by dq.
+
+        Returns
+        -------
+        (ndarray, ndarray), each of shape (N, n, n), or None
+            None if no effect acts on the links.
+
+        """
         law = self.along(motion).action().link_torque
         return None if law is None else law_derivatives(law, self.link_motion(motion))
 

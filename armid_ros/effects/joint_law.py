@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Effects on each joint separately, and the arrangement of their parameters."""
+"""Effects on each joint separately, and the order of their parameters."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class JointStates(NamedTuple):
 
 @dataclass(frozen=True)
 class JointLaw(Effect):
-    """Effect on each joint separately, by a law of time and of the motion of the joint."""
+    """Effect whose torque on a joint depends on time and the motion of this joint only."""
 
     #: Whether the torque acts on the link side of an elastic transmission.
     on_links: ClassVar[bool] = False
@@ -58,7 +58,7 @@ class JointLaw(Effect):
         """
 
     def columns(self, motion: Motion, arm: Arm) -> FloatArray:
-        """Return the law along a motion, shape (N, n, P)."""
+        """Return the regressor of the effect along a motion, shape (N, n, P)."""
         side = arm.link_motion(motion) if self.on_links else motion
         own, _ = _flat_places(self.joints, motion.joints, len(self.quantities))
         states = (part[:, own] for part in (side.q, side.dq, direction(side)))
@@ -148,7 +148,7 @@ def scatter(effect: Effect, values: FloatArray, robot: Robot) -> FloatArray:
 
 
 def _placed(effect: Effect, motion: Motion, quantities: Sequence[FloatArray]) -> FloatArray:
-    """Return the columns of quantities of the joints of an effect, each (N, k)."""
+    """Return the regressor (N, n, P) with the values (N, k) of each quantity of k joints."""
     size = len(quantities) * len(effect.joints)
     columns = np.zeros((len(motion), motion.n_joints * size))
     _, places = _flat_places(effect.joints, motion.joints, len(quantities))
@@ -161,7 +161,7 @@ def _placed(effect: Effect, motion: Motion, quantities: Sequence[FloatArray]) ->
 def _flat_places(
     joints: tuple[str, ...], among: tuple[str, ...], count: int
 ) -> tuple[npt.NDArray[np.intp], tuple[npt.NDArray[np.intp], ...]]:
-    """Return indices of joints, and of the columns of each quantity in a flattened sample."""
+    """Return the indices of joints among others, and those of their regressor entries."""
     own = np.array(places_among(joints, among), dtype=np.intp)
     size = count * len(own)
     return own, tuple(own * size + np.arange(first, size, count) for first in range(count))

@@ -48,7 +48,10 @@ class Run:
         for transfer, own, end in ((self.approach, -1, 0), (self.back, 0, 1)):
             # tolerance for rounding [rad or m]
             if transfer is not None and np.abs(transfer.q[own] - ends[end]).max() > 1e-9:
-                raise TrajectoryError('run: a transfer and the excitation do not meet in a pose')
+                raise TrajectoryError(
+                    'run: the approach has to end in the first pose of the excitation, and the '
+                    'return has to start in its last pose; plan the run again'
+                )
         for name in ('approach', 'back'):
             transfer = getattr(self, name)
             if transfer is not None:

@@ -132,7 +132,7 @@ class WatchedArm:
         return float(np.median(errors)) if errors else None
 
     def bag_at(self, change: HistoryChange) -> dict[str, Any]:
-        """Return the row of the bag at a change: the first after a step, the last for a trend."""
+        """Return the table row of the first bag after a step, or of the last bag of a trend."""
         day = change.series.days[change.index if change.kind == 'step' else -1]
         return min(self.bags, key=lambda row: abs(row['start_ns'] / DAY_NS - day))
 
@@ -140,7 +140,7 @@ class WatchedArm:
 @dataclass(frozen=True, eq=False)
 class Watch:
     """
-    The histories of all arms of a fleet.
+    For each arm of a fleet, the estimates from its bags over time and the changes found in them.
 
     Attributes
     ----------

@@ -127,7 +127,7 @@ class Evidence:
         return np.asarray(settings.thresholds.same_fit * np.maximum(varies, 1.0))
 
     def material_loss(self, settings: DiagnosisSettings) -> FloatArray:
-        """Return the `chi2_per_row` of the smallest material residual of each joint, (n,)."""
+        """Return the `chi2_per_row` of a residual as large as `settings.material` allows, (n,)."""
         unit = np.mean(np.square(self.sigma), axis=0)
         return np.asarray((settings.material * self.torque_rms) ** 2 / unit)
 

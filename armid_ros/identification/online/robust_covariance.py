@@ -144,7 +144,7 @@ class RobustCovariance:
         self._latest = window
 
     def _subtract_change(self, directions: FloatArray, values: FloatArray) -> Job:
-        """Subtract the torque of the best-fitting change of some directions from earlier sums."""
+        """Fit a parameter change along directions, and subtract its torque from earlier sums."""
         self._latest = None
         if self._settled is None:
             return

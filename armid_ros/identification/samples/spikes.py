@@ -382,7 +382,7 @@ class SpikeGate:
     def _accept(
         self, samples: list[StreamSample], innovation: Innovation | None = None
     ) -> list[StreamSample]:
-        """Return undamaged samples, after updating the usual prediction errors with them."""
+        """Update the typical prediction errors with samples without spikes; return the samples."""
         self._pending = []
         for sample in samples:
             one = innovation or innovation_of(self._reference, sample, self._period)

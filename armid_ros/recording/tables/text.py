@@ -78,7 +78,7 @@ def _lines(path: Path) -> list[str]:
 
 
 def _heading(path: Path, lines: list[str]) -> tuple[int, str, str]:
-    """Return the index of the first row, the line of names and that of units, if there are any."""
+    """Return the index of the first line of numbers, the line of names, and that of units."""
     words: list[str] = []
     comment = ''
     for number, line in enumerate(lines):
