@@ -263,8 +263,8 @@ class ExcitationResult(Shown):
             parts = zip(robot.joints, self.start, robot.position_units, strict=True)
             pose = [f'{joint} {value:.3g} {unit}' for joint, value, unit in parts if value]
             lines.append(
-                f'starts at rest at {", ".join(pose) or "zero"}, is on the trajectory after '
-                f'{run.approach.duration:.1f} s and back after {run.duration:.1f} s'
+                f'The run starts at rest at {", ".join(pose) or "zero"}, reaches the trajectory '
+                f'after {run.approach.duration:.1f} s and is back after {run.duration:.1f} s.'
             )
             lines += [self.start_reason] if self.start_reason else []
             early = f'stopped early ({self.core.stopped}): another run with this seed may differ'

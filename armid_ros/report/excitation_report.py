@@ -205,8 +205,8 @@ def identifiable(design: Design, links: Sequence[str]) -> list[str]:
     return [
         f'All {len(names)} parameters can be identified (condition number '
         f'{plain(information.condition)}: {grade}).',
-        f'{accurate} of {known} described parameters will be known to 10 %{remark}. Least '
-        f'accurate: {full_label(names[worst], links)}: ± {digits(float(std[worst]))} '
+        f'{accurate} of {known} parameters that are not zero in the description will be known to '
+        f'10 %{remark}. Least accurate: {full_label(names[worst], links)}: ± {digits(float(std[worst]))} '
         f'{pretty(names[worst].unit)}.',
     ]
 

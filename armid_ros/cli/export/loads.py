@@ -207,8 +207,8 @@ def load_text(load: CarriedLoad, maker: str, source: str) -> tuple[str, tuple[st
     low, middle, high = np.linalg.eigvalsh(load.body.inertia)
     if min(low, low + middle - high) < -1e-9 * abs(high):  # not a rounding error
         notes.append(
-            f'no body has the principal moments {low:.3g}, {middle:.3g}, {high:.3g} kg m^2; the '
-            'inertia is written as zero'
+            f'mass and centre are valid, but no body has the principal moments {low:.3g}, '
+            f'{middle:.3g}, {high:.3g} kg m^2, so the inertia is written as zero'
         )
         point = pin.Inertia(load.body.mass, load.body.lever, np.zeros((3, 3)))
         load = replace(load, body=point)

@@ -173,7 +173,7 @@ class ForwardValidation:
         """Return a text with the largest position error of each model."""
         if self.before is None or self.same:
             return self.after.worst
-        return f'{self.before.worst} before, {self.after.worst} after'
+        return f'{self.before.worst} with the given model, {self.after.worst} with the new one'
 
     @property
     def worse(self) -> tuple[str, ...]:
