@@ -54,7 +54,7 @@ def next_steps(
             'diagnose again.'
         )
     if verdict in ('unknown', 'partial'):
-        steps += [f'Unexplained at {w.joint}: {w.signature}.' for w in diagnosis.left]
+        steps += [f'Look for a cause at {w.joint}: {w.signature}.' for w in diagnosis.left]
         option = '' if learned else '--residual gp, which learns that torque as a map'
         if diagnosis.baseline != OWN_MISFIT:
             option = '--baseline BAG, a recording from before'

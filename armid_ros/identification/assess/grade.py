@@ -160,7 +160,7 @@ def _torque_errors(
             yield Fault(text, word)
             continue
         # without held-out data, each half of the data is predicted from the other half
-        text = f'torque error of one half of the data, predicted from the other: {one.text}{ask}'
+        text = f'torque error in a cross-check of the two halves of the data: {one.text}{ask}'
         halves = result.halves.joint_relative_error_percent
         undetermined = halves > np.maximum(LIMITS.undetermined * training, 100.0 * LIMITS.floor)
         undetermined &= beyond_noise(halves, result.training, result.used) > 0.0

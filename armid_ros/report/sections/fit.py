@@ -51,7 +51,7 @@ def error_bars(robot: Robot, training: Fits, validation: Fits, halves: Score) ->
         return Score.of([f for part in fits.values() for f in part]).joint_relative_error_percent
 
     test = errors(validation) if validation else halves.joint_relative_error_percent
-    label = 'torque error of one half of the data, predicted from the other'
+    label = 'torque error in a cross-check: each half of the data predicted from the other'
     if validation:
         label = 'torque error on recordings not used for the fit'
     shown: list[tuple[Role, str, FloatArray]] = [
