@@ -138,7 +138,7 @@ def misfit_of_block(block: Any) -> Misfit:
     if data not in _DATA:
         raise ModelError(f"misfit: 'data' is '{data}', but has to be {' or '.join(_DATA)}")
     if loud is not None and not loud.keys() >= rms.keys():
-        raise ModelError("misfit: 'torque_rms' has to have all joints of 'rms'")
+        raise ModelError("misfit: a joint of 'rms' is missing in 'torque_rms'")
     relative = finite(error, 'relative_error_percent of the misfit')
     return Misfit(data, rms, relative, loud, filters=filters)
 

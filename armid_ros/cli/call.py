@@ -32,7 +32,7 @@ def call(action: str, share: float | None, node: str, timeout: float) -> None:
 
     """
     if (action == 'speed') != (share is not None):
-        raise click.UsageError('SHARE is for the action speed only, as in armid call speed 0.5')
+        raise click.UsageError("SHARE is only for the action 'speed', as in armid call speed 0.5")
     from armid_ros.nodes.calls import call_publisher
 
     say(call_publisher(node, action, share, timeout))

@@ -211,7 +211,7 @@ class LearnedTorque(Effect):
             return self
         lost = [joint for joint in self.joints if joint not in found]
         if lost:
-            raise ModelError(f"{self.name}: joint '{lost[0]}' has no torque map")
+            raise ModelError(f"{self.name}: the model file has no map of joint '{lost[0]}'")
         maps = tuple(TorqueMap.of_document(found[joint], joint) for joint in self.joints)
         return replace(self, maps=maps)
 

@@ -63,9 +63,9 @@ class Tied(Attached):
         partner, names = motion.partner, self.points
         if partner is None or not set(names) <= set(partner.names):
             raise ModelError(
-                f'{self.name} of {", ".join(self.joints)}: the motion of its anchor points on '
-                f'{self.partner or "another machine"} ({", ".join(names)}) was not recorded; name '
-                f'that machine with --partner'
+                f'{self.name} of {", ".join(self.joints)} needs the motion of {", ".join(names)} '
+                f'on {self.partner or "another machine"}, whose joint states were not read; give '
+                f'the description of this machine with --partner'
             )
         columns = [partner.names.index(name) for name in names]
         position, velocity = partner.position[:, columns], partner.velocity[:, columns]

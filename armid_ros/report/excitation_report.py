@@ -206,8 +206,8 @@ def identifiable(design: Design, links: Sequence[str]) -> list[str]:
         f'All {len(names)} parameters can be identified (condition number '
         f'{plain(information.condition)}: {grade}).',
         f'{accurate} of {known} parameters that are not zero in the description will be known to '
-        f'10 %{remark}. Least accurate: {full_label(names[worst], links)}: ± {digits(float(std[worst]))} '
-        f'{pretty(names[worst].unit)}.',
+        f'10 %{remark}. Least accurate: {full_label(names[worst], links)}: '
+        f'± {digits(float(std[worst]))} {pretty(names[worst].unit)}.',
     ]
 
 

@@ -157,8 +157,8 @@ def with_obstacles(collision: CollisionModel, obstacles: Sequence[Obstacle]) -> 
         unknown = [link for link in obstacle.ignore if link not in links]
         if unknown:
             raise TrajectoryError(
-                f"obstacle '{obstacle.name}' ignores link '{unknown[0]}', which has no body; "
-                f'links with a body are {", ".join(dict.fromkeys(links))}'
+                f"obstacle '{obstacle.name}' ignores link '{unknown[0]}', which has no collision "
+                f'geometry; links with collision geometry are {", ".join(dict.fromkeys(links))}'
             )
         rotation = pin.rpy.rpyToMatrix(*obstacle.rpy)
         placement = pin.SE3(rotation, np.array(obstacle.position))

@@ -71,4 +71,4 @@ def reserved_domain() -> Iterator[int]:
                 continue
             yield domain
             return
-    raise ArmidError(f'all {len(domains)} private ROS domains of this machine are in use')
+    raise ArmidError(f'all {len(domains)} ROS domain IDs of armid are in use; end a process')

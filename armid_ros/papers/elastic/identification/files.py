@@ -104,8 +104,8 @@ def read_runs(
         )
     if not runs:
         raise RecordingError(
-            f'{path}: {REFERENCE} has no motion of {_MIN_DURATION:g} s or more; record the '
-            'reference of the velocity loops'
+            f'{path}: no motion of the topic {REFERENCE} lasts {_MIN_DURATION:g} s; record the '
+            'reference of the velocity loops for longer'
         )
     return runs
 
