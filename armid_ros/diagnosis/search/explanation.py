@@ -197,7 +197,8 @@ def _unset(
 
     The prior of a value is the one of every other effect: a mixture of normal distributions with
     standard deviations `SIZES`, times the value whose torque is that of the joint. Most joints
-    have friction and an offset, so the default frequency of these effects is 'often'.
+    have friction and an offset, so the default frequency of these effects is 'often'. The variance
+    of a value is that of its posterior, or of the jackknife over recordings if larger.
 
     """
     nuisance = result.nuisance
@@ -205,6 +206,12 @@ def _unset(
     diagnosed, joints = np.flatnonzero(nuisance.rows.diagnosed).tolist(), nuisance.arm.robot.joints
     residual = nuisance.squares_of_diagnosed(result.posterior)
     names = [(one.name, one.joint) for one in nuisance.base.parameters]
+    scatter = np.zeros(len(means))
+    if len(diagnosed) > 1:
+        hyperparameters = result.posterior.hyperparameters
+        others = [[j for j in diagnosed if j != left_out] for left_out in diagnosed]
+        fits = [nuisance.means(nuisance.posterior(hyperparameters, used)) for used in others]
+        scatter = (len(fits) - 1) * np.var(fits, axis=0)
     for effect in unknown:
         parameter = effect.parameters(nuisance.arm.robot)[0]
         if (parameter.name, parameter.joint) not in names:
@@ -216,8 +223,9 @@ def _unset(
         joint = joints.index(parameter.joint)
         sigma = float(nuisance.rows.sigma[-1][joint])
         rms = sigma * np.sqrt(square / count)
-        variance = float(covariance[k, k])
-        prior = SIZES * nuisance.rows.torque[joint] / max(rms, 1e-300)
+        variance = max(float(covariance[k, k]), float(scatter[k]))
+        unit = nuisance.rows.torque[joint] / max(rms, 1e-12 * nuisance.rows.torque[joint])
+        prior = SIZES * unit
         wide = 1.0 + prior**2 / variance
         explained = 0.5 * means[k] ** 2 / variance * (1.0 - 1.0 / wide)
         odds = float(np.logaddexp.reduce(explained - 0.5 * np.log(wide)) - np.log(len(SIZES)))
@@ -230,7 +238,7 @@ def _unset(
             means[k : k + 1],
             np.sqrt([variance]),
             np.array([resolution]),
-            np.array([settings.material * nuisance.rows.torque[joint] / max(rms, 1e-300)]),
+            np.array([settings.material * unit]),
             np.sqrt(resolution),
             2.0 * odds,
             odds,
