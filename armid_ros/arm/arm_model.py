@@ -78,7 +78,7 @@ class ArmModel:
     quasi_static: bool = False
 
     def __post_init__(self) -> None:
-        """Use zeros for missing values, check the number of values, and make them read-only."""
+        """Set missing parameter values to zero, check their number, and make them read-only."""
         sizes = [len(effect.parameters(self.robot)) for effect in self.effects]
         values = self.values or tuple(np.zeros(size) for size in sizes)
         object.__setattr__(self, 'values', tuple(read_only(v) for v in values))
@@ -204,12 +204,12 @@ class ArmModel:
 
     @property
     def body(self) -> Robot:
-        """Return the robot with the effects that change it, such as a payload or gravity."""
+        """Return the rigid body, including effects that change it, such as a payload."""
         assert self._acting.robot is not None
         return self._acting.robot
 
     def along(self, motion: Motion) -> ArmModel:
-        """Return the arm with effects that use other signals of a motion, such as temperatures."""
+        """Return the arm with recorded signals that its effects need, such as temperatures."""
         effects = tuple(effect.along(motion) for effect in self.effects)
         known = all(new is old for new, old in zip(effects, self.effects, strict=True))
         return self if known else replace(self, effects=effects)
@@ -241,7 +241,7 @@ class ArmModel:
         return gravity_sensitivity(self.body, self.link_motion(motion).q)
 
     def smoothed(self, motion: Motion) -> Motion:
-        """Return a recorded motion without frequencies above its band."""
+        """Return a recorded motion without frequencies above its ``band_hz``."""
         return smoothed(motion)
 
     def load_derivatives(self, motion: Motion) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -249,15 +249,7 @@ class ArmModel:
         return inverse_dynamics_derivatives(self.body, self.rigid_body_motion(motion))
 
     def link_torque_derivatives(self, motion: Motion) -> tuple[FloatArray, FloatArray] | None:
-        """
-        Return derivatives of the torque of effects that act on the links, by q and by dq.
-
-        Returns
-        -------
-        (ndarray, ndarray), each of shape (N, n, n), or None
-            None if no effect acts on the links.
-
-        """
+        """Differentiate torques of effects on the links by q and dq; None without such effects."""
         law = self.along(motion).action().link_torque
         return None if law is None else law_derivatives(law, self.link_motion(motion))
 
@@ -385,7 +377,7 @@ class ArmModel:
         return tau
 
     def neighbours(self, period: float) -> int:
-        """Return the number of samples, before and after each, that affect a torque reading."""
+        """Return the number of samples on each side of a sample that affect its torque reading."""
         action = self._acting
         if action.displacement is None and action.reading_memory == 0.0:  # noqa: RUF069 - of laws, never computed
             return 0
@@ -394,7 +386,7 @@ class ArmModel:
 
     @cached_property
     def _readings(self) -> list[tuple[TorqueReading, FloatArray]]:
-        """Return the sensor effects of the torque, with their parameter values."""
+        """Return the effects that act on torque readings, with their parameter values."""
         pairs = zip(self.effects, self.values, strict=True)
         return [(e, values) for e, values in pairs if isinstance(e, TorqueReading)]
 
@@ -418,7 +410,7 @@ class ArmModel:
         return columns
 
     def with_load_friction(self, motion: Motion, columns: FloatArray) -> FloatArray:
-        """Add the change of load-dependent friction caused by a change of the load, (N, n, P)."""
+        """Add derivatives of load-dependent friction to derivatives of the load, (N, n, P)."""
         friction = self._acting.dry_friction
         if friction is None or friction.load_share is None:
             return columns
@@ -428,7 +420,7 @@ class ArmModel:
         return np.asarray(columns + along @ (gain[:, :, np.newaxis] * (along.T @ columns)))
 
     def rigid_body_motion(self, motion: Motion) -> Motion:
-        """Return the motion for rigid-body torques: without velocities if quasi-static."""
+        """Return the motion for rigid-body torques, at rest in each sample if quasi-static."""
         return motion.at_rest() if self.quasi_static else motion
 
     def base_parameters(

@@ -22,7 +22,7 @@ import numpy as np
 @dataclass(frozen=True)
 class Exported:
     """
-    Exported robot description, and the parts of the arm that its format cannot contain.
+    Content of an exported URDF or MJCF, and parts of the arm that the format cannot contain.
 
     Attributes
     ----------
@@ -90,7 +90,7 @@ def place_values(
     arm: ArmModel, attribute: Callable[[Effect], str]
 ) -> tuple[dict[str, dict[str, float]], tuple[str, ...]]:
     """
-    Return effect values by attribute of a file format, and text lines of all other values.
+    Return the effect parameters that a file format has, by attribute, and the others as text.
 
     The function ``attribute`` returns the attribute of the format for an effect, or an empty text.
     Effects that change the rigid body are part of its inertial parameters, and appear in neither
@@ -116,7 +116,7 @@ def place_values(
 
 def torque_check(exported: Exported, arm: ArmModel) -> dict[str, Any]:
     """
-    Compare the torques of an exported file in MuJoCo with those of the arm, in random states.
+    Compare joint torques that MuJoCo computes from an exported file with those of the arm.
 
     Parameters
     ----------
@@ -173,7 +173,7 @@ def torque_check(exported: Exported, arm: ArmModel) -> dict[str, Any]:
 
 
 def _inverse(mujoco: Any, model: Any, motion: Motion, held: dict[str, float]) -> FloatArray:
-    """Return joint torques by MuJoCo's inverse dynamics, without contacts and limits, (N, n)."""
+    """Return joint torques by MuJoCo's inverse dynamics, without contacts and joint limits."""
     model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONSTRAINT
     data = mujoco.MjData(model)
     kind = mujoco.mjtObj.mjOBJ_JOINT

@@ -19,7 +19,7 @@ _Result = TypeVar('_Result')
 
 @dataclass
 class _Regressor:
-    """Rigid-body regressor of a recorded motion, and its filtered rows."""
+    """Cache entry: a recorded motion, its rigid-body regressor, and the filtered regressor."""
 
     motion: Motion
     columns: FloatArray
@@ -43,7 +43,7 @@ class _Memoized(ArmModel):
         return {}
 
     def _once(self, name: str, motion: Motion, compute: Callable[[Motion], _Result]) -> _Result:
-        """Return a quantity along a motion, computed at the first call."""
+        """Return a quantity along a motion from the cache; compute it at the first call."""
         key = name, id(motion)
         if key not in self._known:
             self._known[key] = motion, compute(motion)
@@ -61,7 +61,7 @@ class _Memoized(ArmModel):
         return self._once('frames', motion, super().link_frames)
 
     def regressor(self, motion: Motion) -> _Regressor | None:
-        """Return the cached regressor; None if effects move the links or memory is full."""
+        """Return and cache the rigid-body regressor of a motion; None if it cannot be cached."""
         if self.action().displacement is not None:
             return None
         key = self._key(motion)
@@ -76,7 +76,7 @@ class _Memoized(ArmModel):
         return self.regressors[key]
 
     def _key(self, motion: Motion) -> tuple[object, ...]:
-        """Return a key of all that a regressor depends on: motion, gravity and quasi-static."""
+        """Return the cache key of a regressor, made of motion, gravity and ``quasi_static``."""
         places = (array.ctypes.data for array in (motion.q, motion.dq, motion.ddq))
         return *places, len(motion), tuple(self.body.gravity.tolist()), self.quasi_static
 
@@ -97,7 +97,7 @@ class _Memoized(ArmModel):
         return self._once('gravity', motion, super().gravity_columns)
 
     def smoothed(self, motion: Motion) -> Motion:
-        """Return a recorded motion without frequencies above its band."""
+        """Return a recorded motion without frequencies above its ``band_hz``."""
         return self._once('smooth', motion, super().smoothed)
 
     def load_derivatives(self, motion: Motion) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -105,7 +105,7 @@ class _Memoized(ArmModel):
         return self._once('derivatives', motion, super().load_derivatives)
 
     def link_torque_derivatives(self, motion: Motion) -> tuple[FloatArray, FloatArray] | None:
-        """Differentiate effects' torques on the links by q and dq, (N, n, n); None without any."""
+        """Differentiate torques of effects on the links by q and dq; None without such effects."""
         return self._once('holding', motion, super().link_torque_derivatives)
 
     def joint_torque(self, motion: Motion) -> FloatArray:

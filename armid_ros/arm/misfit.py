@@ -117,7 +117,7 @@ class Misfit:
 
 
 def growth(now: FloatArray, before: FloatArray) -> FloatArray:
-    """Return the ratio of present to earlier rms values, but at least 1, shape (n,)."""
+    """Return the ratio of the present to an earlier rms torque of each joint, at least 1."""
     return np.asarray(np.maximum(now / np.maximum(before, 1e-12), 1.0))
 
 
@@ -144,7 +144,7 @@ def misfit_of_block(block: Any) -> Misfit:
 
 
 def _torques(block: Any) -> dict[str, float]:
-    """Return the torques of joints in a block of model.yaml; ModelError if one is negative."""
+    """Return rms torques by joint from a block of model.yaml; ModelError if any is negative."""
     torques = {
         str(joint): finite(value, f"misfit of joint '{joint}'") for joint, value in block.items()
     }

@@ -228,7 +228,7 @@ def read_model(text: str, robot: Robot, source: str) -> ArmModel:
 
 
 def add_effect(arm: ArmModel, effect: Effect, values: FloatArray) -> ArmModel:
-    """Return the arm with an effect added; if the arm has the effect, the values are added."""
+    """Add an effect to an arm, or add its values to those of the same effect in the arm."""
     there = _find_effect(arm, effect)
     if there is None:
         named = effect.named_as(values, arm)
@@ -244,7 +244,7 @@ def add_effect(arm: ArmModel, effect: Effect, values: FloatArray) -> ArmModel:
 
 
 def _find_effect(arm: ArmModel, effect: Effect) -> tuple[int, list[int]] | None:
-    """Return the index of an effect in the arm and those of its parameters; None if missing."""
+    """Return the indices of an effect and of its parameters in the arm; None if it is missing."""
     wanted = [(p.name, p.joint) for p in effect.parameters(arm.robot)]
     for position, own in enumerate(arm.effects):
         if isinstance(effect, type(own)) and not own.shapes and not own.points:
@@ -255,7 +255,7 @@ def _find_effect(arm: ArmModel, effect: Effect) -> tuple[int, list[int]] | None:
 
 
 def _with_catalogue_effects(arm: ArmModel) -> ArmModel:
-    """Return the arm with catalogue effects in place of effects that only searches use."""
+    """Replace effects that only searches use, such as a gravity vector, by catalogue effects."""
     # a gravity vector, for example, becomes a tilt of the base and a magnitude of gravity
     converted = replace(arm, effects=(), values=())
     for effect, values in zip(arm.effects, arm.values, strict=True):
@@ -312,7 +312,7 @@ def _wrong_unit(row: Mapping[str, Any], units: Collection[str]) -> str:
 def _rows(
     document: Mapping[str, Any], text: str
 ) -> Iterator[tuple[tuple[str | int, ...], Any, tuple[str, ...]]]:
-    """Yield the keys in the file, the content and the permitted units of each parameter."""
+    """Yield the keys, the entry and the permitted units of each parameter in model.yaml."""
     for k, row in enumerate(document['rigid_parameters']):
         unit = link_unit(_name(row))
         yield ('rigid_parameters', k), row, (unit,) if unit else ()
@@ -330,7 +330,7 @@ def _rows(
 
 
 def _problem(row: Any, units: tuple[str, ...]) -> tuple[str, str]:
-    """Return the key and the error message of an invalid parameter; empty if it is valid."""
+    """Return key and message of a fault in a parameter's entry; without fault, no message."""
     keys = ', '.join(_KEYS_OF_PARAMETER)
     if not isinstance(row, dict):
         return '', f'a parameter has {keys}, but this entry is {str(row)[:40]!r}'
@@ -349,24 +349,24 @@ def _problem(row: Any, units: tuple[str, ...]) -> tuple[str, str]:
 
 
 def _require(content: Mapping[str, Any], keys: Collection[str], part: str) -> None:
-    """Raise ModelError if a part of the document lacks one of its keys."""
+    """Raise ModelError if a part of model.yaml lacks a required key."""
     missing = [key for key in keys if key not in content]
     if missing:
         raise ModelError(f"{part}: '{missing[0]}' is missing; needed are {', '.join(keys)}")
 
 
 def _name(row: Any) -> str:
-    """Return the name of a parameter in the document; empty if the entry is not valid."""
+    """Return the parameter name in an entry of model.yaml; empty if the entry has no keys."""
     return str(row.get('name')) if isinstance(row, dict) else ''
 
 
 def _called(row: Mapping[str, Any]) -> str:
-    """Return name and joint of a parameter in the document, for error messages."""
+    """Return the parameter name and joint in an entry of model.yaml as text for error messages."""
     return f"parameter '{row.get('name')}' of joint '{row.get('joint')}'"
 
 
 def _arm(document: dict[str, Any], robot: Robot) -> ArmModel:
-    """Return the arm model in a checked document, on a robot."""
+    """Return the arm model that the document of a checked model.yaml describes."""
     try:
         gravity = [finite(part, 'gravity') for part in document['gravity']]
         arm = ArmModel(robot.with_gravity(np.array(gravity).reshape(3)))
@@ -391,7 +391,7 @@ def _arm(document: dict[str, Any], robot: Robot) -> ArmModel:
 
 
 def _values(rows: Sequence[dict[str, Any]], names: Sequence[ParameterName]) -> FloatArray:
-    """Return the values of parameters from their entries; each has to occur once, in its unit."""
+    """Return parameter values from entries of model.yaml; each parameter has to occur once."""
     table: dict[tuple[str, str], dict[str, Any]] = {}
     units = {(name.name, name.joint): [name.unit] for name in names}
     for row in rows:

@@ -176,7 +176,7 @@ def docstring_bounds_and_names_are_valid(trial: EffectCase) -> None:
 
 
 def columns_are_finite_and_one_per_parameter(trial: EffectCase) -> None:
-    """Fail if columns are not finite, or their shape is not (N, n, P)."""
+    """Fail if the effect's columns are not finite, or their array shape is not (N, n, P)."""
     columns = ArmModel(trial.robot).columns_of(trial.effect, trial.motion)
     assert np.all(np.isfinite(columns)), 'columns are not finite'
 
@@ -188,13 +188,13 @@ def size_zero_changes_nothing(trial: EffectCase) -> None:
 
 
 def columns_are_the_derivative_at_zero(trial: EffectCase) -> None:
-    """Fail if ``columns`` is not the derivative of the torque by ``action`` at zero."""
+    """Fail if ``columns`` is not the torque derivative when all parameters are zero."""
     columns = ArmModel(trial.robot).columns_of(trial.effect, trial.motion)
     _compare(trial, np.zeros_like(trial.values), columns)
 
 
 def columns_are_the_derivative_at_any_size(trial: EffectCase) -> None:
-    """Fail if ``columns`` is not the derivative of the torque by ``action`` at typical values."""
+    """Fail if ``columns`` is not the torque derivative at typical parameter values."""
     columns = trial.arm(trial.values).columns(trial.motion)
     _compare(trial, trial.values, columns[:, :, -len(trial.values) :])
 
@@ -220,7 +220,7 @@ def instantaneous_means_sample_by_sample(trial: EffectCase) -> None:
 
 
 def shapes_stay_possible(trial: EffectCase) -> None:
-    """Fail if default shapes, or initial shapes of a search, are outside their bounds."""
+    """Fail if shape parameters are outside their bounds, by default or in a search."""
     effect, motion = trial.effect, trial.motion
     assert motion.tau is not None
     nothing = np.zeros((*motion.q.shape, 0))
@@ -235,12 +235,12 @@ def shapes_stay_possible(trial: EffectCase) -> None:
 
 
 def effect_can_be_pickled(trial: EffectCase) -> None:
-    """Fail if the effect cannot be pickled, as for other processes."""
+    """Fail if the effect cannot be pickled, as needed to send it to other processes."""
     assert pickle.loads(pickle.dumps(trial.effect)) == trial.effect
 
 
 def _compare(trial: EffectCase, values: FloatArray, columns: FloatArray) -> None:
-    """Compare columns with finite differences of the torque, one-sided at a lower bound."""
+    """Compare an effect's columns with finite differences of torque, one-sided at lower bounds."""
     lower, _ = trial.effect.bounds()
     for parameter, step in enumerate(_STEP * np.eye(len(values))):
         if values[parameter] - _STEP > lower[parameter]:
