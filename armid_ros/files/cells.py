@@ -13,7 +13,7 @@ _GUARDED = ('=', '+', '-', '@', '#', '\t', '\r', "'")
 
 def csv_text(rows: Iterable[Sequence[str]]) -> str:
     """
-    Return rows of a table as CSV text; the first cell of each row is a name.
+    Return the rows of a table as CSV text; the first cell of each row has to be a name.
 
     A name that begins like a formula of a spreadsheet gets an apostrophe as prefix. Quotes are
     added if needed.
@@ -29,7 +29,7 @@ def csv_text(rows: Iterable[Sequence[str]]) -> str:
 
 
 def parted(text: str, separator: str = ',') -> list[str]:
-    """Split a text at a separator, but not inside double quotes, which stay in the text."""
+    """Split a text at separators outside double quotes; the quotes stay in the parts."""
     parts, last = [], 0
     for match in re.finditer(rf'"[^"]*"|{re.escape(separator)}', text):
         if match[0] == separator:
@@ -39,5 +39,5 @@ def parted(text: str, separator: str = ',') -> list[str]:
 
 
 def listed(text: str, separator: str = ',') -> tuple[str, ...]:
-    """Return the names in a text with separators; names in double quotes may contain them."""
+    """Return the names in a separated list; a name in double quotes may contain the separator."""
     return tuple(part.replace('"', '') for part in parted(text, separator))

@@ -166,7 +166,7 @@ def _line(event: yaml.Event) -> int:
 
 
 def _error_message(problem: BaseException) -> str:
-    """Return the message of a parser's error in one line."""
+    """Return the message of a parser's error in a single line."""
     if isinstance(problem, RecursionError):
         return 'the document is nested too deep'
     if isinstance(problem, MemoryError):

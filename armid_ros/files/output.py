@@ -245,7 +245,7 @@ def _refuse_other_results(path: Path, schema: str, robot: str) -> None:
 
 
 def _in_words(schema: str) -> str:
-    """Return a schema of results in words, such as 'results of comparison'."""
+    """Return a schema in words: 'results of comparison' for 'armid/comparison/1'."""
     parts = schema.split('/')
     return f'results of {parts[1]}' if len(parts) == 3 else schema
 
@@ -262,7 +262,7 @@ def _representable(value: Any) -> Any:
 
 
 def final_path(path: Path) -> Path:
-    """Return the path of a file after its staging folder is committed; other paths unchanged."""
+    """Return the final path of a file in a staging folder; paths elsewhere are unchanged."""
     return Path(*(part for part in path.parts if part != STAGING))
 
 
@@ -279,7 +279,7 @@ def hash_files(paths: Iterable[str | Path]) -> tuple[tuple[str, int, str], ...]:
 
 
 def written_by(schema: str, also: Collection[str] = ()) -> tuple[str, ...]:
-    """Return names and patterns, such as '*.png', of the files that a result with a schema has."""
+    """Return the names, or patterns such as '*.png', of the files in results with a schema."""
     return (*_WRITES.get(schema, ()), *also)
 
 
@@ -355,7 +355,7 @@ def is_plan(path: Path) -> bool:
 
 
 def is_own(path: Path) -> bool:
-    """Return whether this package wrote a document, a page, a layout or a planned trajectory."""
+    """Return whether this package wrote a file, such as a report, or a bag of a planned motion."""
     if path.is_dir():
         return is_plan(path)
     if not path.name.endswith(_MARKED_SUFFIXES):

@@ -103,7 +103,7 @@ def problem_text(problem: OSError | ValueError) -> str:
 
 
 def default_memory_limit() -> int:
-    """Return the default memory limit for one input: a quarter of the memory [bytes]."""
+    """Return the default memory limit of an input: a quarter of the available memory [bytes]."""
     bounds = [os.sysconf('SC_PAGE_SIZE') * os.sysconf('SC_PHYS_PAGES')]
     limit = resource.getrlimit(resource.RLIMIT_AS)[0]
     if limit != resource.RLIM_INFINITY:

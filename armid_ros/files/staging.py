@@ -28,7 +28,7 @@ from armid_ros.files.output import DOCUMENTS, locked, STAGING
 @dataclass(frozen=True)
 class Staged:
     """
-    Result in a staging folder, which is moved to its place when it is complete.
+    New result in a staging folder; it replaces the earlier result when it is complete.
 
     Attributes
     ----------
@@ -93,7 +93,7 @@ class Staged:
             raise OutputError(f'{self.out}: cannot be written to: {error.strerror}') from error
 
     def _exchanged(self, names: Collection[str]) -> bool:
-        """Exchange the folder for one with the result and all other files; False if impossible."""
+        """Replace the folder by a new folder with result and other files; False if impossible."""
         out = self.out.resolve()
         old, own = out.stat(), self.folder.stat()
         if Path.cwd().is_relative_to(out) or (old.st_uid, old.st_gid) != (own.st_uid, own.st_gid):
