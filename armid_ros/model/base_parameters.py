@@ -118,7 +118,7 @@ def group_columns(
     w: FloatArray, standard: tuple[ParameterName, ...], tolerance: float = RANK_TOLERANCE
 ) -> BaseParameters:
     """
-    Group the dependent columns of a regressor, and return its base parameters.
+    Group linearly dependent columns of a regressor, and return the base parameters.
 
     Parameters
     ----------
@@ -174,7 +174,7 @@ def group_columns(
 
 def regroup(theory: BaseParameters, data: BaseParameters) -> BaseParameters:
     """
-    Combine the grouping that holds for any motion with a further grouping for given data.
+    Combine the grouping of parameters for any motion with the further grouping by given data.
 
     Parameters
     ----------
@@ -192,7 +192,7 @@ def regroup(theory: BaseParameters, data: BaseParameters) -> BaseParameters:
 def _named(
     standard: tuple[ParameterName, ...], independent: npt.NDArray[np.intp], grouping: FloatArray
 ) -> BaseParameters:
-    """Return base parameters with names by their grouping, whose rounding errors become zero."""
+    """Name base parameters by their grouping matrix, in which rounding errors become zero."""
     grouping = np.where(np.abs(grouping) < RANK_TOLERANCE, 0.0, grouping)
     parameters = tuple(
         replace(standard[leader], name=_expression(row, leader, standard))
@@ -203,7 +203,7 @@ def _named(
 
 def levelled(robot: Robot) -> Robot:
     """
-    Return the robot with gravity exactly along a joint axis, if rounding tilts it slightly.
+    Return the robot without tiny components of gravity due to a rounded base orientation.
 
     Components of gravity below 0.2 %, across the axes of the first joint, become zero. A hanging
     base with a rounded angle of 3.1416 excites first moments by 7e-6 of their weight, far below

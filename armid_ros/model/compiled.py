@@ -39,7 +39,7 @@ _JOINT = np.dtype(
 
 class Structure(ctypes.Structure):
     """
-    Base class of the C structures that the kernel reads.
+    Base class of the C structures that the compiled kernel reads.
 
     Attributes
     ----------

@@ -16,7 +16,7 @@ def points_motion(
     robot: Robot, joints: Sequence[str], offsets: FloatArray, q: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """
-    Return the positions and Jacobians of points on links along joint positions.
+    Return the positions and Jacobians of points on links, at given joint positions.
 
     Parameters
     ----------
@@ -42,7 +42,7 @@ def points_motion(
 
 @dataclass(frozen=True)
 class _Frame:
-    """Frame of a link at N samples: rotation (3, 3, N), origin (3, N), and its moving joints."""
+    """Frame of a link at N samples: rotation (3, 3, N), origin (3, N), and joints that move it."""
 
     rotation: FloatArray
     origin: FloatArray
@@ -124,7 +124,7 @@ class LinkFrames:
 
     @classmethod
     def in_the_middle(cls, robot: Robot) -> LinkFrames:
-        """Compute the frames with all joints in the middle of their range; at 0 without limits."""
+        """Compute the frames with all joints in mid-range; joints without limits are at 0."""
         return cls.of(robot, robot.middle_pose[np.newaxis])
 
     def places(self, joint: str, offset: FloatArray) -> FloatArray:

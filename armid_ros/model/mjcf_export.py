@@ -111,7 +111,7 @@ def export_mjcf(
 
 
 def _couplings(root: ElementTree.Element, robot: Robot) -> list[str]:
-    """Add couplings and loops of joints as constraints; return those that MuJoCo cannot have."""
+    """Add couplings and loops of joints as constraints; return couplings that MuJoCo lacks."""
     if robot.mechanism is None:
         return []
     tendons = ElementTree.SubElement(root, 'tendon')
@@ -145,7 +145,7 @@ def _couplings(root: ElementTree.Element, robot: Robot) -> list[str]:
 def _shapes(
     robot: Robot, bodies: Mapping[int, ElementTree.Element], assets: ElementTree.Element
 ) -> list[str]:
-    """Add the shapes of links to their bodies; return the meshes that MuJoCo cannot read."""
+    """Add the geometric shapes of links to MJCF bodies; return meshes that MuJoCo cannot read."""
     left_out: dict[str, None] = {}
     files: dict[tuple[Path, tuple[float, ...]], str] = {}
     for of in _CLASSES:

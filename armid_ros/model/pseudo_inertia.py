@@ -24,7 +24,7 @@ import numpy.typing as npt
 
 
 def _basis() -> FloatArray:
-    """Return the pseudo-inertia matrix of each unit parameter, shape (10, 4, 4)."""
+    """Return the derivatives of pseudo-inertia by inertial parameters, shape (10, 4, 4)."""
     basis = np.zeros((PER_LINK, 4, 4))
     basis[0, 3, 3] = 1.0
     for axis in range(3):
@@ -86,7 +86,7 @@ def link_parameters(matrix: npt.ArrayLike) -> FloatArray:
 @dataclass(frozen=True)
 class Consistency:
     """
-    Mass, centre, principal moments and pseudo-inertia eigenvalues of a link.
+    Mass, centre of mass, principal moments and pseudo-inertia eigenvalues of a link.
 
     Attributes
     ----------
@@ -112,7 +112,7 @@ class Consistency:
 
     @staticmethod
     def of(link: str, parameters: npt.ArrayLike) -> Consistency:
-        """Compute mass, centre, moments and eigenvalues from the ten parameters of a link."""
+        """Compute all attributes from the ten inertial parameters of a link."""
         matrix = pseudo_inertia(parameters)
         mass = float(matrix[3, 3])
         center = moments = np.full(3, np.nan)
@@ -126,7 +126,7 @@ class Consistency:
 
     @property
     def consistent(self) -> bool:
-        """Whether a body of positive density can have these parameters."""
+        """Whether a body of positive density can have the inertial parameters."""
         return bool(self.eigenvalues[0] > 0.0)
 
 

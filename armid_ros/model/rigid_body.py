@@ -51,7 +51,7 @@ def link_unit(name: str) -> str:
 
 
 class _Prepared(threading.local):
-    """Work space of Pinocchio and kernel body of each robot, cached in each thread."""
+    """Cache in each thread: Pinocchio's work space, and the body in kernel format, by robot."""
 
     def __init__(self) -> None:
         self.data: WeakKeyDictionary[Robot, pin.Data] = WeakKeyDictionary()
@@ -64,7 +64,7 @@ class _Prepared(threading.local):
         return self.data[robot]
 
     def body_of(self, robot: Robot) -> BodyOfKernel | None:
-        """Return a robot in the format of the kernel; None without a kernel."""
+        """Return a robot in the format of the compiled kernel; None without this kernel."""
         if robot not in self.bodies:
             self.bodies[robot] = kernel_body(robot)
         return self.bodies[robot]
@@ -147,7 +147,7 @@ def inverse_dynamics_derivatives(
 
 
 def _projected(jacobian: FloatArray, torques: FloatArray) -> FloatArray:
-    """Return J^T times torques of moving joints, (N, m, ...), as torques of driven joints."""
+    """Convert torques of moving joints, (N, m, ...), to torques of driven joints, by J^T."""
     return np.asarray(np.einsum('kmn,km...->kn...', jacobian, torques))
 
 

@@ -71,7 +71,7 @@ class TieGeometry(NamedTuple):
 
     def pulled(self, slack: float | FloatArray) -> FloatArray:
         """
-        Return the torque on the first machine's actuators per stiffness, J^T D, (N, n, S) [m^2].
+        Return the first machine's torques per stiffness of each tie, J^T D, (N, n, S) [m^2].
 
         A spring pulls only if it is longer than its slack [m].
 
@@ -81,7 +81,7 @@ class TieGeometry(NamedTuple):
 
 
 def extension(way: FloatArray, slack: float | FloatArray) -> FloatArray:
-    """Return vectors (..., 3) shortened by a slack (...) [m], or zero if they are too short."""
+    """Shorten tie vectors (..., 3) by a slack (...) [m]; shorter vectors become 0."""
     # the direction of a vector shorter than this [m] is undefined
     length = np.maximum(np.linalg.norm(way, axis=-1), 1e-12)
     return np.asarray(np.maximum(1.0 - slack / length, 0.0)[..., np.newaxis] * way)

@@ -149,7 +149,7 @@ def _without_inertials(urdf: str, links: Sequence[str]) -> str:
 
 
 def _share(body: FloatArray, others: FloatArray) -> float:
-    """Return the factor for the inertia of other links that keeps the child link consistent."""
+    """Return a factor for the inertias of other links, so that the child link stays consistent."""
     if not np.any(others):
         return 1.0
     if not Consistency.of('', others).eigenvalues[0] > -1e-12:
@@ -159,7 +159,7 @@ def _share(body: FloatArray, others: FloatArray) -> float:
 
 
 def _scaled(robot: Robot, shares: FloatArray) -> str:
-    """Return the URDF with scaled mass and inertia of links that are fixed to child links."""
+    """Scale mass and inertia of the links that are attached to child links of driven joints."""
     document, root = _parsed(robot.urdf)
     carriers = {joint.child: joint for joint in robot.description.joints}
     for link in _children(root, 'link'):
@@ -180,7 +180,7 @@ def _scaled(robot: Robot, shares: FloatArray) -> str:
 
 
 def _set_inertial(link: minidom.Element, parameters: FloatArray) -> None:
-    """Write ten parameters to a link: mass, centre, and inertia about the centre."""
+    """Write inertial parameters to a URDF link: mass, centre of mass, and inertia about it."""
     body = pin.Inertia.FromDynamicParameters(parameters)
     values = {
         'origin': {'xyz': ' '.join(map(repr, body.lever.tolist())), 'rpy': '0 0 0'},
