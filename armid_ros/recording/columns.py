@@ -100,7 +100,7 @@ class ColumnSettings:
 
 
 def renamed(name: str, rules: Rules) -> str:
-    """Replace the name of a joint, or the beginning of it, by the first rule that matches."""
+    """Rename a joint by a rule (old, new), where old is its name or the beginning of its name."""
     for old, new in sorted(rules, key=lambda rule: rule[0] != name):
         if name.startswith(old):
             return new + name[len(old) :]
@@ -108,7 +108,7 @@ def renamed(name: str, rules: Rules) -> str:
 
 
 def name_in_file(name: str, rules: Rules) -> str:
-    """Return the name that the file has for a joint; the inverse of ``renamed``."""
+    """Return the name of a joint in the file, before rules apply; the inverse of ``renamed``."""
     for old, new in sorted(rules, key=lambda rule: rule[1] != name):
         before = old + name[len(new) :]
         if name.startswith(new) and renamed(before, rules) == name:
@@ -117,7 +117,7 @@ def name_in_file(name: str, rules: Rules) -> str:
 
 
 def renaming(joints: Sequence[str], names: Sequence[str]) -> str:
-    """Return a rule OLD:NEW from names in a file to those of all joints; '' if none fits."""
+    """Return a rule OLD:NEW that renames joints of a file to all given joints; '' if none fits."""
     ends = [(name[:end], name[end:]) for name in names for end in range(len(name))]
     # first try rules that replace complete words of a name
     for old, rest in sorted(ends, key=lambda end: not end[0].endswith(('_', '/'))):
@@ -156,7 +156,7 @@ def numbers(text: str | None) -> tuple[float, ...]:
 
 
 def per_joint(values: Sequence[float], joints: Sequence[str], setting: str) -> FloatArray:
-    """Repeat a single value for all joints, or return one value per joint, shape (n,)."""
+    """Return a value for each joint, shape (n,), from a single value for all or from n values."""
     if len(values) not in (1, len(joints)):
         raise RecordingError(
             f'{setting} has {len(values)} values; give one value for all joints, or '
@@ -240,7 +240,7 @@ def in_si(
 
 
 def _position(joint: str, joints: Sequence[str]) -> int:
-    """Return the index of a joint that a coupling gives by its name, or by its number from 1."""
+    """Return the index of a joint that a motor coupling names, or gives by its number from 1."""
     if joint in joints:
         return list(joints).index(joint)
     if joint.isdigit() and 1 <= int(joint) <= len(joints):

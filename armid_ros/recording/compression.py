@@ -74,7 +74,7 @@ def decompressed(stored: _Buffer, compression: str, size: int, settings: ReadSet
 
 
 class _Zstd(threading.local):
-    """One zstd decompressor per thread; to make one takes as long as decompressing 20 kB."""
+    """A zstd decompressor, kept in each thread because its creation takes long."""
 
     def __init__(self) -> None:
         self.decompressor = zstandard.ZstdDecompressor()
@@ -84,7 +84,7 @@ _ZSTD = _Zstd()
 
 
 def partly_decompressed(stored: _Buffer, compression: str, size: int) -> bytes:
-    """Return the first bytes of a truncated frame's content, at most ``size`` bytes."""
+    """Decompress a truncated zstd or lz4 frame as far as possible, to at most ``size`` bytes."""
     if compression == 'zstd':
         decompressor = zstandard.ZstdDecompressor().decompressobj()
     else:

@@ -15,7 +15,7 @@ def draw_joints(
     joints: Sequence[str], curves: Mapping[str, tuple[FloatArray, FloatArray]], quantity: str
 ) -> npt.NDArray[np.object_]:
     """
-    Draw curves over time for each joint, with one axes per joint in a column.
+    Draw curves over time in a column of axes, with separate axes for each joint.
 
     Parameters
     ----------

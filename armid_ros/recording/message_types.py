@@ -62,7 +62,7 @@ class MessageType:
 
 def message_type(name: str, definition: str | None = None) -> MessageType:
     """
-    Return a message type with its definition, those of the types it contains, and its hash.
+    Return a message type with its hash, and the definitions of it and of types it contains.
 
     Parameters
     ----------
@@ -129,7 +129,7 @@ def _register(store: Typestore, name: str, definition: str | None) -> None:
 
 
 def _installed(name: str) -> str:
-    """Return the text of the .msg file of a type in the sourced ROS workspaces."""
+    """Find the .msg file of a type in the sourced ROS workspaces, and return its text."""
     listed = os.environ.get('AMENT_PREFIX_PATH', '').split(os.pathsep)
     prefixes = [prefix for prefix in (*listed, sys.prefix) if prefix]
     package, _, rest = name.partition('/')

@@ -132,7 +132,7 @@ def read_recording(
 
 
 def is_table(path: Path) -> bool:
-    """Return whether a path is a table; without the plug-in `tables`, any file but a bag."""
+    """Return whether a path is a table; without the plug-in `tables`, every non-bag file is."""
     if find_spec(_TABLES) is None:
         return path.is_file() and not is_bag_file(path)
     from armid_ros.recording import tables
@@ -191,7 +191,7 @@ def assembled(
     decoder: JointStateDecoder,
     damage: str,
 ) -> Recording:
-    """Return a recording of decoded samples; the list of samples is emptied to free memory."""
+    """Make a recording of decoded samples, and empty the list of samples to free memory."""
     where = f'{path}: {topic}'
     if not decoder.messages:
         raise RecordingError(f'{where}: the topic has no messages; record again')

@@ -309,7 +309,7 @@ class Recording:
 
     def plot(self, quantity: Literal['q', 'dq', 'tau'] = 'tau') -> npt.NDArray[np.object_]:
         """
-        Draw one quantity of each joint over time, one axes per joint.
+        Draw a quantity, such as torque, over time, with separate axes for each joint.
 
         Parameters
         ----------
@@ -374,7 +374,7 @@ def recorded_together(
     recording: Recording, other: Recording, robot: Robot, ties: Sequence[Tie] = ()
 ) -> Recording:
     """
-    Add the positions of another machine to a recording, interpolated at its stamps.
+    Add the positions of another machine, interpolated at the recording's stamps, to a recording.
 
     Parameters
     ----------

@@ -35,7 +35,7 @@ class Ros1Source(Source):
     """Reader of one ROS 1 bag file; messages of types that ROS 2 lacks are left out."""
 
     def __init__(self, path: Path, settings: ReadSettings = DEFAULT) -> None:
-        """Open a ROS 1 bag; one chunk at a time is in memory, and chunks have no checksums."""
+        """Open a ROS 1 bag; a single chunk is in memory at a time, and no checksum is compared."""
         super().__init__(path, settings)
         self._old = get_typestore(Stores.ROS1_NOETIC)
         self._new = get_typestore(Stores.ROS2_JAZZY)

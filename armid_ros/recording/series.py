@@ -52,7 +52,7 @@ def gather(pieces: Sequence[JointSamples]) -> list[JointSamples]:
 def clock_problem(
     stamps: IntArray, position: FloatArray | None, receive: IntArray | None = None
 ) -> str:
-    """Return the reason why time stamps cannot be used, as a clause; empty if they can."""
+    """Return why time stamps cannot be used, such as 'do not advance'; empty if they can."""
     first = int(np.argmax(stamps != 0))
     if first and np.count_nonzero(stamps[first:] == 0) <= 0.01 * len(stamps):
         stamps = stamps[first:]  # simulated time is zero until the first /clock
@@ -106,7 +106,7 @@ def ordered(series: JointSamples, clock: Clock, counts: Counter[str]) -> JointSa
 def merged(
     series: Sequence[JointSamples], joints: Sequence[str], counts: Counter[str]
 ) -> JointSamples:
-    """Merge series of some joints each into samples of all joints at common times."""
+    """Merge series, each with some of the joints, into samples of all joints at common times."""
     holders: dict[tuple[int, ...], list[str]] = {}
     for joint in joints:
         key = tuple(i for i, one in enumerate(series) if joint in one.joints)
@@ -158,7 +158,7 @@ def _concatenated(parts: Sequence[JointSamples]) -> JointSamples:
 def _stacked(
     arrays: Sequence[FloatArray | None], parts: Sequence[JointSamples], axis: int = 0
 ) -> FloatArray | None:
-    """Concatenate the arrays of one quantity along time or joints; NaN where it is missing."""
+    """Concatenate arrays of a quantity along time or joints; a missing array becomes NaN."""
     if all(values is None for values in arrays):
         return None
     filled = [
@@ -170,7 +170,7 @@ def _stacked(
 
 
 def _adjacent(arrays: Sequence[FloatArray]) -> FloatArray | None:
-    """Return arrays as one view, if they are consecutive rows of one array; else None."""
+    """Return arrays as a single view if they are consecutive rows of the same array, else None."""
     base = arrays[0].base
     if not isinstance(base, np.ndarray) or base.ndim != 2:
         return None
@@ -208,7 +208,7 @@ def longest_run(stamps: IntArray) -> slice | None:
 
 
 def _sorted(series: JointSamples, counts: Counter[str]) -> JointSamples:
-    """Return samples sorted by time, the first of several samples with equal stamps."""
+    """Return samples sorted by time; of samples with equal stamps, the first is kept."""
     steps = np.diff(series.stamps)
     if (steps > 0).all():
         return series
@@ -225,7 +225,7 @@ def _sorted(series: JointSamples, counts: Counter[str]) -> JointSamples:
 def _resampled(
     series: JointSamples, stamps: IntArray
 ) -> tuple[JointSamples, npt.NDArray[np.bool_], npt.NDArray[np.bool_]]:
-    """Interpolate samples at other stamps; also return masks of valid and of exact values."""
+    """Interpolate samples at other stamps; also return masks of valid and of measured samples."""
     if len(series) == len(stamps) and np.array_equal(series.stamps, stamps):
         everywhere = np.ones(len(stamps), np.bool_)
         return series, everywhere, everywhere
@@ -247,7 +247,7 @@ def _resampled(
 def _finite(
     where: str, joints: tuple[str, ...], series: JointSamples, counts: Counter[str]
 ) -> tuple[JointSamples, tuple[str, ...], tuple[str, ...]]:
-    """Return the samples with finite values, and texts on absent and on non-finite quantities."""
+    """Return the samples with finite values, and names of missing and of non-finite quantities."""
     absent: list[str] = []
     quantities: list[FloatArray | None] = []
     for name, values in zip(QUANTITIES, series.values, strict=True):
@@ -339,7 +339,7 @@ def assemble(
     **attributes: Any,
 ) -> Recording:
     """
-    Return a recording made of samples that may be late, repeated, split or not finite.
+    Make a recording from samples that may be late, repeated, split by joints or not finite.
 
     Parameters
     ----------

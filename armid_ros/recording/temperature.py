@@ -35,7 +35,7 @@ def temperatures(
     where: Sequence[str], times: Sequence[FloatArray], values: Sequence[FloatArray]
 ) -> Temperatures:
     """
-    Combine the temperature readings of joints, each with own times, on one time base.
+    Combine temperature readings of joints, measured at different times, on a common time base.
 
     Parameters
     ----------

@@ -434,7 +434,7 @@ class BagWriter:
 
 
 def _joined(records: list[bytes]) -> tuple[bytes, IntArray]:
-    """Return records as one byte string, and the position of each message record in it."""
+    """Return joined records, and the byte position of each message record in the result."""
     lengths = np.array([len(record) for record in records], np.int64)
     is_message = np.array([record[0] == Opcode.MESSAGE for record in records], np.bool_)
     return b''.join(records), (np.cumsum(lengths) - lengths)[is_message]

@@ -60,7 +60,7 @@ def joint_state_blocks(bag: Bag, topic: Topic) -> Iterator[MessageBlock]:
 
 
 def _inside(described: MessageType) -> str:
-    """Return the JointState field of a message type, preferably of measured states; '' if none."""
+    """Return the name of a type's JointState field, preferably of measured states; '' if none."""
     own = described.definition.split('\n===', 1)[0]
     found = _JOINT_STATE_FIELD.findall(own)
     return next((name for name in found if 'measured' in name), found[0] if found else '')

@@ -111,7 +111,7 @@ class JointStateDecoder:
         self.first_problem = ''
 
     def decode(self, block: MessageBlock) -> Iterator[JointSamples]:
-        """Yield the samples of the requested joints in a block, one object per layout."""
+        """Yield samples of the requested joints in a block of messages, grouped by layout."""
         numbers = np.arange(self.messages, self.messages + len(block), dtype=np.int64)
         self.messages += len(block)
         lengths = block.length
@@ -171,7 +171,7 @@ class JointStateDecoder:
         yield JointSamples(plan.joints, stamps, tuple(values), receive, numbers)
 
     def _reserved(self, name: str, count: int, joints: int) -> FloatArray:
-        """Return an array (count, joints) for a quantity, the next rows of the reserved memory."""
+        """Return an array (count, joints) for a quantity, taken from the reserved memory."""
         free = self._free.get((name, joints))
         if free is None:
             # counts in damaged files are unreliable, so at most 1 GiB is reserved for a quantity
@@ -182,7 +182,7 @@ class JointStateDecoder:
         return free[:count]
 
     def _plan_for(self, first: npt.NDArray[np.void]) -> _Plan | None:
-        """Return the plan for the layout of a message; None if the message is malformed."""
+        """Return the decoding plan for a message's layout; None if the message is malformed."""
         length = first.dtype.itemsize
         known = self._plans.setdefault(length, [])
         for plan in known:
@@ -214,7 +214,7 @@ class JointStateDecoder:
 
 @dataclass(frozen=True)
 class _Plan:
-    """Positions of requested joints, and of other joints by name, in the arrays of a message."""
+    """Decoding plan: indices of requested joints, and of other joints, in arrays of a message."""
 
     layout: JointStateLayout
     dtype: np.dtype[np.void]

@@ -57,7 +57,7 @@ class JointStateLayout:
     @classmethod
     def of(cls, cdr: bytes) -> JointStateLayout:
         """
-        Find the positions of the fields in one serialised JointState message.
+        Find the byte positions of the fields in a serialised JointState message.
 
         Raises
         ------
@@ -101,7 +101,7 @@ class JointStateLayout:
         return layout
 
     def require_one_value_per_joint(self) -> None:
-        """Raise MalformedMessage if a joint occurs twice, or an array does not fit the names."""
+        """Raise MalformedMessage if a joint occurs twice, or an array has a wrong length."""
         if len(set(self.names)) != len(self.names):
             raise MalformedMessage(f'a joint occurs twice in the names {", ".join(self.names)}')
         for quantity, count in zip(QUANTITIES, self.counts, strict=True):
@@ -112,12 +112,12 @@ class JointStateLayout:
 
     @property
     def names_offset(self) -> int:
-        """Return the position of the number of joint names [bytes]."""
+        """Return the byte position of the field that has the number of joint names."""
         return _align(_FRAME_OFFSET + 4 + self.frame_length, 4)
 
     @cached_property
     def names_end(self) -> int:
-        """Return the position after the last joint name [bytes]."""
+        """Return the byte position after the last joint name in the message."""
         position = self.names_offset + 4
         for name in self.names:
             position = _align(position, 4) + 4 + len(name.encode()) + 1
@@ -125,7 +125,7 @@ class JointStateLayout:
 
     @cached_property
     def places(self) -> tuple[tuple[int, int], ...]:
-        """Return the positions of the count and of the first value of each quantity [bytes]."""
+        """Return the byte positions of the value count and of the first value of each quantity."""
         places, position = [], self.names_end
         for count in self.counts:
             at = _align(position, 4)
@@ -137,7 +137,7 @@ class JointStateLayout:
 
     @cached_property
     def end(self) -> int:
-        """Return the position after the last value [bytes]."""
+        """Return the byte position after the last value in the message."""
         return self.places[-1][1] + 8 * self.counts[-1]
 
     @cached_property
@@ -147,7 +147,7 @@ class JointStateLayout:
         return 7 + 4 * self.counts.count(0)
 
     def dtype(self, length: int) -> np.dtype[np.void]:
-        """Return the numpy record type of messages of this layout and a total length [bytes]."""
+        """Return the numpy record type of messages with this layout and a given length [bytes]."""
         words = (_align(self.names_end, 4) - self.names_offset) // 4
         fields: dict[str, tuple[Any, int]] = {
             'encapsulation': ('>u2', 0),
@@ -186,12 +186,12 @@ class JointStateLayout:
 
     @cached_property
     def values(self) -> tuple[tuple[int, int], ...]:
-        """Return the number of values and the position of the first value of each quantity."""
+        """Return the number of values and the byte position of the first value, by quantity."""
         return tuple((n, begin) for n, (_, begin) in zip(self.counts, self.places, strict=True))
 
     @cached_property
     def fixed(self) -> tuple[npt.NDArray[np.void], npt.NDArray[np.void]]:
-        """Return the bytes that all messages of this layout share, and their bit mask, (1,)."""
+        """Return the bytes that all messages of this layout share, and a mask of these bits."""
         expected, mask = np.zeros((2, 1), self.record)
         numbers = {'encapsulation': int(self.order == '<'), 'frame_length': self.frame_length}
         numbers |= {f'n_{name}': n for name, n in zip(QUANTITIES, self.counts, strict=True)}
@@ -212,7 +212,7 @@ class JointStateLayout:
 
     @cached_property
     def _fixed_bits(self) -> tuple[int, int]:
-        """Return bytes and mask of `fixed` as integers, which are compared in a microsecond."""
+        """Return bytes and mask of `fixed` as integers, since integers are compared faster."""
         fixed, mask = (int.from_bytes(record.tobytes(), 'little') for record in self.fixed)
         return fixed, mask
 
@@ -243,5 +243,5 @@ class JointStateLayout:
 
 
 def _align(position: int, size: int) -> int:
-    """Return the next position that is a multiple of a size, counted from byte 4."""
+    """Return the next byte position that is aligned to a size, counted from byte 4."""
     return ((position - 4 + size - 1) & -size) + 4

@@ -23,7 +23,7 @@ import numpy.typing as npt
 
 
 class Contents(NamedTuple):
-    """Contents of some chunks in one buffer, with the range of each chunk in the buffer."""
+    """Contents of some chunks in a shared buffer, with the byte range of each chunk's content."""
 
     data: bytes | mmap.mmap
     parts: list[tuple[Chunk, int, int]]
@@ -142,12 +142,12 @@ def _content(found: FileMap, chunk: Chunk, settings: ReadSettings) -> bytes | me
 
 
 def heads(data: bytes | mmap.mmap, offsets: IntArray) -> npt.NDArray[np.void]:
-    """Return opcode, length, channel and times of messages at given positions (`MESSAGE`)."""
+    """Return opcode, length, channel and times of the messages at given byte positions."""
     return records_at(data, offsets, MESSAGE.itemsize).view(MESSAGE)
 
 
 def message_block(data: bytes | mmap.mmap, offsets: IntArray) -> MessageBlock:
-    """Return the messages at given positions of a buffer as a block."""
+    """Return the messages at given byte positions in a buffer as a block."""
     rows = heads(data, offsets)
     return MessageBlock(
         data,
@@ -159,7 +159,7 @@ def message_block(data: bytes | mmap.mmap, offsets: IntArray) -> MessageBlock:
 
 
 def messages_in(found: FileMap, contents: Contents) -> tuple[IntArray, npt.NDArray[np.void]]:
-    """Return positions and heads of all messages in some chunks."""
+    """Return the byte positions in the buffer, and the heads, of all messages in some chunks."""
     data, parts = contents  # a correct index is faster than a walk over the records
     ranges = np.array([(begin, end) for _, begin, end in parts], np.int64)
     if all(chunk.indexes and chunk.complete for chunk, _, _ in parts):
@@ -195,7 +195,7 @@ def heads_by_index(
     data: bytes | mmap.mmap, offsets: IntArray, ranges: IntArray
 ) -> npt.NDArray[np.void] | None:
     """
-    Read message heads at the positions that an index states; None if the index is wrong.
+    Read message heads at the byte positions that an MCAP index states; None if an index is wrong.
 
     An index is correct if messages and definitions fill the chunk without gaps: each record
     begins at the end of the previous record.

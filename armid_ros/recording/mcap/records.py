@@ -83,7 +83,7 @@ class Chunk:
 @dataclass
 class FileMap:
     """
-    Chunks, loose messages and definitions of an MCAP file, with its damage.
+    Chunks, messages outside chunks, and definitions of an MCAP file, with its damage.
 
     Attributes
     ----------
@@ -114,7 +114,7 @@ class FileMap:
     damage: Damage = field(default_factory=Damage)
 
     def span(self, chunk: Chunk) -> str:
-        """Return the time range of the messages of a chunk as a text, for messages on damage."""
+        """Return the time range of a chunk's messages as a text, for descriptions of damage."""
         begin = min((c.start_time for c in self.chunks if c.end_time), default=0)
         start, end = (1e-9 * (time - begin) for time in (chunk.start_time, chunk.end_time))
         return f'from {start:.3f} to {end:.3f} s after the beginning'
@@ -122,7 +122,7 @@ class FileMap:
 
 def map_file(data: bytes | mmap.mmap, path: Path, *, check: bool = True) -> FileMap:
     """
-    Return the chunks, loose messages, definitions and damage of an MCAP file.
+    Return the chunks, messages outside chunks, definitions and damage of an MCAP file.
 
     Parameters
     ----------
@@ -171,7 +171,7 @@ def map_file(data: bytes | mmap.mmap, path: Path, *, check: bool = True) -> File
 
 
 def _walk(found: FileMap) -> tuple[list[tuple[int, int, int]], int | None, int | None, int]:
-    """Fill a map with chunks and loose messages; return definitions and last positions."""
+    """Fill a file map; return definitions, and positions of data end, footer and last record."""
     data = found.data
     definitions: list[tuple[int, int, int]] = []
     data_end = footer = None
@@ -250,7 +250,7 @@ def _add_chunk(found: FileMap, begin: int, end: int, *, complete: bool = True) -
 
 
 def _add_data(found: FileMap, opcode: int, begin: int, end: int) -> None:
-    """Add a chunk, the index of the messages of a channel in it, or a loose message to a map."""
+    """Add a chunk, the message index of a chunk, or a message outside chunks to a file map."""
     if opcode == Opcode.CHUNK:
         _add_chunk(found, begin, end)
     elif opcode == Opcode.MESSAGE and end - begin < MESSAGE_HEADER:

@@ -58,7 +58,7 @@ _MESSAGE_HEAD = struct.Struct('<BQHIQQ')
 
 
 class Committed(NamedTuple):
-    """State of a file after its last finished step: sizes [bytes], numbers and log times [ns]."""
+    """State of an MCAP file after its last complete write: sizes [bytes], counts, times [ns]."""
 
     position: int = 0
     chunks: int = 0

@@ -80,7 +80,7 @@ class QuantityColumns:
     rest : mapping of str to TableColumn
         Columns of other joints with the same pattern, by their label.
     missing : tuple of str
-        Joints without a column of numbers. If there are any, the quantity is missing.
+        Joints without a column of numbers; the quantity is missing unless this tuple is empty.
     guessed : bool
         Whether the columns were guessed.
     unit : str
@@ -176,7 +176,7 @@ def guess(
     table: Table, quantity: QuantityName, joints: Sequence[str] | None, rename: Rules = ()
 ) -> QuantityColumns:
     """
-    Return the columns of a quantity that fit best by their names; without columns if none fit.
+    Find the columns whose names fit a quantity best; the result has no columns if none fit.
 
     Parameters
     ----------
@@ -240,7 +240,7 @@ def _family(
     joints: Sequence[str] | None,
     rename: Rules,
 ) -> QuantityColumns | None:
-    """Return the columns of all joints, found by name or by number; None if a joint has none."""
+    """Return the columns of all joints, by joint name or number; None if a joint has no column."""
     labels = list(members)
     numbered = all(label.isdigit() for label in labels)
     if numbered:
@@ -257,7 +257,7 @@ def _family(
 
 
 def _by_number(label: str) -> tuple[int, str]:
-    """Return the sort key of a label that consists of digits, by its number."""
+    """Return a key that sorts labels of digits by their numbers."""
     digits = label.lstrip('0')
     return len(digits), digits
 
@@ -333,7 +333,7 @@ def _patterns(
 
 
 def _score(pattern: str, quantity: QuantityName) -> float:
-    """Return how well the words of a pattern fit a quantity; zero if they do not fit."""
+    """Return a score of how well the words of a column pattern fit a quantity; zero if not."""
     words = words_of(pattern)
     scores = {
         name: max((table.get(word, 0.0) for word in words), default=0.0)
@@ -346,7 +346,7 @@ def _score(pattern: str, quantity: QuantityName) -> float:
 
 
 def words_of(name: str) -> list[str]:
-    """Return the words of a column name in lower case: 'actualQ_{}' gives actual and q."""
+    """Return the words of a column name in lower case: 'actual' and 'q' for 'actualQ_3'."""
     apart = re.sub(r'(?<=[a-z])(?=[A-Z])', ' ', name)
     apart = re.sub(r'\d+', ' ', apart)
     return [word.lower() for word in re.split(r'[^A-Za-z0-9]+', apart) if word]

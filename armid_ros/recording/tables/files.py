@@ -85,12 +85,12 @@ def open_table(path: Path, *, episode: int | None = None) -> Table:
 
 
 def _suffix(path: Path) -> str:
-    """Return the suffix of a file in lower case, without that of its compression."""
+    """Return the suffix of a file in lower case; a suffix .gz of compression is ignored."""
     return Path(path.stem).suffix.lower() if path.suffix == '.gz' else path.suffix.lower()
 
 
 def _with_names(table: Table) -> Table:
-    """Rename numbered columns by the joint names in other columns of the same rows."""
+    """Replace numbered columns by columns of joints, whose names are in text columns."""
     names: dict[str, dict[str, npt.NDArray[np.str_]]] = {}  # by the text before 'name', and number
     for name, cells in table.words.items():
         match = _NAME.fullmatch(name)
@@ -134,7 +134,7 @@ def _with_dates(table: Table) -> Table:
 
 
 def _with_stamps(table: Table) -> Table:
-    """Combine the columns of seconds and nanoseconds of a stamp in one column [s]."""
+    """Combine the columns of seconds and nanoseconds of a stamp in a single column [s]."""
     pairs = []
     starts = {
         match[1]: column for column in table.columns if (match := _SECONDS.fullmatch(column.name))
@@ -212,7 +212,7 @@ def read_hdf5(path: Path) -> Table:
 
 
 def _require_possible(array: str, size: int, stored: int) -> None:
-    """Raise RecordingError if the stated size of an array is impossible or over the limit."""
+    """Raise RecordingError if an array's stated size is impossible or over the memory limit."""
     # deflate compresses by 1:1032 at most
     if size > 1100 * stored:
         raise RecordingError(

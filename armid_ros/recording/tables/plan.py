@@ -192,7 +192,7 @@ def _source(
     settings: ColumnSettings,
     joints: Sequence[str] | None,
 ) -> QuantityColumns:
-    """Return the columns of a quantity, given or guessed; without columns if it is missing."""
+    """Return the columns of a quantity, given by the user or guessed; empty if it is missing."""
     given = getattr(settings, quantity)
     if given is not None and given.lower() == 'none':
         return QuantityColumns(quantity, '')
@@ -219,7 +219,7 @@ def _scaled(
     joints: Sequence[str],
     slides: npt.NDArray[np.bool_],
 ) -> QuantityColumns:
-    """Return columns with the user's unit settings applied; degrees are for revolute joints."""
+    """Apply the user's unit settings to columns; degrees apply to revolute joints only."""
     if source.quantity == 'temperature':
         return source
     if source.quantity == 'effort':
@@ -267,7 +267,7 @@ def _position_notes(
 
 
 def _time(table: Table, settings: ColumnSettings) -> tuple[TableColumn | None, str, float | None]:
-    """Return the column of time and its unit, or None and the sampling rate [Hz]."""
+    """Return the time column and its unit, or the sampling rate [Hz] without a time column."""
     given = settings.time
     column: TableColumn | None = None
     if given is not None and given.lower() != 'none':
@@ -292,7 +292,7 @@ def _time(table: Table, settings: ColumnSettings) -> tuple[TableColumn | None, s
 
 
 def _time_unit(table: Table, column: TableColumn, given: str | None) -> str:
-    """Return the unit of a column of time: as given, from its name, or from its steps."""
+    """Return the unit of a time column: given by the user, in its name, or from time steps."""
     where = f'{table.source}: column {column.name}'
     steps = np.diff(column.finite)
     if len(steps) and np.mean(steps < 0.0) > 0.5:  # sorting would reverse the motion
@@ -376,7 +376,7 @@ def converted(plan: TablePlan) -> Recording:
 def _temperatures(
     plan: TablePlan, recording: Recording, t: FloatArray, start: int
 ) -> Temperatures | None:
-    """Return the temperatures in a table, on the time base of a recording; None without any."""
+    """Return temperatures in a table on a recording's time base; None without temperatures."""
     for source in plan.sources:
         if source.quantity == 'temperature':
             own = t + 1e-9 * (start - recording.start_ns)
@@ -389,7 +389,7 @@ def _temperatures(
 
 
 def _times(plan: TablePlan) -> tuple[FloatArray, int]:
-    """Return row times [s] from a reference stamp, and this stamp [ns], 1 s if it is unknown."""
+    """Return the times of rows [s] since a stamp, and the stamp [ns], which is 1 s if unknown."""
     if plan.time is None:
         assert plan.rate_hz is not None
         return np.arange(len(plan.table)) / plan.rate_hz, 10**9

@@ -121,7 +121,7 @@ class Table:
     words: Mapping[str, Sequence[str]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        """Separate columns without numbers; raise RecordingError if lengths differ."""
+        """Move columns without numbers to ``words``; RecordingError if column lengths differ."""
         there = tuple(one for one in self.columns if len(one.finite))
         empty = {one.name: () for one in self.columns if one not in there}
         object.__setattr__(self, 'columns', there)
