@@ -116,5 +116,5 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    """Return the public names of the package, for completion."""
+    """Return the public names of the package, for tab completion in a Python shell."""
     return [*__all__, '__version__']

@@ -54,18 +54,18 @@ class ParameterName:
 
     @property
     def rigid(self) -> bool:
-        """Whether the parameter, or the first term of its grouping, is an inertial parameter."""
+        """Whether the parameter is inertial, such as 'mx2', or a sum such as 'Izz1 + Iyy2'."""
         return _RIGID.match(self.name) is not None
 
 
 def name_in_words(name: str) -> str:
-    """Return an identifier of an effect or parameter in words: 'Coulomb friction'."""
+    """Return an effect or parameter name in words: 'Coulomb friction' for 'coulomb_friction'."""
     words = name.replace('_', ' ')
     return words.replace('coulomb', 'Coulomb').replace('stribeck', 'Stribeck')
 
 
 def symbol_in_words(symbol: str) -> str:
-    """Return the meaning of an inertial symbol: 'product of inertia xy' for 'Ixy'."""
+    """Return the symbol of an inertial parameter in words: 'product of inertia xy' for 'Ixy'."""
     if symbol == 'm':
         return 'mass'
     if symbol[0] == 'm':

@@ -30,14 +30,14 @@ def read_only(values: npt.ArrayLike) -> FloatArray:
 
 
 def freeze(instance: object, *names: str) -> None:
-    """Make array attributes of a frozen dataclass read-only, in its ``__post_init__``."""
+    """Make array attributes of a frozen dataclass read-only; for use in ``__post_init__``."""
     for name in names:
         if getattr(instance, name) is not None:
             object.__setattr__(instance, name, read_only(getattr(instance, name)))
 
 
 def freeze_samples(where: str, samples: Any, *names: str) -> None:
-    """Make arrays of joint samples read-only; RecordingError unless they are (times, joints)."""
+    """Make arrays of joint samples read-only; RecordingError unless their shape is (N, n)."""
     freeze(samples, 't', *names)
     expected = (len(samples.t), len(samples.joints))
     for name in names:
@@ -56,7 +56,7 @@ def freeze_samples(where: str, samples: Any, *names: str) -> None:
 
 
 def selected(instance: object, samples: Samples, *names: str) -> dict[str, Any]:
-    """Return array attributes of an object at selected samples, by name; None if missing."""
+    """Return arrays of an object at selected samples, by name; missing arrays stay None."""
     arrays = {name: getattr(instance, name) for name in names}
     return {name: None if array is None else array[samples] for name, array in arrays.items()}
 
@@ -64,7 +64,7 @@ def selected(instance: object, samples: Samples, *names: str) -> dict[str, Any]:
 @dataclass(frozen=True)
 class MovingPoints:
     """
-    Positions and velocities of points of a partner, such as the wearer of an exoskeleton.
+    Positions and velocities of points on a partner of the arm, such as an exoskeleton's wearer.
 
     Attributes
     ----------
@@ -91,7 +91,7 @@ class MovingPoints:
 @dataclass(frozen=True, eq=False)
 class Temperatures:
     """
-    Measured temperatures of joints or of their motors, usually at fewer times than the motion.
+    Measured temperatures of joints or motors, usually sampled less often than the motion.
 
     Attributes
     ----------
@@ -110,7 +110,7 @@ class Temperatures:
         freeze(self, 't', 'values')
 
     def at(self, t: npt.ArrayLike) -> FloatArray:
-        """Interpolate the temperatures at times (N,), constant beyond both ends; (N, n) [degC]."""
+        """Interpolate temperatures at times (N,), constant beyond the readings; (N, n) [degC]."""
         return np.column_stack([np.interp(np.ravel(t), self.t, one) for one in self.values.T])
 
 
@@ -168,7 +168,7 @@ class Motion:
     def of_states(
         cls, joints: tuple[str, ...], q: npt.ArrayLike, dq: npt.ArrayLike, ddq: npt.ArrayLike
     ) -> Motion:
-        """Return a motion of independent states, one per second, each (N, n), (n,) or a number."""
+        """Return a motion of independent states, 1 s apart, each (N, n), (n,) or a number."""
         parts = np.broadcast_arrays(np.atleast_2d(q), dq, ddq)
         return cls(joints, np.arange(len(parts[0]), dtype=float), *map(np.array, parts))
 
@@ -200,7 +200,7 @@ class Motion:
 @dataclass(frozen=True)
 class BlurredMotion(Motion):
     """
-    Motion with a smooth direction of each joint, tanh(dq / width), in place of the sign of dq.
+    Motion in which a smooth function, tanh(dq / width), replaces the sign of joint velocities.
 
     A search for trajectories needs a gradient, which the sign of a velocity does not have.
 

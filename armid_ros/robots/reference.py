@@ -207,7 +207,7 @@ class Reference:
 
     def require_limits(self, robot: Robot, dt: float) -> None:
         """
-        Check that the curve keeps the position and velocity limits of a robot.
+        Check that the interpolated motion keeps the position and velocity limits of a robot.
 
         Parameters
         ----------
