@@ -54,7 +54,7 @@ class ParameterName:
 
     @property
     def rigid(self) -> bool:
-        """Whether the parameter is inertial, such as 'mx2', or a sum such as 'Izz1 + Iyy2'."""
+        """Whether the parameter is inertial, or a sum with an inertial first term."""
         return _RIGID.match(self.name) is not None
 
 

@@ -56,7 +56,7 @@ def freeze_samples(where: str, samples: Any, *names: str) -> None:
 
 
 def selected(instance: object, samples: Samples, *names: str) -> dict[str, Any]:
-    """Return arrays of an object at selected samples, by name; missing arrays stay None."""
+    """Return arrays of an object at selected samples, by attribute; missing arrays stay None."""
     arrays = {name: getattr(instance, name) for name in names}
     return {name: None if array is None else array[samples] for name, array in arrays.items()}
 

@@ -420,7 +420,7 @@ class ArmModel:
         return np.asarray(columns + along @ (gain[:, :, np.newaxis] * (along.T @ columns)))
 
     def rigid_body_motion(self, motion: Motion) -> Motion:
-        """Return the motion for rigid-body torques, at rest in each sample if quasi-static."""
+        """Return the motion, with zero velocity and acceleration if the arm is quasi-static."""
         return motion.at_rest() if self.quasi_static else motion
 
     def base_parameters(

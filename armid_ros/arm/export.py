@@ -90,7 +90,7 @@ def place_values(
     arm: ArmModel, attribute: Callable[[Effect], str]
 ) -> tuple[dict[str, dict[str, float]], tuple[str, ...]]:
     """
-    Return the effect parameters that a file format has, by attribute, and the others as text.
+    Return the effect parameters that a file format has, by attribute, and all others as text.
 
     The function ``attribute`` returns the attribute of the format for an effect, or an empty text.
     Effects that change the rigid body are part of its inertial parameters, and appear in neither

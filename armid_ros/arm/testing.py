@@ -220,7 +220,7 @@ def instantaneous_means_sample_by_sample(trial: EffectCase) -> None:
 
 
 def shapes_stay_possible(trial: EffectCase) -> None:
-    """Fail if shape parameters are outside their bounds, by default or in a search."""
+    """Fail if shape parameters exceed their bounds, by default or at the start of a search."""
     effect, motion = trial.effect, trial.motion
     assert motion.tau is not None
     nothing = np.zeros((*motion.q.shape, 0))

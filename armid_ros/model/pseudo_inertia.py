@@ -126,7 +126,7 @@ class Consistency:
 
     @property
     def consistent(self) -> bool:
-        """Whether a body of positive density can have the inertial parameters."""
+        """Whether a body of positive density can have these inertial parameters."""
         return bool(self.eigenvalues[0] > 0.0)
 
 

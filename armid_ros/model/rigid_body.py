@@ -51,7 +51,7 @@ def link_unit(name: str) -> str:
 
 
 class _Prepared(threading.local):
-    """Cache in each thread: Pinocchio's work space, and the body in kernel format, by robot."""
+    """Cache of each thread, by robot: Pinocchio's work space, and the body in kernel format."""
 
     def __init__(self) -> None:
         self.data: WeakKeyDictionary[Robot, pin.Data] = WeakKeyDictionary()

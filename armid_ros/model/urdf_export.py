@@ -180,7 +180,7 @@ def _scaled(robot: Robot, shares: FloatArray) -> str:
 
 
 def _set_inertial(link: minidom.Element, parameters: FloatArray) -> None:
-    """Write inertial parameters to a URDF link: mass, centre of mass, and inertia about it."""
+    """Write inertial parameters to a URDF link: mass, centre of mass, and inertia about this."""
     body = pin.Inertia.FromDynamicParameters(parameters)
     values = {
         'origin': {'xyz': ' '.join(map(repr, body.lever.tolist())), 'rpy': '0 0 0'},

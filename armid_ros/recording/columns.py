@@ -240,7 +240,7 @@ def in_si(
 
 
 def _position(joint: str, joints: Sequence[str]) -> int:
-    """Return the index of a joint that a motor coupling names, or gives by its number from 1."""
+    """Return the index of a joint in a motor coupling, given by its name or its number from 1."""
     if joint in joints:
         return list(joints).index(joint)
     if joint.isdigit() and 1 <= int(joint) <= len(joints):

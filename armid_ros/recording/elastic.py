@@ -111,7 +111,7 @@ def read_accelerations(
 
 
 def _length(frame_length: int) -> int:
-    """Return the size of an Imu message, given the size of its frame_id and zero byte [bytes]."""
+    """Return the size of an Imu message from that of its frame_id with final zero, in bytes."""
     return 4 + -(-(12 + frame_length) // 8) * 8 + 37 * 8
 
 

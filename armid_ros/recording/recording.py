@@ -160,7 +160,7 @@ class ReadReport:
 
     @property
     def clean(self) -> bool:
-        """Whether every message gave one sample, and no quantity is missing."""
+        """Whether every message became a sample, and no quantity is missing."""
         return self == ReadReport(messages=self.messages, samples=self.samples)
 
     @property
@@ -374,7 +374,7 @@ def recorded_together(
     recording: Recording, other: Recording, robot: Robot, ties: Sequence[Tie] = ()
 ) -> Recording:
     """
-    Add the positions of another machine, interpolated at the recording's stamps, to a recording.
+    Add the positions of another machine to a recording, interpolated at the recording's stamps.
 
     Parameters
     ----------

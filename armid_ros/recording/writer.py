@@ -358,7 +358,7 @@ class BagWriter:
             self.write(message.topic, message.cdr, message.log_time_ns, message.publish_time_ns)
 
     def flush(self) -> None:
-        """Write the messages in memory to the file, as a chunk; a timer calls this method."""
+        """Write messages in memory to the file, as a chunk; a recorder calls this by a timer."""
         self._check_open()
         content, offsets = _joined(self._open_records())
         # A chunk without messages need not be written.

@@ -243,5 +243,5 @@ class JointStateLayout:
 
 
 def _align(position: int, size: int) -> int:
-    """Return the next byte position that is aligned to a size, counted from byte 4."""
+    """Return the next byte position that is a multiple of a field size, counted from byte 4."""
     return ((position - 4 + size - 1) & -size) + 4

@@ -192,7 +192,7 @@ def _source(
     settings: ColumnSettings,
     joints: Sequence[str] | None,
 ) -> QuantityColumns:
-    """Return the columns of a quantity, given by the user or guessed; empty if it is missing."""
+    """Return a quantity's columns, given by the user or guessed; no columns if it is missing."""
     given = getattr(settings, quantity)
     if given is not None and given.lower() == 'none':
         return QuantityColumns(quantity, '')

@@ -78,7 +78,7 @@ def _lines(path: Path) -> list[str]:
 
 
 def _heading(path: Path, lines: list[str]) -> tuple[int, str, str]:
-    """Return the index of the first line of numbers, and the texts of name and unit lines."""
+    """Return the index of the first line of numbers, and the lines of column names and units."""
     words: list[str] = []
     comment = ''
     for number, line in enumerate(lines):
