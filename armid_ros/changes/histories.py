@@ -116,7 +116,7 @@ class Spread:
 @dataclass(frozen=True)
 class HistoryChange:
     """
-    Largest step of a series of estimates, or trend of the series.
+    Largest step in the estimates of a parameter over time, or the trend of these estimates.
 
     Attributes
     ----------
@@ -203,7 +203,7 @@ def judge(
 
 
 def significant(judged: Judged, alpha: float) -> tuple[HistoryChange, ...]:
-    """Return the changes of an arm that are significant at a false discovery rate alpha."""
+    """Return an arm's parameter changes that are significant at a false discovery rate alpha."""
     if judged.adjusted > alpha or not judged.changes:
         return ()
     limit = alpha * judged.p / judged.adjusted / len(judged.changes)
@@ -211,13 +211,13 @@ def significant(judged: Judged, alpha: float) -> tuple[HistoryChange, ...]:
 
 
 def wear(series: ParameterHistory, spread: Spread) -> tuple[float, float]:
-    """Return the slope of a series of estimates per month, and its standard deviation."""
+    """Return the fitted change of a parameter per month, and the change's standard deviation."""
     slope, std, _ = _line(series.days, series.values, 1.0 / _variances(series, spread)[0])
     return slope * MONTH, std * spread.trends * MONTH
 
 
 def spreads(series: Sequence[ParameterHistory]) -> dict[tuple[str, str], Spread]:
-    """Return the scatter between bags of each parameter, by name and joint."""
+    """Return the scatter of each parameter between bags, by name and joint of the parameter."""
     found = {parameter: _spread(group) for parameter, group in _by_parameter(series).items()}
     for name in dict.fromkeys(one.name for one in series):  # of all joints together
         group = [one for one in series if one.name == name]
@@ -230,7 +230,7 @@ def spreads(series: Sequence[ParameterHistory]) -> dict[tuple[str, str], Spread]
 
 def without_days(series: Sequence[ParameterHistory]) -> list[ParameterHistory]:
     """
-    Return series without the deviation that all arms share on each day, such as by temperature.
+    Return estimates minus the deviation that all arms share on a day, such as by temperature.
 
     The shared deviation is proportional to the size of the parameter, as for friction that falls
     with temperature. It is found by a median polish. Days on which few arms have bags are
@@ -262,7 +262,7 @@ def without_days(series: Sequence[ParameterHistory]) -> list[ParameterHistory]:
 
 
 def _largest_change(series: ParameterHistory, spread: Spread) -> HistoryChange:
-    """Return the largest step of a series, or the trend if it explains the series as well."""
+    """Return the largest step of a series of estimates, or its trend if the trend fits as well."""
     split, count = _splits(series, spread), len(series.values)
     scores, trend = split.scores / spread.steps, split.trend / spread.trends
     best = int(np.argmax(scores))
@@ -277,13 +277,13 @@ def _largest_change(series: ParameterHistory, spread: Spread) -> HistoryChange:
 
 
 def _p(score: float, freedom: float, tried: int) -> float:
-    """Return the p-value of the largest of several scores, in standard deviations."""
+    """Return the p-value of the largest of `tried` scores, which is in standard deviations."""
     # lower bound of the p-value, which underflows for larger scores
     return min(1.0, tried * max(float(tail(score**2, 1, freedom)), 1e-300))
 
 
 class _Splits(NamedTuple):
-    """Means of a series before and after each possible step, and a straight line through it."""
+    """Mean estimates before and after each possible step, and a line through all estimates."""
 
     low: FloatArray  # (K - 1,)
     high: FloatArray
@@ -297,7 +297,7 @@ class _Splits(NamedTuple):
 
 
 def _splits(series: ParameterHistory, spread: Spread) -> _Splits:
-    """Return each possible step of a series and its trend, in standard deviations."""
+    """Fit each possible step, and a straight line, to a series of estimates."""
     variance, freedom = _variances(series, spread)
     std = np.sqrt(variance)
     # outliers are clipped to three standard deviations around the median of five bags
@@ -316,7 +316,7 @@ def _splits(series: ParameterHistory, spread: Spread) -> _Splits:
 def _by_parameter(
     series: Sequence[ParameterHistory],
 ) -> dict[tuple[str, str], list[ParameterHistory]]:
-    """Return the series of all arms grouped by parameter, a name and a joint."""
+    """Return the series of all arms by the name and joint of their parameter."""
     groups: dict[tuple[str, str], list[ParameterHistory]] = {}
     for one in series:
         groups.setdefault(one.parameter, []).append(one)
@@ -324,7 +324,7 @@ def _by_parameter(
 
 
 def _spread(group: Sequence[ParameterHistory]) -> Spread:
-    """Return the scatter of a parameter between bags, from differences of successive values."""
+    """Return the scatter of a parameter between bags, from differences of successive estimates."""
     # the scatter t solves median(d^2 / (s_k^2 + s_k+1^2 + 2 t^2)) = median of chi-squared
     squares = np.concatenate([np.diff(one.values) ** 2 for one in group])
     stated = np.concatenate([one.std[1:] ** 2 + one.std[:-1] ** 2 for one in group])
@@ -347,7 +347,7 @@ def _prior_freedom(
     group: Sequence[ParameterHistory], found: Mapping[tuple[str, str], Spread]
 ) -> float:
     """
-    Return the prior degrees of freedom of the variances of arms (empirical Bayes).
+    Return how many degrees of freedom the prior of an arm's variance has (empirical Bayes).
 
     The logarithms of variance ratios have the variance trigamma(d_a / 2) + trigamma(d_0 / 2). The
     degrees of freedom of one series are d_a, and the equation is solved for d_0. Only scatter
@@ -372,20 +372,20 @@ def _prior_freedom(
 
 
 def _ratio(series: ParameterHistory, spread: Spread) -> float:
-    """Return the observed variance of a series over the variance expected from all arms."""
+    """Return the observed variance of a series over that expected from the scatter of all arms."""
     stated = series.std[1:] ** 2 + series.std[:-1] ** 2 + 2.0 * spread.std**2
     squares = np.diff(series.values) ** 2 / np.maximum(stated, 1e-300)
     return max(float(np.median(squares)) / MEDIAN_SQUARE, 1e-100)
 
 
 def _freedom(bags: int) -> float:
-    """Return the degrees of freedom of a variance that follows from a number of bags."""
+    """Return the degrees of freedom of a variance that is estimated from a number of bags."""
     # a line through simulated series of white noise; right to 6 % from 4 to 80 bags
     return 0.8 + 0.31 * bags
 
 
 def _variances(series: ParameterHistory, spread: Spread) -> tuple[FloatArray, float]:
-    """Return the variance of each value of a series, (K,), and its degrees of freedom."""
+    """Return the variance of each estimate, (K,), and the degrees of freedom of the variances."""
     usual = np.maximum(series.std**2 + spread.std**2, 1e-300)
     if len(series.values) < _MIN_BAGS or spread.prior_freedom >= _MAX_FREEDOM:
         return usual, spread.freedom
@@ -398,7 +398,7 @@ def _variances(series: ParameterHistory, spread: Spread) -> tuple[FloatArray, fl
 def _lasting(
     group: Sequence[ParameterHistory], found: dict[tuple[str, str], Spread]
 ) -> tuple[float, float]:
-    """Return the inflation factors of steps and of trends, each at least 1."""
+    """Return factors, at least 1, by which steps and trends of healthy arms exceed expectation."""
     steps, trends = [], []
     for one in group:
         if len(one.values) < _MIN_BAGS:
@@ -419,7 +419,7 @@ def _lasting(
 
 
 def _line(days: FloatArray, x: FloatArray, weights: FloatArray) -> tuple[float, float, float]:
-    """Return slope, its standard deviation, and start value of a weighted straight line."""
+    """Fit a weighted line; return slope, the slope's standard deviation, and the first value."""
     total = weights.sum()
     middle, mean = weights @ days / total, weights @ x / total
     deviation = days - middle

@@ -70,7 +70,7 @@ def tail(
 
 
 def limits(chance: float, rank: FloatArray, freedom: FloatArray) -> FloatArray:
-    """Return thresholds that quadratic forms without a change exceed with a given probability."""
+    """Return thresholds that quadratic forms exceed with a given chance if nothing changed."""
     # Fisher's distribution by the beta distribution, as scipy.stats takes ten times as long
     share = special.betaincinv(0.5 * freedom, 0.5 * rank, chance)
     return np.asarray(freedom * (1.0 - share) / share)
@@ -78,7 +78,7 @@ def limits(chance: float, rank: FloatArray, freedom: FloatArray) -> FloatArray:
 
 def two_means(x: FloatArray, weights: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     """
-    Return the weighted means of a series before and after each possible change point.
+    Return the weighted means of values before and after each possible change point.
 
     Parameters
     ----------
@@ -100,7 +100,7 @@ def two_means(x: FloatArray, weights: FloatArray) -> tuple[FloatArray, FloatArra
 
 
 def beyond_chance(chances: Sequence[float] | FloatArray, allowed: float) -> list[bool]:
-    """Return which p-values are significant at an allowed family-wise error rate (Holm 1979)."""
+    """Return whether each p-value is significant at a family-wise error rate (Holm 1979)."""
     beyond = [False] * len(chances)
     for tried, index in enumerate(np.argsort(chances)):
         if chances[index] > allowed / (len(chances) - tried):
