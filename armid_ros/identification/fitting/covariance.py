@@ -36,7 +36,7 @@ def sandwich(bread: FloatArray, middle: FloatArray) -> FloatArray:
 
 def score_products(scores: Sequence[FloatArray], lags: int) -> FloatArray:
     """
-    Return the covariance of the sum of scores that are correlated with their neighbours.
+    Return the covariance of a sum of scores in which neighbouring samples are correlated.
 
     Source: Newey and West 1987.
 
@@ -62,7 +62,7 @@ def score_products(scores: Sequence[FloatArray], lags: int) -> FloatArray:
 
 
 def widened(covariance: FloatArray, bread: FloatArray, middle: FloatArray) -> FloatArray:
-    """Return a covariance whose variances are raised to those of the sandwich B M B' if larger."""
+    """Raise variances of a covariance to those of a sandwich B M B' where these are larger."""
     ratio = np.diag(bread @ middle @ bread) / np.diag(covariance)
     factor = np.sqrt(np.maximum(ratio, 1.0))
     return np.asarray(covariance * np.outer(factor, factor))
@@ -76,7 +76,7 @@ def noise_products(
     instruments: Sequence[FloatArray] | None = None,
 ) -> FloatArray:
     """
-    Return the covariance of W' e, the products of the weighted columns and the noise.
+    Return the covariance of the products W' e of weighted columns W and torque noise e.
 
     The noise of each joint is coloured, with a spectrum Phi that is estimated from its residual.
     Noise is taken as independent between joints and between stretches. A fit removes noise at
@@ -128,7 +128,7 @@ def noise_products(
 def _noise_spectrum(
     residual: FloatArray, informative: npt.NDArray[np.bool_], leverage: FloatArray
 ) -> FloatArray:
-    """Return the power spectrum of the noise of a joint, (M + 1,), from its residual, (M,)."""
+    """Return the power spectrum of a joint's torque noise, (M + 1,), from its residuals, (M,)."""
     count = len(residual)
     size = 2 * count
     # the autocovariance of the informative samples is divided by the number of their pairs

@@ -127,7 +127,7 @@ def identifiable_base(
 
 
 def bounds(arm: ArmModel, base: BaseParameters) -> tuple[FloatArray, FloatArray]:
-    """Return lower and upper bounds of base parameters, infinite for combinations, each (r,)."""
+    """Return lower and upper bounds of base parameters, (r,), infinite for grouped parameters."""
     free = np.full(len(arm.robot.rigid_parameters), np.inf)
     effects = [effect.bounds() for effect in arm.effects]
     lower = np.concatenate([-free, *(limits[0] for limits in effects)])[base.independent]
@@ -140,7 +140,7 @@ def fit_determined(
     arm: ArmModel, base: BaseParameters, problem: Sequence[Regression], method: Method
 ) -> tuple[BaseParameters, tuple[Regression, ...], Solution]:
     """
-    Fit base parameters, but keep the described value of those that the data determine worse.
+    Fit base parameters, but keep described values that are more certain than a fit of the data.
 
     Parameters are fixed one at a time, as each fixed parameter makes the others more certain.
 

@@ -137,7 +137,7 @@ def _by_instruments(
 
 
 def _smoothed(recordings: Sequence[Recording], used: Conditioning) -> list[Recording]:
-    """Return recordings with positions smoothed far below the cut-off of the regressor."""
+    """Return recordings whose positions are low-passed far below the cut-off of the regressor."""
     calm = []
     for recording in recordings:
         # band of the instruments over that of the regressor, which is ten times the band of the
@@ -196,18 +196,18 @@ class NoiseCheck:
 
     @property
     def relative_bias(self) -> FloatArray:
-        """Bias of each parameter over its standard deviation, shape (r,)."""
+        """Bias of parameters by encoder noise, over the parameters' standard deviations, (r,)."""
         return np.asarray(self.bias / np.where(self.std > 0.0, self.std, np.inf))
 
     @property
     def harmless(self) -> bool:
-        """Whether the bias of every parameter is small against its standard deviation."""
+        """Whether the bias of every parameter is small compared with its standard deviation."""
         # smallest bias that matters, in standard deviations: it reduces 95 % intervals to 94 %
         return bool(np.max(np.abs(self.relative_bias), initial=0.0) < 0.25)
 
     def findings(self) -> tuple[tuple[str, bool], tuple[str, bool]]:
         """
-        Return two sentences, on the test and on the bias, each with whether it is satisfactory.
+        Return sentences on the test and on the bias, each with whether the result is satisfactory.
 
         If the test is significant and the bias by noise is negligible, the two fits differ for
         another reason: a missing effect of the model changes the two fits differently.

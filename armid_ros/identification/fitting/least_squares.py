@@ -80,7 +80,7 @@ class Solution:
 @dataclass(frozen=True, eq=False)
 class NormalEquations:
     """
-    Normal equations of each joint: products of its columns and its torque with each other.
+    Normal equations of each joint: products of its regressor columns and torque with each other.
 
     Attributes
     ----------
@@ -140,12 +140,12 @@ class NormalEquations:
         return int(self.products.shape[2]) - 1
 
     def summed(self, scale: npt.ArrayLike = 1.0) -> FloatArray:
-        """Return the sum over joints, each joint divided by a scale, shape (r + 1, r + 1)."""
+        """Sum the products of joints, each divided by a squared scale, shape (r + 1, r + 1)."""
         weight = np.broadcast_to(np.asarray(scale, dtype=float), self.counts.shape) ** -2.0
         return np.asarray(np.tensordot(weight, self.products, axes=1))
 
     def squares(self, values: FloatArray) -> FloatArray:
-        """Return the squared residuals of each joint for given parameters, (n,) [(N m)^2]."""
+        """Return the sum of squared residuals of each joint, given parameters, (n,) [(N m)^2]."""
         ends = np.append(values, -1.0)
         # smaller values are rounding errors of the products
         return np.asarray(
@@ -153,26 +153,26 @@ class NormalEquations:
         )
 
     def relative_error_percent(self, values: FloatArray) -> float:
-        """Return the relative error of given parameters over all joints, 100 |r| / |y| [%]."""
+        """Return the relative torque error of given parameters, 100 |residual| / |torque| [%]."""
         whole = self.products[:, -1, -1].sum()
         return float(100.0 * np.sqrt(self.squares(values).sum() / whole))
 
     def joint_std(self, values: FloatArray) -> FloatArray:
-        """Return the standard deviation of each joint's residual for parameters, (n,) [N m]."""
+        """Return the standard deviation of each joint's residual, given parameters, (n,) [N m]."""
         counts = np.maximum(self.counts, 1.0)
         rows = float(counts.sum())
         freedom = rows / max(1.0, rows - len(values))  # correction for degrees of freedom
         return np.asarray(np.sqrt(freedom * self.squares(values) / counts))
 
     def packed(self) -> FloatArray:
-        """Return the normal equations as one array: number of joints, counts, upper triangles."""
+        """Return an array: number of joints, counts of samples, upper triangles of products."""
         upper = np.triu_indices(self.rank + 1)
         numbers = self.products[:, upper[0], upper[1]].ravel()
         return np.concatenate([[len(self.counts)], self.counts, numbers])
 
     @classmethod
     def unpacked(cls, numbers: FloatArray) -> NormalEquations:
-        """Return the normal equations from an array of `packed`."""
+        """Return the normal equations from an array that `packed` returned."""
         joints = int(numbers[0])
         triangles = numbers[1 + joints :].reshape(joints, -1)
         size = int(np.sqrt(2 * triangles.shape[1]))
@@ -229,7 +229,7 @@ def solve(
 def _robust(
     problem: Sequence[Regression], used: npt.NDArray[np.bool_], fit: WeightedFit
 ) -> tuple[WeightedFit, FloatArray]:
-    """Return a fit with reduced weight of outliers, and the weights before scaling, (N, n)."""
+    """Return a fit with outliers weighted down, and the weights without joint scales, (N, n)."""
     relative: FloatArray = used.astype(float)
     for _ in range(_MAX_ITERATIONS):
         before = (fit.scale, relative)
@@ -305,7 +305,7 @@ def _positive(scale: FloatArray) -> FloatArray:
 
 def factored(products: FloatArray) -> tuple[FloatArray, FloatArray]:
     """
-    Return a square root F of products of columns, F' F, and the inverse of F, each (p, p).
+    Return F such that F' F equals given products of columns, and the inverse of F, each (p, p).
 
     Eigenvalues below the rounding error are raised to the rounding error.
 
@@ -322,7 +322,7 @@ def within_bounds(
     values: FloatArray, factor: FloatArray, bounds: tuple[FloatArray, FloatArray]
 ) -> FloatArray:
     """
-    Return the values within bounds whose torques are nearest to those of an unbounded fit.
+    Return the parameters within bounds whose torques are nearest to those of an unbounded fit.
 
     Parameters
     ----------
@@ -345,7 +345,7 @@ def within_bounds(
 
 def informative_basis(products: FloatArray) -> FloatArray:
     """
-    Return a basis B of the identifiable directions of parameters, scaled to unit variance.
+    Return a basis B of the identifiable directions in parameter space, scaled to unit variance.
 
     Parameters
     ----------
@@ -374,7 +374,7 @@ def informative_basis(products: FloatArray) -> FloatArray:
 
 def informative_solution(products: FloatArray, aim: FloatArray) -> FloatArray:
     """
-    Solve normal equations, with zero in the directions that are not identifiable.
+    Solve normal equations, with zero in the unidentifiable directions of parameter space.
 
     Parameters
     ----------
@@ -394,7 +394,7 @@ def informative_solution(products: FloatArray, aim: FloatArray) -> FloatArray:
 
 def scaled_inverse(matrix: FloatArray) -> FloatArray:
     """
-    Return the inverse of a covariance or precision, (p, p), of values with different units.
+    Invert a covariance or precision matrix, (p, p), of values with different units.
 
     Eigenvalues below the rounding error are raised to the rounding error.
 

@@ -97,7 +97,7 @@ def fit_values(
     solution: Solution | None = None,
 ) -> FittedValues:
     """
-    Fit base parameters by one linear solution, or by Gauss-Newton steps if the arm is nonlinear.
+    Fit base parameters by a linear solution, or by Gauss-Newton steps if the arm is nonlinear.
 
     Parameters
     ----------
@@ -314,7 +314,7 @@ def _iterate(
 
 
 class _State:
-    """Step of a Gauss-Newton iteration: arm model, its values, linear problem and residual."""
+    """State of a Gauss-Newton iteration: arm model, parameters, linear problem and residual."""
 
     def __init__(self, arm: ArmModel, values: FloatArray, problem: Sequence[Regression]) -> None:
         self.arm, self.values, self.problem = arm, values, tuple(problem)
@@ -327,7 +327,7 @@ class _State:
         self._weights = self._used / np.maximum(rms, _MIN_TORQUE_SHARE * max(rms.max(), 1e-100))
 
     def gain(self, predicted: Torques) -> float:
-        """Return by how much predicted torques reduce the cost; zero without a residual."""
+        """Return by how much given torques reduce the cost; zero if the fit is exact already."""
         # a smaller residual torque is a rounding error
         if np.linalg.norm(self._used * self._residual) <= 1e-6 * np.linalg.norm(
             self._used * self._tau
@@ -336,7 +336,7 @@ class _State:
         return self.cost() - self.cost(predicted)
 
     def damped(self, damping: float, limits: tuple[FloatArray, FloatArray]) -> FloatArray:
-        """Return the parameters after a Levenberg-Marquardt step, within limits."""
+        """Return the parameters after a Levenberg-Marquardt step, within limits of parameters."""
         w, _ = weighted_rows(self.problem, self._weights)
         size = np.linalg.norm(w, axis=0)
         scaled = w / np.where(size > 0.0, size, 1.0)
