@@ -62,7 +62,7 @@ class PhysicalSettings:
     mass_range: float | None = None
 
     def __post_init__(self) -> None:
-        """Raise an error for a mass, range or box that no link can have."""
+        """Raise an error for a total mass, ratio of masses or box that no links can have."""
         if self.total_mass is not None and not 0.0 < self.total_mass < np.inf:
             raise IdentificationError(
                 f'the total mass of the links, {self.total_mass} kg, has to be positive'
@@ -83,7 +83,7 @@ class PhysicalSettings:
 @dataclass(frozen=True)
 class PhysicalCertificate:
     """
-    Evidence that fitted links are physically consistent, and cost of the constraints.
+    Evidence that fitted links are physically consistent, and torque error by the constraints.
 
     Attributes
     ----------
@@ -133,7 +133,7 @@ class PhysicalCertificate:
 
     @property
     def cost(self) -> float:
-        """Relative increase of the torque error by the constraints, in training or held out."""
+        """Relative torque error that constraints add: the larger of training and held-out data."""
         return max(self.misfit_ratio, self.held_out_ratio) - 1.0
 
     @property
@@ -144,7 +144,7 @@ class PhysicalCertificate:
 
     @property
     def constraint_notes(self) -> tuple[str, ...]:
-        """Notes on constraints that change the fit, and on their cost; empty if none does."""
+        """Notes on constraints that change the fit or increase its torque error; empty if none."""
         notes = []
         # held-out torque error, relative to an unconstrained fit, above which the constraints do
         # not fit the arm
@@ -172,7 +172,7 @@ class PhysicalCertificate:
         return tuple(notes)
 
     def sentences(self) -> tuple[str, ...]:
-        """Return sentences on consistency, cost of the constraints, and assumptions."""
+        """Return sentences on physical consistency, cost of the constraints, and assumptions."""
         least = min(self.links, key=lambda link: float(link.eigenvalues[0]))
         verdict = 'every link is' if self.consistent else 'not every link is'
         return (
@@ -266,7 +266,7 @@ def fit_consistent_links(
 def _fit_links(
     arm: ArmModel, fit: FittedValues, settings: PhysicalSettings
 ) -> tuple[FittedValues, PhysicalCertificate]:
-    """Fit physically consistent links to the linear problem of a fit."""
+    """Fit physically consistent links to the linear problem of an earlier fit."""
     base, problem, weights = fit.base, fit.problem, fit.solution.weights
     program, notes = physical_program(arm, base, settings)
     # normal equations of blocks of successive samples, which are left out in turn
@@ -324,7 +324,7 @@ def _fit_links(
 
 
 def _walls_reached(parameters: FloatArray, box: Box) -> list[str]:
-    """Return the limits of its box that a link reaches, given its ten inertial parameters."""
+    """Return the limits of its box that a link with given inertial parameters reaches."""
     width = box[1] - box[0]
     largest = np.concatenate([width, width, 0.25 * width**2]) * parameters[0]
     near = box_conditions(box) @ parameters < _ACTIVE_SHARE * largest
@@ -333,7 +333,7 @@ def _walls_reached(parameters: FloatArray, box: Box) -> list[str]:
 
 
 def far_from_described(robot: Robot, masses: FloatArray) -> tuple[str, ...]:
-    """Return a note on links whose mass, (n,) [kg], is far from the description, or nothing."""
+    """Return a note on links whose mass, (n,) [kg], is far from that described; empty if none."""
     # ratio of a mass to the described one above which a note is given
     heavy = 3.0
     described = robot.rigid_parameters[::PER_LINK]
@@ -353,7 +353,7 @@ def far_from_described(robot: Robot, masses: FloatArray) -> tuple[str, ...]:
 def physical_program(
     arm: ArmModel, base: BaseParameters, settings: PhysicalSettings
 ) -> tuple[PhysicalProgram, tuple[str, ...]]:
-    """Return the convex program of a physically consistent fit, and assumptions of its prior."""
+    """Return the convex program of a physically consistent fit, and notes on its prior."""
     prior, notes = consistent_prior(arm)
     ends = [effect.bounds() for effect in arm.effects]
     lower, upper = (np.concatenate([np.empty(0), *(b[k] for b in ends)]) for k in (0, 1))
@@ -421,7 +421,7 @@ def _held_out_errors(
     blocks: FloatArray,
     counts: FloatArray,
 ) -> tuple[tuple[float, float], ...]:
-    """Return weights of the prior with held-out torque errors relative to unconstrained fits."""
+    """Return held-out torque errors by weight of the prior, relative to unconstrained fits."""
     # compared weights of the divergence. The term of the torques is a mean square of about one.
     candidates = tuple(float(w) for w in 10.0 ** np.arange(-7.0, 0.5))
     free = 0.0

@@ -45,7 +45,7 @@ Box = tuple[FloatArray, FloatArray]
 @dataclass(frozen=True)
 class PhysicalProgram:
     """
-    Convex program with constraints and prior of a physically consistent fit, for any data.
+    Convex program of a physically consistent fit: constraints and prior, without data.
 
     Attributes
     ----------
@@ -79,7 +79,7 @@ class PhysicalProgram:
 
     def solve(self, products: FloatArray, count: float, weight: float) -> FloatArray:
         """
-        Return the standard parameters that minimise the cost under the constraints.
+        Return the standard parameters that minimise the program's cost under its constraints.
 
         Parameters
         ----------
@@ -147,7 +147,7 @@ class PhysicalProgram:
 
     @cached_property
     def _whitened_links(self) -> FloatArray:
-        """Linear map from matrices, where the prior is the identity, to inertial parameters."""
+        """Linear map to inertial parameters from coordinates in which priors are the identity."""
         blocks = []
         for link in range(self.n_links):
             values = self.prior[PER_LINK * link : PER_LINK * (link + 1)]
@@ -201,7 +201,7 @@ class PhysicalProgram:
 
     @cached_property
     def _log_determinants(self) -> tuple[sparse.spmatrix, FloatArray, list[Any]]:
-        """Constraints sum u <= log det X for the whitened pseudo-inertia X of each link."""
+        """Constraints sum(u) <= log det X on variables u and links' whitened pseudo-inertias X."""
         # X >= Z diag(Z)^-1 Z' for a lower triangle Z, and u <= log of its diagonal (Ben-Tal and
         # Nemirovski 2001, section 4.2): 36 rows of a matrix, then an exponential per diagonal
         height = 36 + 3 * _DIAGONAL
