@@ -198,7 +198,7 @@ class CausalFilter:
         self.reset()
 
     def reset(self) -> None:
-        """Restart the filter, and set the counters to zero."""
+        """Restart the filter, and set the counts of left-out samples and restarts to zero."""
         self.rejected: Counter[str] = Counter()
         self.restarts: Counter[str] = Counter()
         self._begin()
@@ -259,7 +259,7 @@ class CausalFilter:
         return signal
 
     def advance(self, t: float, signal: FloatArray) -> CausalMotion | None:
-        """Filter the array of a joint state; None until the initial state has decayed."""
+        """Filter the signals of a joint state; None until the initial filter state has decayed."""
         dt = 0.0 if self._last is None else t - self._last
         longest = self.max_gap * self.period if self.period else np.inf
         if self._last is not None and not 0.0 < dt <= longest:
@@ -352,7 +352,7 @@ class RowNoise:
 
     @classmethod
     def of(cls, period: float, motion_pole: float, row_pole: float) -> RowNoise:
-        """Return the noise of rows, given the period [s] and the poles of both filters [rad/s]."""
+        """Return the noise of filtered torques, given the period [s] and filter poles [rad/s]."""
         # impulse response of both filters in series, over and in units of the row filter's pole;
         # its square has the integral of the squared gain over all frequencies (Parseval)
         ratio = motion_pole / row_pole
@@ -364,12 +364,12 @@ class RowNoise:
         return cls(bandwidth, gain, gain / (period * row_pole * float(np.max(response))))
 
     def independent(self, step: float) -> float:
-        """Return how many independent observations a row holds, `step` s after the last row."""
+        """Return how many independent observations a row holds, `step` s after the row before."""
         return min(1.0, self.bandwidth * step)
 
 
 def sensor_noise(robot: Robot, given: tuple[float, ...] | None) -> FloatArray:
-    """Return the torque noise of each joint, (n,): given, or a share of the joint's limit."""
+    """Return the torque noise of each joint, (n,): as given, or a share of its torque limit."""
     if given is not None:
         noise = np.array(given, dtype=np.float64)
         if noise.shape != (robot.n_joints,):

@@ -52,7 +52,7 @@ SILENT = 'the torque of every joint is constant; fill in the effort of the joint
 
 def check_motion(robot: Robot, recordings: Sequence[Recording]) -> tuple[str, ...]:
     """
-    Return a note on joints at rest in recordings; raise an error without usable motion.
+    Return a note on joints at rest in recordings; raise an error if the motion is unusable.
 
     Raises
     ------
@@ -91,7 +91,7 @@ def moving(motions: Iterable[Motion]) -> npt.NDArray[np.bool_]:
 
 
 def resting(robot: Robot, source: str, ranges: FloatArray) -> tuple[str, ...]:
-    """Return a note on joints at rest, by their ranges, (n,); raise an error if all rest."""
+    """Return a note on joints at rest, by ranges of position, (n,); raise an error if all rest."""
     names = [name for name, size in zip(robot.joints, ranges, strict=True) if size < REST_RANGE]
     if len(names) == robot.n_joints:
         raise IdentificationError(
@@ -189,7 +189,7 @@ def laws_of_controllers(
     robot: Robot, motion: Motion, informative: npt.NDArray[np.bool_]
 ) -> tuple[str, ...]:
     """
-    Return a message for each driven joint if all torques depend only on position and direction.
+    Return a message per driven joint if all torques depend only on position and motion direction.
 
     Gravity compensation outputs the weight of the arm while a hand moves it; energy shaping
     outputs a constant torque in the direction of motion. Such a torque does not contain the torque
@@ -248,14 +248,14 @@ def laws_of_controllers(
 
 
 def check_positions(robot: Robot, source: str, lowest: FloatArray, highest: FloatArray) -> None:
-    """Raise an error if the range of positions of a joint is far out of its limits."""
+    """Raise an error if positions of a joint are far outside its position limits."""
     problem = position_problem(robot, lowest, highest)
     if problem:
         raise IdentificationError(f'{source}: {problem}')
 
 
 def position_problem(robot: Robot, lowest: FloatArray, highest: FloatArray) -> str:
-    """Return a message on the joint farthest out of its limits by its range; empty if none."""
+    """Return a message on the joint farthest outside its position limits; empty if none is far."""
     # largest excess of positions over the limits that is no wrong unit: two turns of a joint that
     # a controller lets spin [rad], or one metre [m]
     turning, sliding = 4.0 * np.pi, 1.0
@@ -284,7 +284,7 @@ def position_problem(robot: Robot, lowest: FloatArray, highest: FloatArray) -> s
 
 
 def beyond_limits(robot: Robot, recordings: Sequence[Recording]) -> tuple[str, ...]:
-    """Return a note on joints that exceed the limits of the description, or nothing."""
+    """Return a note on joints that exceed their described position limits; empty if none does."""
     slack = _LIMIT_SLACK * (robot.upper - robot.lower)
     found = []
     for sign, limits, ends in (
@@ -337,7 +337,7 @@ def torque_factors(arm: ArmModel, motions: Sequence[Motion]) -> tuple[FloatArray
 
 
 def joined(motions: Sequence[Motion]) -> Motion:
-    """Return one motion with the samples of several motions with torques, in order."""
+    """Join several motions with torques into a single motion, in the given order."""
     names = ('t', 'q', 'dq', 'ddq', 'tau')
     arrays = [np.concatenate([getattr(motion, name) for motion in motions]) for name in names]
     return Motion(motions[0].joints, *arrays)
@@ -345,7 +345,7 @@ def joined(motions: Sequence[Motion]) -> Motion:
 
 def unit_of(factor: float, of_joints: Sequence[float] = (), near_force: float = 1.2) -> str:
     """
-    Return the units of torque that explain a factor of torques, joined by 'or'; empty if none.
+    Return torque units, joined by 'or', that explain measured / expected torque; empty if none.
 
     Parameters
     ----------

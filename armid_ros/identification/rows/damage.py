@@ -77,7 +77,7 @@ def without_damage(
 
 def impossible_excursions(t: FloatArray, x: FloatArray, floor: FloatArray) -> list[Excursion]:
     """
-    Return the excursions of signals that jump and come back, as no real motion or torque does.
+    Return the excursions of signals: jumps and returns that no real motion or torque makes.
 
     A `SpikeGate` finds them with the prediction errors and ranges of the whole recording. It
     processes only samples that differ too much from their prediction, and the samples after them.

@@ -38,7 +38,7 @@ _Columns = Callable[[Motion], FloatArray]
 @dataclass(frozen=True)
 class Stretch:
     """
-    Filtered, decimated motion and torque of a stretch of a recording without gaps.
+    Filtered, decimated motion and torque of a gap-free stretch of a recording.
 
     Attributes
     ----------
@@ -86,25 +86,25 @@ class Regression(Stretch):
 
     @property
     def target(self) -> FloatArray:
-        """Return the measured torque minus the constant, to which columns are fitted, (M, n)."""
+        """Return the measured torque minus the constant, for the fit of the columns, (M, n)."""
         return np.asarray(self.tau - self.constant)
 
     def torque(self, values: FloatArray) -> FloatArray:
-        """Return the torque of the linear model for parameter values, (r,), shape (M, n)."""
+        """Return the torque, (M, n), that the linear model predicts for parameter values, (r,)."""
         return np.asarray(self.columns @ values + self.constant)
 
     def residual(self, values: FloatArray) -> FloatArray:
-        """Return the residual torque for parameter values, (r,), shape (M, n)."""
+        """Return the residual torque, (M, n), for parameter values, (r,)."""
         return np.asarray(self.target - self.columns @ values)
 
     def restrict(self, columns: Sequence[int] | npt.NDArray[np.intp]) -> Regression:
-        """Return the problem with only the columns of given indices."""
+        """Return the linear problem with only the regressor columns at given indices."""
         if np.array_equal(columns, np.arange(self.columns.shape[2])):
             return self
         return replace(self, columns=self.columns[:, :, columns])
 
     def select(self, rows: npt.NDArray[np.intp]) -> Regression:
-        """Return the problem with the samples of given indices."""
+        """Return the linear problem with only the samples at given indices."""
         return replace(
             self,
             motion=self.motion.select(rows),
@@ -205,7 +205,7 @@ class Score:
 
     @staticmethod
     def of(fits: Sequence[Fit]) -> Score:
-        """Return the errors on all samples of one or more stretches."""
+        """Return the torque errors over all informative samples of given stretches."""
         names = 'residual', 'tau', 'informative'
         return Score.of_rows(*(np.concatenate([getattr(f, one) for f in fits]) for one in names))
 
@@ -213,7 +213,7 @@ class Score:
     def of_rows(
         residual: FloatArray, tau: FloatArray, informative: npt.NDArray[np.bool_]
     ) -> Score:
-        """Return the errors of informative samples of residuals and torques, each (N, n)."""
+        """Return torque errors over the informative samples of residuals and torques, (N, n)."""
         errors, lengths = (np.linalg.norm(informative * x, axis=0) for x in (residual, tau))
         count, whole = np.maximum(informative.sum(axis=0), 1), np.linalg.norm(lengths)
         return Score(
@@ -227,7 +227,7 @@ class Score:
 def weighted_rows(
     problem: Sequence[Regression], weights: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Return columns, (N n, r), and targets, (N n,), of all stretches, times weights, (N, n)."""
+    """Return weighted columns, (N n, r), and weighted target torques, (N n,), of all stretches."""
     columns = np.concatenate([part.columns for part in problem])
     target = np.concatenate([part.target for part in problem])
     rows = weights[:, :, np.newaxis] * columns
@@ -337,7 +337,7 @@ def filtered_columns(
 
 
 def _as_slice(indices: npt.NDArray[np.intp]) -> Samples:
-    """Return adjacent indices as a slice, which copies no array; others unchanged."""
+    """Return adjacent indices as a slice, which copies no array, and other indices unchanged."""
     adjacent = len(indices) and np.array_equal(indices, indices[0] + np.arange(len(indices)))
     return slice(int(indices[0]), int(indices[-1]) + 1) if adjacent else indices
 
@@ -375,7 +375,7 @@ def held_samples(
 
 def bridged(values: FloatArray, unsure: npt.NDArray[np.bool_]) -> FloatArray:
     """
-    Return values with linear interpolation across samples whose friction is unknown.
+    Return torques or columns, interpolated linearly across samples of unknown dry friction.
 
     Parameters
     ----------

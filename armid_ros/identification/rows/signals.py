@@ -80,7 +80,7 @@ class SignalSettings:
 @dataclass(frozen=True)
 class Conditioning:
     """
-    Cut-off of positions, and decimation, for recordings of one sampling rate.
+    Cut-off of positions, and decimation, for recordings of equal sampling rate.
 
     Attributes
     ----------
@@ -118,7 +118,7 @@ class Conditioning:
     @property
     def smooth_stride(self) -> int:
         """
-        Largest stride at which smooth functions of filtered positions need values, in samples.
+        Largest number of samples between needed values of smooth functions of filtered positions.
 
         The spectrum of positions ends at the cut-off, that of smooth functions slightly above.
         Five samples per period of the cut-off are enough for the pass band of the decimation.
@@ -131,7 +131,7 @@ class Conditioning:
 
 def conditioning(recordings: Sequence[Recording], settings: SignalSettings) -> Conditioning:
     """
-    Choose the cut-off of positions and the decimation for recordings of one sampling rate.
+    Choose the cut-off of positions and the decimation for recordings of equal sampling rate.
 
     The cut-off of positions is the frequency at which their spectrum falls to their noise. It is
     at most a fifth of the sampling rate, as derivatives above are only noise. It is also at most
@@ -194,7 +194,7 @@ def velocity_error(recording: Recording, used: Conditioning) -> FloatArray:
 
 def segments(recording: Recording, used: Conditioning) -> Iterator[Motion]:
     """
-    Yield the motion of each stretch without a gap, at even times, with filtered positions.
+    Yield the motion of each gap-free stretch, at even times, with filtered positions.
 
     Positions are differentiated as well; torques are unchanged. Stretches too short for the
     filters are left out.
@@ -222,7 +222,7 @@ def segments(recording: Recording, used: Conditioning) -> Iterator[Motion]:
 
 
 def unbroken(recording: Recording, rate: float) -> list[npt.NDArray[np.intp]]:
-    """Return the indices of the samples of each stretch without a gap."""
+    """Return the sample indices of each gap-free stretch of a recording."""
     longest = GAP_PERIODS * max(1.0 / rate, recording.period)
     breaks = np.flatnonzero(np.diff(recording.t) > longest) + 1
     return np.split(np.arange(len(recording.t)), breaks)
@@ -257,7 +257,7 @@ def no_stretch(recording: Recording, used: Conditioning) -> IdentificationError:
 
 def decimate(values: FloatArray, used: Conditioning, stride: int = 1) -> FloatArray:
     """
-    Return values after the low-pass and the decimation of torque and regressor.
+    Low-pass and decimate values, such as torques and regressor columns.
 
     Parameters
     ----------
@@ -305,7 +305,7 @@ def decimated_samples(n_samples: int, used: Conditioning) -> range:
 
 
 def _even(t: FloatArray, period: float, *signals: FloatArray) -> tuple[FloatArray, ...]:
-    """Return even times, and signals at these times, by cubic splines if stamps jitter."""
+    """Return even times, and signals at these times, from cubic splines if the stamps jitter."""
     grid = np.linspace(t[0], t[-1], round((t[-1] - t[0]) / period) + 1)
     # stamps that differ by less than a twentieth of a period are even
     if len(grid) == len(t) and np.max(np.abs(grid - t)) < 0.05 * period:
@@ -327,7 +327,7 @@ def position_noise(recording: Recording) -> FloatArray:
 def _differentiated(
     recording: Recording, t: FloatArray, q: FloatArray, tau: FloatArray, used: Conditioning
 ) -> Motion:
-    """Return the filtered motion of a stretch; positions, (N, k), include those of a partner."""
+    """Return the filtered motion of a stretch; positions, (N, k), include a partner machine's."""
     sections = signal.butter(4, used.cutoff_hz, fs=used.rate_hz, output='sos')
     smooth = signal.sosfiltfilt(sections, q, axis=0)
     dq = _central_difference(smooth, t[1] - t[0])
@@ -437,7 +437,7 @@ def mean_spectrum(
 def _position_spectrum(
     recording: Recording,
 ) -> tuple[list[FloatArray], FloatArray, FloatArray, FloatArray]:
-    """Return gap-free positions, frequencies (K,), power (K, n) and white noise (n,) per Hz."""
+    """Return gap-free positions; their frequencies (K,), power (K, n) and noise (n,) per Hz."""
     rate = 1.0 / recording.period
     parts = [part for part in unbroken(recording, rate) if len(part) >= _MIN_SAMPLES]
     stretches = [recording.q[part] for part in parts] or [recording.q]

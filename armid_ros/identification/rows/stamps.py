@@ -63,7 +63,7 @@ def rounded_stamps(recording: Recording) -> str:
 
 def check_recordings(recordings: Sequence[Recording]) -> None:
     """
-    Raise an error for a recording with too few samples per second, or of two senders.
+    Raise an error for a recording with too few samples per second, or from two senders.
 
     Raises
     ------

@@ -21,7 +21,7 @@ _SIZES = {'viscous_slope': 'viscous_coefficient', 'coulomb_slope': 'coulomb_torq
 
 
 def mean_temperatures(parts: Sequence[Motion | Recording]) -> dict[str, float] | None:
-    """Return the mean temperature of each joint [degC]; None if any part has no temperatures."""
+    """Return the mean temperature of each joint [degC]; None if a recording has no temperature."""
     found = [part.temperature.at(part.t) for part in parts if part.temperature is not None]
     if not found or len(found) < len(parts):
         return None
