@@ -21,14 +21,14 @@ Moment = tuple[float, FloatArray]
 
 @dataclass
 class _Part:
-    """Joints of one sender, and its samples, each (s, k), that are not yet merged."""
+    """Joints of a sender of joint states, and the sender's unmerged samples, each (s, k)."""
 
     joints: tuple[int, ...]
     samples: deque[Moment] = field(default_factory=lambda: deque(maxlen=1000))
     period: float = np.inf
 
     def take(self, t: float, values: FloatArray) -> None:
-        """Add a sample of the sender; a stamp that goes back clears the earlier samples."""
+        """Add a sample of the sender; clear the earlier samples if its time stamp goes back."""
         if self.samples:
             step = t - self.samples[-1][0]
             if step == 0.0:  # noqa: RUF069 - equal stamps differ by zero
@@ -75,13 +75,13 @@ class JointMerger:
 
     @property
     def missing(self) -> tuple[int, ...]:
-        """Indices of the joints that no sender has sent so far."""
+        """Indices of the joints that no sender has published so far."""
         sent = {joint for part in self._parts for joint in part}
         return tuple(k for k in range(self._n_joints) if k not in sent)
 
     def take(self, joints: tuple[int, ...], t: float, values: FloatArray) -> list[Moment]:
         """
-        Add a sample of some joints; return the merged samples that it completes.
+        Add a sample of some joints; return the merged samples that become complete.
 
         Parameters
         ----------

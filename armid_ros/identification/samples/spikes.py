@@ -16,7 +16,7 @@ and return, for example when free play is crossed. The usual range of the torque
 pulses from damage. A stream leaves them out unreported, as the range is known too late; a
 recording keeps them.
 
-The largest allowed error is the largest of three. The first is the usual prediction error in the
+The largest allowed error is the largest of three. The first is the typical prediction error in the
 noisiest window of the last minute, times the normal quantile for one false alarm in
 `false_alarm_time`. The second is the resolution, the smallest step of a signal, times the same
 quantile. The third is the negligible error (``floor``): the error of one sample that changes an
@@ -157,7 +157,7 @@ class SpikeGate:
         return good + self._take(StreamSample(t, x))
 
     def _take(self, sample: StreamSample) -> list[StreamSample]:
-        """Process a sample whose time stamp agrees with the next sample; see `take`."""
+        """Process a sample whose time stamp the next sample does not contradict; see `take`."""
         if self._reference:
             self._last = self._reference[1].x
         if self._last is not None:
@@ -172,7 +172,7 @@ class SpikeGate:
 
     def settle(self) -> bool:
         """
-        Update the usual prediction errors if a window is almost full; return whether it was.
+        Update the typical prediction errors if a window is almost full; return whether it was.
 
         Otherwise `take` updates them with the sample that completes the window. A stream calls
         `settle` after a sample that needs little other work.
@@ -187,7 +187,7 @@ class SpikeGate:
         curvature: FloatArray | float = 0.0,
     ) -> None:
         """
-        Begin inside a recording whose usual prediction errors are known.
+        Begin within a recording whose typical prediction errors are known.
 
         Parameters
         ----------
@@ -206,9 +206,9 @@ class SpikeGate:
 
     def possible(self, excursion: Excursion, lowest: FloatArray, highest: FloatArray) -> bool:
         """
-        Return whether an excursion is physically possible, a pulse of torque and no damage.
+        Return whether an excursion of signals may be a real pulse of torque, and not damage.
 
-        A position cannot jump and return. A torque can exceed its usual range, from `lowest` to
+        A position cannot jump and return. A torque can exceed its typical range, from `lowest` to
         `highest`, when free play is crossed, but by no more than the width of that range: an
         impact is of the order of the driving torque.
 
@@ -224,7 +224,7 @@ class SpikeGate:
         reference: Sequence[StreamSample] = (),
         curvature: FloatArray | float = 0.0,
     ) -> None:
-        """Begin a new stretch with some samples, and keep the usual prediction errors."""
+        """Begin a new stretch with given samples, and keep the typical prediction errors."""
         self._first, self._reference = first, tuple(reference)
         self._curvature = curvature
         self._pending: list[StreamSample] = []
@@ -262,7 +262,7 @@ class SpikeGate:
         return False
 
     def _begin(self) -> list[StreamSample]:
-        """Measure noise and period of the first samples; return those that are undamaged."""
+        """Measure noise and period from the first samples; return the undamaged first samples."""
         raw, self._first = self._first or [], None
         first = all_unwrapped(raw, self._turn)
         self._period = float(np.median(np.diff([s.t for s in first])))
@@ -326,7 +326,7 @@ class SpikeGate:
         return []
 
     def _release(self) -> list[StreamSample]:
-        """Return held samples that are valid, after another check for damage."""
+        """Check the held samples for damage again; return the undamaged samples."""
         held, self._pending = self._pending, []
         innovations = self._lines_through(held)
         steady = ~self._pulsing
@@ -370,12 +370,12 @@ class SpikeGate:
         return bool(np.any(far[self._continuous & (ahead.error * back.error < 0.0)] > 1.0))
 
     def _limits(self, innovation: Innovation) -> FloatArray:
-        """Return the largest allowed prediction error of a sample, shape (m,)."""
+        """Return the largest allowed prediction error of each signal of a sample, shape (m,)."""
         limits = self._level.model.limits(innovation.noise, innovation.acceleration)
         return np.maximum(limits, self._floor)
 
     def _ratio_to_limit(self, innovation: Innovation) -> FloatArray:
-        """Return the prediction error of a sample over its limit, shape (m,)."""
+        """Return the prediction error of each signal over the largest allowed error, (m,)."""
         limit = np.maximum(self._limits(innovation), 1e-300)
         return np.asarray(np.abs(innovation.error) / limit)
 
@@ -395,12 +395,12 @@ class SpikeGate:
         return samples
 
     def _lines_through(self, samples: Sequence[StreamSample]) -> list[Innovation]:
-        """Return the prediction error of each sample by the two samples before it."""
+        """Return the error of predicting each sample by the line through the two before it."""
         pairs = range(len(samples) - 2)
         return [innovation_of(samples[k : k + 2], samples[k + 2], self._period) for k in pairs]
 
     def _leave_out_ahead(self, samples: Sequence[StreamSample], innovation: Innovation) -> None:
-        """Leave out the samples before the first sample that is in line with the next."""
+        """Leave out the samples that precede the first three samples on a straight line."""
         if samples:
             ratio, limit = self._ratio_to_limit(innovation), self._limits(innovation)
             self._leave_out(Excursion(tuple(samples), ratio, limit))

@@ -3,7 +3,7 @@
 """
 Prediction of a sample of a stream by the straight line through the two samples before it.
 
-The usual prediction errors are the noise of a stream and the resolution of its signals. One
+The typical prediction errors are the noise of a stream and the resolution of its signals. One
 sample in a hundred completes a window of errors. All windows take the same computing time, as a
 stream must not wait.
 
@@ -80,7 +80,7 @@ class Excursion:
 @dataclass(frozen=True, eq=False)
 class ErrorModel:
     """
-    Usual prediction errors of undamaged samples of a stream.
+    Typical prediction errors of undamaged samples of a stream.
 
     Attributes
     ----------
@@ -101,13 +101,13 @@ class ErrorModel:
     quantile: float
 
     def growth(self, noise: Factor, acceleration: Factor) -> FloatArray:
-        """Return the growth of errors by noise and acceleration together, (m,) or (N, m)."""
+        """Return the growth factor of errors, noise and acceleration combined, (m,) or (N, m)."""
         squares = acceleration**2
         return np.asarray(np.sqrt(squares + self.white * (noise**2 - squares)))
 
     @cached_property
     def correlation(self) -> FloatArray:
-        """Correlation of successive errors, 0 for white noise and 1 for acceleration, (m,)."""
+        """Correlation of successive prediction errors: 0 for noise, 1 for acceleration, (m,)."""
         return np.clip(1.0 - (1.0 - _NOISE_CORRELATION) * self.white, 0.0, 1.0)
 
     def limits(self, noise: Factor, acceleration: Factor) -> FloatArray:
@@ -115,7 +115,7 @@ class ErrorModel:
         Return the largest allowed prediction errors, given their growth by noise and acceleration.
 
         The acceleration of an arm is bounded, unlike noise, which has tails. The limit of a smooth
-        signal is therefore a small multiple of its usual error, not a quantile of the normal
+        signal is therefore a small multiple of its typical error, not a quantile of the normal
         distribution.
 
         """
@@ -126,7 +126,7 @@ class ErrorModel:
 
     @cached_property
     def limits_of_a_period(self) -> FloatArray:
-        """Largest allowed prediction errors over one period, shape (m,)."""
+        """Largest allowed prediction errors over one sampling period, shape (m,)."""
         return self.limits(1.0, 1.0)
 
 
@@ -149,7 +149,7 @@ class Innovation(NamedTuple):
 
 
 def growth_over(step: Time, ahead: Time, period: float) -> tuple[Time, Time]:
-    """Return the growth of prediction errors, by noise and by acceleration, with time ahead."""
+    """Return factors by which errors by noise and by acceleration grow with prediction time."""
     ratio = ahead / step
     noise: Time = ((1.0 + (1.0 + ratio) ** 2 + ratio**2) / 6.0) ** 0.5
     return noise, 0.5 * ahead * (ahead + step) / period**2
@@ -166,7 +166,7 @@ def innovation_of(
 
 
 def unwrapped(x: FloatArray, last: FloatArray, turn: FloatArray) -> FloatArray:
-    """Return positions without the jump by full turns with which drivers keep them in +-pi."""
+    """Return positions without jumps by full turns, by which drivers keep angles within +-pi."""
     if float(np.abs(x - last).max()) <= np.pi:
         return x
     turns = np.rint(np.divide(x - last, turn, where=turn > 0.0, out=np.zeros_like(x)))
@@ -188,7 +188,7 @@ def quantile(period: float, count: int, false_alarm_time: float = FALSE_ALARM_TI
 
 def robust_scale(innovations: FloatArray, share: float = 0.95) -> FloatArray:
     """
-    Return the standard deviation of errors, (k, m), from a quantile of their size.
+    Return the standard deviation of errors, (k, m), from a quantile of the errors' size.
 
     Larger errors may be friction steps, or damage.
 
@@ -203,7 +203,7 @@ def robust_scale(innovations: FloatArray, share: float = 0.95) -> FloatArray:
 
 
 def share_of_noise(innovations: FloatArray, size: FloatArray) -> FloatArray:
-    """Return the share of white noise in the squares of successive errors, (k, m)."""
+    """Return the share of white noise in squared successive prediction errors, (k, m)."""
     most = 3.0 * size  # larger errors are limited
     errors = np.minimum(np.maximum(innovations, -most), most)
     squares = np.einsum('k...,k...->...', errors, errors)
@@ -215,7 +215,7 @@ def share_of_noise(innovations: FloatArray, size: FloatArray) -> FloatArray:
 
 class NoiseLevel:
     """
-    Estimator of the usual prediction errors of a stream, from undamaged samples.
+    Estimator of the typical prediction errors of a stream, from undamaged samples.
 
     Parameters
     ----------
@@ -244,7 +244,7 @@ class NoiseLevel:
         self._window: list[tuple[Innovation, FloatArray]] = []
 
     def set(self, model: ErrorModel) -> None:
-        """Replace the usual prediction errors by those of a model."""
+        """Replace the typical prediction errors by those of a given error model."""
         self.forget()
         self._remember(model.size, model.white)
         self.model = model
@@ -256,7 +256,7 @@ class NoiseLevel:
 
     def begin(self, innovations: Sequence[Innovation], moves: FloatArray, period: float) -> None:
         """
-        Measure the usual prediction errors of the first samples, which may include damaged ones.
+        Measure the typical prediction errors of the first samples, some of which may be damaged.
 
         `moves`, (k, m), are the differences between successive samples; the period is in s.
 
@@ -271,11 +271,11 @@ class NoiseLevel:
             self._use(period, size, share_of_noise(errors, np.maximum(size, self._least(period))))
 
     def learn(self, innovation: Innovation, move: FloatArray) -> None:
-        """Add the prediction error of an undamaged sample, and its change of signals, (m,)."""
+        """Add the prediction error of an undamaged sample, and the change of its signals, (m,)."""
         self._window.append((innovation, move))
 
     def settle(self, period: float, count: int = WINDOW) -> bool:
-        """Update the usual prediction errors if a window is full; return whether it was."""
+        """Update the typical prediction errors if a window is full; return whether it was."""
         if len(self._window) < count:
             return False
         innovations, moves = zip(*self._window, strict=True)
@@ -291,24 +291,24 @@ class NoiseLevel:
         return True
 
     def _use(self, period: float, size: FloatArray, white: FloatArray) -> None:
-        """Set the usual prediction errors of a window, at least the resolution."""
+        """Set the typical prediction errors to those of a window, but at least the resolution."""
         allowed = quantile(period, len(size), self._false_alarm_time)
         self.model = ErrorModel(period, np.maximum(size, self._least(period)), white, allowed)
 
     def _remember(self, size: FloatArray, white: FloatArray) -> None:
-        """Store the usual prediction errors of a window, in place of the oldest window."""
+        """Store the typical prediction errors of a window, in place of the oldest window."""
         place = self._seen % len(self._sizes)
         self._sizes[place], self._shares[place] = size, white
         self._seen += 1
 
     def add_steps(self, moves: FloatArray) -> None:
-        """Update the resolution of each signal with changes between samples, (k, m)."""
+        """Update the resolution of each signal with changes between successive samples, (k, m)."""
         sizes = np.abs(moves)
         if ((sizes > 0.0) & (sizes < self._min_steps[-1])).any():  # seldom after the first samples
             self._min_steps = smallest_steps(np.concatenate([self._min_steps, sizes]))
 
     def _least(self, period: float) -> FloatArray:
-        """Return the smallest relevant error of each signal: resolution, or onset of motion."""
+        """Return each signal's smallest relevant error: resolution, or change as motion begins."""
         # A fast signal has no small steps, but its resolution causes prediction errors.
         step = np.where(np.isfinite(self._min_steps[-1]), self._min_steps[-1], 0.0)
         least = np.maximum(self._finest, self._onset * period**2)
