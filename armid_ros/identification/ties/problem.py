@@ -96,7 +96,7 @@ class InteractionProblem:
 
     @property
     def motion_noise(self) -> FloatArray:
-        """Covariance of the errors of a sample's motion by noisy angles, shape (3 J, 3 J)."""
+        """Covariance of the errors that noisy angles cause in a sample's motion, (3 J, 3 J)."""
         return np.asarray(self.motion_lags[0])
 
     @property
@@ -106,7 +106,7 @@ class InteractionProblem:
         return np.asarray(np.sqrt(variance[: len(variance) // 3]))
 
     def with_springs(self, kept: npt.NDArray[np.intp]) -> InteractionProblem:
-        """Return the problem with the springs of given indices."""
+        """Return the regression problem with only some of its springs, chosen by their indices."""
         columns = [*kept.tolist(), *range(len(self.segments), self.columns.shape[2])]
         return replace(
             self,
@@ -119,7 +119,7 @@ class InteractionProblem:
         )
 
     def residual(self, theta: FloatArray) -> FloatArray:
-        """Return the residual torques for parameters, (P,), shape (N, n) [N m]."""
+        """Return the residual torques, (N, n) [N m], for given parameters, (P,)."""
         return np.asarray(self.tau - self.known - self.columns @ theta)
 
     def sensitivity(self, theta: FloatArray) -> FloatArray:
@@ -128,7 +128,7 @@ class InteractionProblem:
         return np.asarray(self.known_by_motion + spring)
 
     def deviation(self, theta: FloatArray) -> FloatArray:
-        """Return the root mean square residual of each joint by noise alone, (n,) [N m]."""
+        """Return the root mean square residual of each joint due to noise alone, (n,) [N m]."""
         by_motion = self.sensitivity(theta)
         angles = np.sum(by_motion @ self.motion_noise * by_motion, axis=2)
         return np.asarray(np.sqrt(np.mean(angles, axis=0) + self.torque_noise**2))
@@ -146,7 +146,7 @@ def interaction_problem(
     slack: float | FloatArray = 0.0,
 ) -> InteractionProblem:
     """
-    Return the regression of spring stiffness on motions of both machines.
+    Return the regression problem of spring stiffness, from motions of both machines.
 
     Parameters
     ----------
@@ -227,7 +227,7 @@ def interaction_problem(
 def _free_inertias(
     robot: Robot, motion: Motion, springs: FloatArray, names: Sequence[str]
 ) -> tuple[FloatArray, BaseParameters]:
-    """Return the inertial columns that the motion identifies, and their base parameters."""
+    """Return the regressor columns of identifiable inertias, and the base parameters of these."""
     # remainder of a column, as a share of it, below which it is a combination of the others
     tolerance = 1e-6
     body = regressor(robot, motion)
@@ -248,7 +248,7 @@ def _free_inertias(
 
 
 def _filtered_noise(used: Conditioning | None) -> tuple[FloatArray, FloatArray]:
-    """Return the covariances of filtered noise between samples: of the motion, and of torques."""
+    """Return covariances between samples of filtered unit noise, of motion and of torques."""
     # number of samples over which errors are correlated after filtering
     n_lags = 6
     # Covariances of position, velocity, acceleration of a sample with itself and with later
@@ -270,7 +270,7 @@ def _filtered_noise(used: Conditioning | None) -> tuple[FloatArray, FloatArray]:
 
 
 def _regressor_by_motion(robot: Robot, motion: Motion, kept: npt.NDArray[np.intp]) -> FloatArray:
-    """Return the derivatives of chosen rigid columns by the motion, shape (N, n, P, 3, n)."""
+    """Return derivatives of chosen rigid-body columns by the motion, shape (N, n, P, 3, n)."""
     h = 1e-5  # step of the central differences [rad or m]
     n = motion.n_joints
     result = np.empty((len(motion), n, len(kept), 3, n))
@@ -284,7 +284,7 @@ def _regressor_by_motion(robot: Robot, motion: Motion, kept: npt.NDArray[np.intp
 
 
 def _placed(by_own: FloatArray, count: int) -> FloatArray:
-    """Return derivatives by one machine's motion, (..., 3, n), with zeros for the other's."""
+    """Extend derivatives by one machine's motion, (..., 3, n), by zeros for the other machine."""
     result = np.zeros((*by_own.shape[:-1], count))
     result[..., : by_own.shape[-1]] = by_own
     return result.reshape((*by_own.shape[:-2], 3 * count))

@@ -42,7 +42,7 @@ def recorded_interaction_problem(
     slack: float | FloatArray = 0.0,
 ) -> InteractionProblem:
     """
-    Return the regression of spring stiffness on recordings of both machines.
+    Return the regression problem of spring stiffness, from recordings of both machines.
 
     The angles of the other machine are interpolated at the stamps of the first machine. Both are
     filtered, and torques and columns are decimated, as in any identification. White noise of the
@@ -85,7 +85,7 @@ def together_interaction_problem(
     rest: Callable[[Motion], FloatArray] | None = None,
 ) -> InteractionProblem:
     """
-    Return the regression of spring stiffness on a recording with the other machine's motion.
+    Return the regression problem of spring stiffness, from a recording of both machines.
 
     Parameters
     ----------
@@ -139,7 +139,7 @@ def together_interaction_problem(
 
 def stacked(problems: Sequence[InteractionProblem]) -> InteractionProblem:
     """
-    Return one regression with the samples of several stretches or recordings.
+    Join regressions of several stretches or recordings into a single regression.
 
     Raises
     ------
@@ -154,7 +154,7 @@ def stacked(problems: Sequence[InteractionProblem]) -> InteractionProblem:
 
 
 def _one_machine(recording: Recording) -> Recording:
-    """Return a recording with the joints of both machines; torques of the other are zero."""
+    """Return a recording of both machines' joints; torques of the other machine are zero."""
     assert recording.partner is not None and recording.tau is not None
     far = recording.partner.q
     return replace(
@@ -174,7 +174,7 @@ def band_of_motion(
     margin: float = 2.0,
 ) -> Conditioning:
     """
-    Return filters whose band is reduced to that of the motion, unless settings define it.
+    Return filters with the band reduced to that of the motion, unless the user set the band.
 
     Parameters
     ----------
@@ -258,5 +258,5 @@ class SensorNoise:
 
     @cached_property
     def _taut(self) -> InteractionProblem:
-        """Regression with springs without slack."""
+        """Regression problem of springs that have no slack."""
         return together_interaction_problem(self.robot, self.recording, self.used, separate=True)

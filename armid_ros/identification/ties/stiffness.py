@@ -85,7 +85,7 @@ class Interaction:
 
 def identify_interaction(problem: InteractionProblem) -> Interaction:
     """
-    Estimate stiffnesses and free inertias without the bias by noisy angles.
+    Estimate spring stiffnesses and free inertias, corrected for the bias by noisy angles.
 
     Parameters
     ----------
@@ -130,7 +130,7 @@ def identify_interaction(problem: InteractionProblem) -> Interaction:
 def _most_likely(
     problem: InteractionProblem, theta: FloatArray, variance: FloatArray
 ) -> FloatArray:
-    """Return the most likely parameters, near a start, by a quasi-Newton method (BFGS)."""
+    """Return the most likely parameters, from start values, by a quasi-Newton method (BFGS)."""
     # largest gradient, in standard deviations, at the end of the iteration
     converged = 1e-3
     # Where noise dominates a column, the information overestimates the curvature of the loss, and
@@ -142,7 +142,7 @@ def _most_likely(
     unit = np.linalg.inv(root).T / size[:, np.newaxis]  # directions of one standard deviation
 
     def half_loss(z: FloatArray) -> tuple[float, FloatArray]:
-        """Return half of the loss and its gradient, z standard deviations from the start."""
+        """Return half of the loss, and its gradient, at z standard deviations from the start."""
         here = theta + unit @ z
         step = _gauss_newton(problem, here, variance)
         away = here - problem.described
