@@ -102,7 +102,7 @@ class IdentificationSettings:
 
     @property
     def least_squares(self) -> Method:
-        """Return the least-squares method; that of the initial fit for instrumental variables."""
+        """Return the method of least squares, also of the first fit for instrumental variables."""
         return 'wls' if self.method == 'iv' else self.method
 
     @property
@@ -324,7 +324,7 @@ def _fitted(
     settings: IdentificationSettings,
     rng: np.random.Generator,
 ) -> tuple[BaseParameters, FittedValues]:
-    """Return the identifiable base parameters, and a fit of those that the data determine."""
+    """Return the identifiable base parameters, and a fit of the parameters that data determine."""
     base, problem, recordings, used = data
     method, rigid = settings.least_squares, len(arm.robot.rigid_parameters)
     refitted = False
@@ -351,7 +351,7 @@ def _fit_quasi_static(
     method: Method,
     rng: np.random.Generator,
 ) -> tuple[FittedValues, tuple[str, ...]]:
-    """Fit weight and friction to slow motions with the described inertia; return notes too."""
+    """Fit weight and friction to slow motions with the described inertia; return fit and notes."""
     base, problem, recordings, used = data
     problem = exact_at(problem, torques(arm, recordings, used), base.values(arm.theta))
     free = unidentifiable_directions(arm, arm.base_parameters(rng))

@@ -64,7 +64,7 @@ class DriveGains:
         ]
 
     def sentences(self) -> tuple[str, ...]:
-        """Return a sentence on each gain, and on the model that results."""
+        """Return sentences on the drive gains, and on the model that is fitted with the gains."""
         sure = np.isfinite(self.std)
         lines = [
             f'drive gain of {joint}: {gain:.4g} ({gain - width:.4g} to {gain + width:.4g}, 95 %)'
@@ -88,7 +88,7 @@ def payloads_of(
     texts: Sequence[str], recordings: Sequence[Recording], robot: Robot
 ) -> Mapping[str, Robot]:
     """
-    Return the robot with its payload, by the path of each recording with a payload.
+    Return the robot with payload for each recording with a payload, by the recording's path.
 
     Raises
     ------
@@ -219,7 +219,7 @@ def drive_gains(
 def _gain(
     columns: FloatArray, known: FloatArray, tau: FloatArray, blocks: FloatArray
 ) -> tuple[float, float, float]:
-    """Return the gain of a drive, its standard deviation, and half of its 95 % interval."""
+    """Return the gain of a drive, its standard deviation, and the 95 % interval's half width."""
     scale = np.linalg.norm(columns, axis=0)
     columns = columns[:, scale > 0.0] / scale[scale > 0.0]
     # regression of the effort's residual on that of the payload's torque (Frisch and Waugh)
@@ -246,7 +246,7 @@ def corrected(
     gains: DriveGains,
     signals: SignalSettings,
 ) -> list[Recording]:
-    """Return recordings with the torque of the bare arm: efforts over gains, without payload."""
+    """Return recordings with torques of the bare arm: efforts over gains, minus payload torque."""
     result = []
     for recording in recordings:
         assert recording.tau is not None

@@ -173,7 +173,7 @@ def identified_from(path: str | Path) -> tuple[Path, ...]:
 
 def require_as_identified(path: str | Path) -> None:
     """
-    Raise an error if a recording of a model has changed since the identification.
+    Raise an error if a recording that a model was identified from has changed since then.
 
     Parameters
     ----------
@@ -215,7 +215,7 @@ def _content(path: Path) -> dict[str, Any]:
 
 
 def _found(model: Path) -> dict[Path, dict[str, Any] | None]:
-    """Return the existing recordings of a model.yaml, with size and digest if known."""
+    """Return existing recordings that a model.yaml is identified from, with digests if known."""
     file = model.with_name('identification.json')
     if not is_file(file):
         return {}
@@ -264,5 +264,5 @@ def _score(result: Identification, fits: Sequence[Fit]) -> dict[str, Any]:
 
 
 def _by_joint(result: Identification, values: FloatArray) -> dict[str, float]:
-    """Return the value of each joint by its name."""
+    """Return values of all joints, (n,), by the names of the joints."""
     return dict(zip(result.arm.robot.joints, values.tolist(), strict=True))

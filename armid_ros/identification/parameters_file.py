@@ -56,7 +56,7 @@ class KnownFit:
 
     @property
     def unusable(self) -> bool:
-        """Whether the grade of the model is unusable: it does not describe the arm."""
+        """Whether the grade of the model is unusable, as the model does not describe the arm."""
         return self.grade == 'unusable'
 
 
@@ -138,7 +138,7 @@ class ParameterFile:
 
     def regrouped_as(self, other: ParameterFile) -> ParameterFile:
         """
-        Return these parameters and the base parameters of another file that follow from them.
+        Return this file's parameters, and base parameters of another file that follow from these.
 
         A motion with less excitation groups more standard parameters. Its base parameters are
         combinations of the base parameters of a motion with more excitation.
@@ -212,7 +212,7 @@ def read_parameters(path: str | Path) -> ParameterFile:
 
 
 def _identification_of(path: Path, model: Mapping[str, Any]) -> ParameterFile | None:
-    """Read the identification.json in the folder of a model.yaml; None if of another model."""
+    """Read the identification.json in the folder of a model.yaml; None if of a different model."""
     # identification.json has the base parameters of the model and their covariance. It is of this
     # model if the model reproduces the value of every base parameter.
     file = path.with_name('identification.json')
@@ -333,7 +333,7 @@ def _matrix(rows: Sequence[Mapping[str, float]], keys: Sequence[str]) -> FloatAr
 
 def known_fit(document: Mapping[str, Any]) -> KnownFit | None:
     """
-    Return torque error and grade from the content of identification.json; None if absent.
+    Return torque error and grade in the content of identification.json; None if they are absent.
 
     Raises
     ------
@@ -358,7 +358,7 @@ def known_fit(document: Mapping[str, Any]) -> KnownFit | None:
 
 
 def _covariance(rows: list[list[float]] | None, size: int) -> FloatArray | None:
-    """Return the covariance matrix of a lower triangle with `size` rows; None without rows."""
+    """Return the covariance matrix from the rows of its lower triangle; None if `rows` is None."""
     if rows is None:
         return None
     if [len(row) for row in rows] != list(range(1, size + 1)):
