@@ -69,11 +69,11 @@ class Agreement:
 
     @property
     def holds(self) -> bool:
-        """Whether the squared distance of the errors is inside its 95 % range."""
+        """Whether the squared Mahalanobis distance of the errors is inside its 95 % range."""
         return self.lower <= self.distance <= self.upper
 
     def sentence(self) -> str:
-        """Return a sentence with the number of correct parameters and chi-squared."""
+        """Return a sentence on the parameters within 2 sigma of the truth, and on chi-squared."""
         chance = '' if self.holds else '; repeat the simulation with another --seed'
         return (
             f'{self.within} of {self.parameters} parameters within 2 sigma of the truth '

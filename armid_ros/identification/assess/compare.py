@@ -110,7 +110,7 @@ def compare(before: ParameterFile, after: ParameterFile) -> Comparison:
 
 
 def _check_comparable(before: ParameterFile, after: ParameterFile) -> None:
-    """Raise an error unless both results have a covariance, share the robot and differ."""
+    """Raise an error unless two results are of the same robot, differ and have covariances."""
     for file in (before, after):
         if file.covariance is None:
             raise ModelError(
@@ -150,10 +150,10 @@ def _single_changes(
     before: ParameterFile, after: ParameterFile, names: Sequence[ParameterName]
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """
-    Return parameters and standard deviations of two results, (2, p), and p-values of changes.
+    Return values and standard deviations of parameters in two results, and p-values of changes.
 
-    The p-values have shape (p,). Standard deviations are those of noise. If the scatter between
-    recordings exceeds the noise of a joint, they are multiplied by the ratio.
+    The shapes are (2, p), (2, p) and (p,). Standard deviations are those of noise. If the scatter
+    between recordings exceeds the noise of a joint, they are multiplied by the ratio.
 
     """
     known = np.array([[one.values[name] for name in names] for one in (before, after)])
@@ -187,7 +187,7 @@ def _single_changes(
 def _common_change(
     before: ParameterFile, after: ParameterFile, names: Sequence[ParameterName]
 ) -> tuple[FloatArray, FloatArray, float]:
-    """Return the changes of parameters, their covariance, and the p-value of all together."""
+    """Return parameter changes, covariance, and the p-value of the hypothesis of no change."""
     files = before, after
     difference = np.array([after.values[name][0] - before.values[name][0] for name in names])
     covariance = sum((one.covariance_of(names) for one in files), np.zeros(()))
@@ -196,7 +196,7 @@ def _common_change(
         return difference, covariance, 1.0
 
     def distance(rows: FloatArray) -> tuple[float, int]:
-        """Return the summed squared Mahalanobis distances of rows (K, p), and the rank."""
+        """Return the sum of squared Mahalanobis distances of rows, and the covariance's rank."""
         correlation = covariance / np.outer(std, std)
         with np.errstate(over='ignore'):
             squares, rank = quadratic_form(rows / std, correlation, _ROUNDING)
@@ -217,7 +217,7 @@ def _common_change(
 def _find_load(
     terms: Sequence[Mapping[str, float]], difference: FloatArray, covariance: FloatArray
 ) -> LoadChange | None:
-    """Return the payload that explains all changes, on the outermost possible link, or None."""
+    """Return the payload, on the outermost possible link, that explains all changes, or None."""
     std = np.sqrt(np.diag(covariance))
     if not len(std) or not np.all(std > 0.0):
         return None

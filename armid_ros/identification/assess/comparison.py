@@ -40,7 +40,7 @@ class ParameterChange:
 
     @property
     def difference(self) -> float:
-        """Return the second value minus the first value."""
+        """Return the parameter of the second identification minus that of the first."""
         return self.after - self.before
 
     @property
@@ -50,7 +50,7 @@ class ParameterChange:
 
     @property
     def deviations(self) -> float:
-        """Return the z-score of the difference; 0 or ±inf for values without uncertainty."""
+        """Return the z-score of the difference; 0 or ±inf if both standard deviations are 0."""
         if self.std > 0.0:
             return self.difference / self.std
         return float(np.copysign(np.inf if self.changed else 0.0, self.difference))
@@ -200,10 +200,10 @@ class Comparison:
     @property
     def factors(self) -> dict[str, float]:
         """
-        Return the ratio of new to old values of each joint, if nearly all values share a ratio.
+        Return the median ratio of new to old parameters per joint, if most ratios are similar.
 
         No load and no wear multiplies masses and friction of all joints by several times: the
-        torques of one result are in another unit, or currents. Empty without a shared ratio.
+        torques of one result are in another unit, or currents. Empty if the ratios differ.
 
         """
         # smallest z-score of a value whose ratio is used, smallest number of ratios, and share of
@@ -239,7 +239,7 @@ class Comparison:
 
     @property
     def changed_together(self) -> tuple[GroupChange, ...]:
-        """Return the groups that changed significantly although no single parameter did."""
+        """Return groups that changed significantly, although none of their parameters did."""
         sure = {change.parameter for change in self.changed}
         return tuple(g for g in self.groups if g.changed and not sure.intersection(g.parameters))
 

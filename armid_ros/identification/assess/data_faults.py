@@ -47,7 +47,7 @@ def check_data(
     before: Sequence[Recording] = (),
 ) -> tuple[list[str], list[str]]:
     """
-    Return the faults of recordings that make a diagnosis meaningless, and less serious notes.
+    Return faults of recordings that make a diagnosis meaningless, and notes on smaller faults.
 
     Both contain remedies. `data` are the regression rows of the recordings. The torques of the
     baseline `before` have the unit of the model.
@@ -150,7 +150,7 @@ def unit_faults(
 def _torque_ratios(
     arm: ArmModel, motions: Sequence[Motion], before: Sequence[Motion]
 ) -> FloatArray:
-    """Return measured over modelled torque of each joint, relative to a baseline; 0: unknown."""
+    """Return each joint's measured over modelled torque, relative to any baseline; 0: unknown."""
     best, factors = np.full((2, arm.robot.n_joints), 0.0)
     if not motions:
         return factors

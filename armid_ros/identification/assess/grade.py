@@ -142,7 +142,7 @@ def grade(
 def _torque_errors(
     result: Identification, worst: Mapping[str | None, _WorstJoint], held_out: Sequence[Fit]
 ) -> Iterator[Fault]:
-    """Yield the torque error of the worst joint, and joints whose torque is hardly predicted."""
+    """Yield reasons of a grade: largest torque error, and torques that are hardly predicted."""
     use = {
         'good': '',
         'poor': ', too large to compute torques',
@@ -190,7 +190,7 @@ def _torque_errors(
 
 
 class _WorstJoint(NamedTuple):
-    """Joint with the largest torque error [%]: index, error, error without noise, and text."""
+    """Joint with the largest torque error: index, error with and without noise [%], and text."""
 
     joint: int
     measured: float
@@ -199,7 +199,7 @@ class _WorstJoint(NamedTuple):
 
 
 def _worst_joint(errors: FloatArray, fits: Sequence[Fit], result: Identification) -> _WorstJoint:
-    """Return the joint with the largest torque error without noise."""
+    """Return the joint with the largest torque error after subtraction of sensor noise."""
     joints, beyond = result.arm.robot.joints, beyond_noise(errors, fits, result.used)
     moves = moving(fit.motion for fit in fits)
     worst = int(np.lexsort((np.where(moves, errors, -1.0), beyond))[-1])
@@ -214,7 +214,7 @@ def _worst_joint(errors: FloatArray, fits: Sequence[Fit], result: Identification
 
 
 def _resting(result: Identification, validation: Mapping[str, Sequence[Fit]]) -> Iterator[Fault]:
-    """Yield the joints that do not move, so that they are not identified or not validated."""
+    """Yield reasons of a grade: joints at rest, which are not identified or not validated."""
     fitted = moving(fit.motion for fit in result.training)
     held_out = [fit.motion for part in validation.values() for fit in part]
     checked = moving(held_out) if held_out else fitted
@@ -233,7 +233,7 @@ def _resting(result: Identification, validation: Mapping[str, Sequence[Fit]]) ->
 
 def beyond_noise(errors: FloatArray, fits: Sequence[Fit], used: Conditioning) -> FloatArray:
     """
-    Return the relative torque error of each joint without the share of white sensor noise [%].
+    Return the relative torque error of each joint after subtraction of white sensor noise [%].
 
     The noise is computed from the median of second differences (Gasser, Sroka and Jennen-Steinmetz
     1986): torques of motion change little from row to row, and friction jumps in few rows only.

@@ -83,7 +83,7 @@ WITHOUT_BODY = Hypothesis(
 
 def hypotheses(robot: Robot, motions: Sequence[Motion]) -> Iterator[Hypothesis]:
     """
-    Yield all possible mistakes in recorded motions of an arm, except torque delays.
+    Yield the hypotheses of mistakes to test in recorded motions, except torque delays.
 
     Only values beyond 2 pi are tested for degrees: even small angles in degrees exceed this.
 
@@ -157,7 +157,7 @@ def _gravity_and_scale(robot: Robot, motions: Sequence[Motion]) -> Iterator[Hypo
 
 
 def in_unit(robot: Robot, joint: int, unit: str) -> Hypothesis:
-    """Return the hypothesis that the torque of a joint is recorded in a given other unit."""
+    """Return the hypothesis that the torque of a joint is recorded in a given wrong unit."""
     wrong = FORCE_UNITS[unit] if robot.prismatic[joint] else unit
     right = robot.torque_units[joint]
     return Hypothesis(
@@ -257,7 +257,7 @@ def other_gravity(robot: Robot, vector: FloatArray) -> Hypothesis | None:
 
 
 def _zero_off(robot: Robot, joint: int, degrees: float) -> Hypothesis:
-    """Return the hypothesis that the zero of an encoder is wrong by an angle."""
+    """Return the hypothesis that the zero position of a joint's encoder is wrong by an angle."""
     shift = np.zeros(robot.n_joints)
     shift[joint] = -np.deg2rad(degrees)
     wrong = 180.0 - (180.0 - degrees) % 360.0
@@ -282,21 +282,21 @@ def _in_degrees(robot: Robot, joint: int | None = None) -> Hypothesis:
 
 
 def _beyond_masses(factor: float) -> bool:
-    """Return whether a torque factor is too large or small for wrong masses."""
+    """Return whether a factor of all torques is too large or small to be due to wrong masses."""
     return not 1.0 / LIMITS.torque_factor < factor < LIMITS.torque_factor
 
 
 def _scaling(
     robot: Robot, quantity: Quantity, joint: int | slice, factor: float
 ) -> Callable[[Motion], Motion]:
-    """Return a function that multiplies positions or torques of a motion by a factor."""
+    """Return a function that scales positions, torques or both of some joints in a motion."""
     scale = np.ones(robot.n_joints)
     scale[joint] = factor
     return partial(_transformed, quantity, np.diag(scale))
 
 
 def _transformed(quantity: Quantity, matrix: FloatArray, motion: Motion) -> Motion:
-    """Return a motion with the positions or torques of all joints multiplied by a matrix."""
+    """Return a motion whose positions, torques or both are multiplied by a matrix, (n, n)."""
     if quantity != 'torque':
         q, dq, ddq = (x @ matrix for x in (motion.q, motion.dq, motion.ddq))
         motion = replace(motion, q=q, dq=dq, ddq=ddq)

@@ -128,7 +128,7 @@ def shared_mistakes(
 
 
 class _Tested(NamedTuple):
-    """Tested hypothesis: prediction errors, and likelihood ratios over their limits."""
+    """Tested hypothesis: torque prediction errors, and likelihood ratios divided by limits."""
 
     hypothesis: Hypothesis
     described: PredictionError  # with the described links
@@ -163,7 +163,7 @@ def find_mistake(
         return None
 
     def rows(some: Sequence[Hypothesis]) -> list[_Tested]:
-        """Evaluate hypotheses; fit the links as well if their errors may change the decision."""
+        """Evaluate hypotheses; also fit links if errors of the links may change the decision."""
         found = []
         for one in some:
             after = _error(robot, slow, one, near=False)
@@ -209,7 +209,7 @@ def find_mistake(
 def _error(
     robot: Robot, slow: Sequence[Motion], one: Hypothesis, *, near: bool
 ) -> PredictionError | None:
-    """Return the torque error after a correction of the data; None for too few samples."""
+    """Return the torque error with the correction of a hypothesis; None for too few samples."""
     # 200 samples: twenty for each of the ten parameters of a link
     motion = thinned([one.motion(motion) for motion in slow], 200)
     if motion is None or len(motion) < _MIN_SAMPLES:
@@ -218,7 +218,7 @@ def _error(
 
 
 def _most_likely(rows: Sequence[_Tested], ratio: str, before: PredictionError) -> Mistake:
-    """Return the most likely mistake, with equally likely mistakes of other kinds."""
+    """Return the most likely mistake, with about equally likely mistakes of other kinds."""
     value = attrgetter(ratio)
     first, *others = sorted(rows, key=value, reverse=True)
     likely = {first.hypothesis.kind: first.hypothesis}
@@ -232,7 +232,7 @@ def _most_likely(rows: Sequence[_Tested], ratio: str, before: PredictionError) -
 
 
 def slow_motions(recordings: Sequence[Recording], used: Conditioning) -> list[Motion]:
-    """Return the uninterrupted motions of recordings, low-passed to the band of the motion."""
+    """Return uninterrupted parts of recordings, low-passed to the frequencies of the motion."""
     result = []
     for motion in (part for one in recordings for part in segments(one, used)):
         kept = np.array(decimated_samples(len(motion), used), dtype=np.intp)
@@ -253,7 +253,7 @@ class Delay(NamedTuple):
 
 def torque_delay(robot: Robot, recording: Recording, used: Conditioning) -> Delay | None:
     """
-    Return the delay of torques with its 95 % interval; None if the interval includes zero.
+    Return the delay of torques behind positions; None if its 95 % interval includes zero.
 
     A delay shifts the whole torque in time. Presliding friction delays only the friction: after a
     reversal it grows with the distance that the joint has travelled (Dahl 1968), which takes tens
@@ -287,7 +287,7 @@ def torque_delay(robot: Robot, recording: Recording, used: Conditioning) -> Dela
 
 
 def _delay_rows(robot: Robot, motion: Motion, used: Conditioning) -> tuple[FloatArray, ...]:
-    """Return regressor columns of joints, links and a delay, each (n, M, k), and the torques."""
+    """Return regressors of nuisance, link and delay parameters, (n, M, k), and the torques."""
     # presliding lengths of friction [rad or m], as in gears of arms, in steps of three to cover
     # all lengths between. On 63 recordings with lengths of 1 to 3 mrad, the delay errs by -1 to 6
     # ms (5 to 95 %). Lengths of 1 and 3 mrad alone err by 0 to 6 ms, 0.1 to 30 mrad by -3 to 6 ms.

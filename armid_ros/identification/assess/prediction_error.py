@@ -49,7 +49,7 @@ class PredictionError:
     off: float = 0.0
 
     def overall(self, robot: Robot) -> float:
-        """Return the larger error: that of all prismatic joints or that of all revolute joints."""
+        """Return the larger of two torque errors: of all prismatic and of all revolute joints."""
         residual = self.joints * self.torque
         return max(
             float(np.linalg.norm(residual[own]) / np.linalg.norm(self.torque[own]))
@@ -59,7 +59,7 @@ class PredictionError:
 
     def gain(self, better: PredictionError) -> float:
         """
-        Return the likelihood ratio of another prediction to this one, per independent sample.
+        Return the likelihood ratio of `better` to this prediction, per independent sample.
 
         The likelihood ratio of models with unknown noise is multiplied by the ratio of the
         priors of their links. Errors are limited to the range from the floor to the torque itself.
@@ -68,7 +68,7 @@ class PredictionError:
         return self.of_data(better) * float(np.exp((self.off - better.off) / (2.0 * FREEDOM)))
 
     def of_data(self, better: PredictionError) -> float:
-        """Return the likelihood ratio of another prediction without the priors of the links."""
+        """Return the likelihood ratio of `better` to this prediction, without priors of links."""
         before, after = (np.clip(x.joints, LIMITS.floor, 1.0) for x in (self, better))
         return float(np.prod(before / after))
 
@@ -84,7 +84,7 @@ def thinned(stretches: Sequence[Motion], rows: int) -> Motion | None:
 
 def prediction_error(robot: Robot, motion: Motion, *, near: bool) -> PredictionError:
     """
-    Return the torque error after a fit of friction, offset and drive inertia of every joint.
+    Return the torque error after a fit of each joint's friction, torque offset and drive inertia.
 
     Friction and drive inertia are bounded below by zero, so they cannot explain a torque of the
     opposite sign.
@@ -132,7 +132,7 @@ def prediction_error(robot: Robot, motion: Motion, *, near: bool) -> PredictionE
 
 def _nonnegative_fit(own: FloatArray, target_torque: FloatArray) -> FloatArray:
     """
-    Return nonnegative friction and drive inertia, and the offset, that fit each joint torque.
+    Fit nonnegative friction and drive inertia, and a torque offset, to the torque of each joint.
 
     The columns of each joint have shape (N, n, 4), the torques (N, n) and the values (n, 4). The
     joints are independent. The best feasible solution of eight sets of active bounds is used.
@@ -227,7 +227,7 @@ def root_mean_square(columns: FloatArray) -> FloatArray:
 
 
 def _friction_columns(motion: Motion) -> tuple[FloatArray, FloatArray]:
-    """Return weighted friction columns of each joint, (N, n, 4), and their weights, (N, n)."""
+    """Return each joint's weighted regressor of friction, (N, n, 4), and the weights, (N, n)."""
     dq, ddq = motion.dq, motion.ddq
     columns = np.stack([np.ones_like(dq), dq, np.sign(dq), ddq], axis=-1)
     # Weights are zero where a joint rests or reverses: dry friction is arbitrary there, and

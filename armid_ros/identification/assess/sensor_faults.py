@@ -63,7 +63,7 @@ def sensor_faults(
     arm: ArmModel, recordings: Sequence[Recording], rows: Sequence[Stretch], used: Conditioning
 ) -> Iterator[Fault]:
     """
-    Yield faults of clocks and sensors, and undriven joints that are not where the model has them.
+    Yield faults of clocks and sensors, and undriven joints that are not at modelled positions.
 
     The recordings have torques and no damaged samples (see `damage`); `rows` are the regression
     rows of the same recordings.
@@ -92,7 +92,7 @@ def sensor_faults(
 
 
 def _jumps(robot: Robot, recording: Recording) -> Iterator[Fault]:
-    """Yield the first impossible jump of a joint position; `damage` repairs single samples."""
+    """Yield the first impossible, lasting jump of a position; `damage` repairs single samples."""
     if len(recording) < 2:
         return
     # a step is no motion if it is ten times as fast as the limit and as 99 % of all steps
@@ -113,7 +113,7 @@ def _jumps(robot: Robot, recording: Recording) -> Iterator[Fault]:
 
 
 def encoder_faults(recording: Recording, units: Sequence[str] | None) -> Iterator[Fault]:
-    """Yield position and velocity channels that stay constant while the joint moves."""
+    """Yield faults of position or velocity channels that stay constant while the joint moves."""
     if recording.dq is None:
         return
     t, units = recording.t, units or ('rad',) * recording.n_joints
@@ -157,7 +157,7 @@ def encoder_faults(recording: Recording, units: Sequence[str] | None) -> Iterato
 def torque_faults(
     arm: ArmModel, recording: Recording, motions: Sequence[Motion]
 ) -> Iterator[Fault]:
-    """Yield torque channels that stay constant while the motion requires a varying torque."""
+    """Yield faults of torque channels that stay constant while the load of the joint varies."""
     assert recording.tau is not None
     if np.all(np.ptp(recording.tau, axis=0) < NOTHING):
         yield Fault(SILENT, 'unusable', recording.source)
@@ -190,7 +190,7 @@ def units_beyond_drives(
     robot: Robot, recordings: Sequence[Recording], motions: Sequence[Motion]
 ) -> Iterator[str]:
     """
-    Yield notes on joints whose torques exceed the drive limit so far that their unit is wrong.
+    Yield notes on joints whose torques exceed the drive limit so far that the unit must be wrong.
 
     There is no note if most joints exceed their limits, or if the described links need as much
     torque along the filtered motions: then the described limits are wrong.
@@ -234,7 +234,7 @@ def _constant_channel(
 
 
 def _longest_constant(reading: FloatArray, step: float = 0.0) -> tuple[int, int]:
-    """Return the index range of the longest run of samples without a step above ``step``."""
+    """Return the index range of the longest run of samples without a change above ``step``."""
     edges = np.flatnonzero(np.abs(np.diff(reading)) > step) + 1
     bounds = np.concatenate([[0], edges, [len(reading)]])
     longest = int(np.argmax(np.diff(bounds)))
@@ -243,7 +243,7 @@ def _longest_constant(reading: FloatArray, step: float = 0.0) -> tuple[int, int]
 
 def velocity_ratio(recording: Recording) -> tuple[FloatArray, FloatArray]:
     """
-    Return the ratio of recorded velocities to the rates of the positions, and its correlation.
+    Return the ratio of recorded velocities to the rates of the positions, and their correlation.
 
     The integral of a velocity is compared with the position, so that noise and steps of positions
     and jitter of time stamps do not matter.
@@ -287,7 +287,7 @@ def velocity_ratio(recording: Recording) -> tuple[FloatArray, FloatArray]:
 
 def velocity_faults(recording: Recording) -> Iterator[Fault]:
     """
-    Yield velocities that disagree with the positions in time base, unit or sign.
+    Yield faults of velocities that disagree with the positions in time base, unit or sign.
 
     Identification differentiates the positions, so a wrong unit or sign of velocities is harmless.
     A wrong time base needs at least two joints that agree, and no moving joint that disagrees.

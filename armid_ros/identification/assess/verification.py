@@ -91,7 +91,7 @@ class ForwardScore:
 
 @dataclass(frozen=True, eq=False)
 class _RecordedTorque(Controller):
-    """Controller with recorded torque, and inertia-scaled feedback to the recorded motion."""
+    """Controller that adds inertia-scaled feedback to the recorded torque of a motion."""
 
     motion: Motion
     feedback: LinearFeedback
@@ -106,7 +106,7 @@ class _RecordedTorque(Controller):
 def _forward_score(
     arm: ArmModel, recording: Recording, used: Conditioning, nominal: ArmModel, duration: float
 ) -> ForwardScore:
-    """Simulate an arm driven by the recorded torques, with the feedback of a nominal model."""
+    """Simulate an arm driven by recorded torques, with a feedback that a nominal model defines."""
     motion = next(iter(segments(recording, used)), None)
     if motion is None:
         raise IdentificationError(f'{recording.source}: no stretch is long enough to be filtered')
@@ -205,7 +205,7 @@ class ForwardValidation:
 @dataclass(frozen=True)
 class Verification:
     """
-    Results of the tests of an identified model: encoder noise, and simulations.
+    Results of the tests of an identified model: bias by encoder noise, and simulations.
 
     Attributes
     ----------
@@ -233,7 +233,7 @@ def verify(
     progress: Progress = lambda share, what: None,
 ) -> Verification:
     """
-    Test a model for bias by encoder noise, and simulate it along held-out recordings.
+    Test an identified model for bias by encoder noise, and simulate held-out recordings with it.
 
     Parameters
     ----------
