@@ -48,7 +48,7 @@ _MIN_EIGENVALUE = 1e-9
 @dataclass(frozen=True, eq=False)
 class Block:
     """
-    Normal equations of the whitened regression rows of a quarter of a second.
+    Normal equations of a block: regression rows of a quarter of a second, scaled to unit noise.
 
     Attributes
     ----------
@@ -85,7 +85,7 @@ class Block:
 @dataclass(frozen=True, eq=False)
 class ScoreStatistics:
     """
-    Information and score of Q possible changes in a window of blocks.
+    Information matrix and score vector of Q possible changes in a window of blocks.
 
     Attributes
     ----------
@@ -144,7 +144,7 @@ def score_statistics(
     residual_scale: float = 1.0,
 ) -> Pieces[ScoreStatistics]:
     """
-    Compute the information and score of possible changes in a window, in short pieces.
+    Compute information matrix and score of possible changes in a window, in short pieces.
 
     Parameters
     ----------
@@ -231,7 +231,7 @@ class ChangeSearch:
         self._chance = chance / (len(self._sizes) * len(_WINDOW_LENGTHS))
 
     def reset(self) -> None:
-        """Clear the calibration and all blocks."""
+        """Clear the calibrated critical values and all blocks of samples."""
         places = {c.joint for c in self._candidates}
         self._calibrations = {
             m: NullCalibration(self._sizes.tolist(), m, len(places)) for m in _WINDOW_LENGTHS
@@ -246,7 +246,7 @@ class ChangeSearch:
 
     def take(self, block: Block, residual_scale: float) -> Pieces[FoundChange | None]:
         """
-        Add a block, and return a significant change; None if there is none.
+        Add a block of samples, and return a significant change of the arm; None without a change.
 
         Parameters
         ----------
@@ -288,7 +288,7 @@ class ChangeSearch:
         after: Sequence[Block],
         residual_scale: float,
     ) -> Pieces[Estimate]:
-        """Return the estimated size of a change between one block and later blocks."""
+        """Return the estimated size of a candidate change between a block and later blocks."""
         window = yield from score_statistics(after, before, self.directions, residual_scale)
         yield
         number = self._candidates.index(candidate)
@@ -299,7 +299,7 @@ class ChangeSearch:
         return Estimate(candidate.parameters, values, covariance * usual)
 
     def _find_onset(self, residual_scale: float) -> Pieces[FoundChange | None]:
-        """Return the change with its onset and cause; None while they are ambiguous."""
+        """Return the change with its onset and cause; None while onset or cause is ambiguous."""
         # difference of log-likelihoods from which one explanation is clearly better
         clear = 5.0
         rows, blocks = [], list(self._blocks)

@@ -43,7 +43,7 @@ Item = TypeVar('Item')
 
 class Row(NamedTuple):
     """
-    Filtered sample of the estimator, with the motion that gives its friction columns.
+    Filtered sample for the estimator, with the motion from which friction columns are computed.
 
     Attributes
     ----------
@@ -135,7 +135,7 @@ class NuisanceRows:
 
 @dataclass(eq=False)
 class _Stretch:
-    """Samples of one block that are not searched yet; `end` is None before an interruption."""
+    """Samples of a block not yet searched; the time `end` is None before an interruption."""
 
     begin: float
     end: float | None = None
@@ -188,7 +188,7 @@ class ChangeWatch:
         self.reset()
 
     def reset(self) -> None:
-        """Clear the noise level and the changes; no background computation may be pending."""
+        """Clear noise level and detected changes; no background computation may be pending."""
         self.changes: list[Change] = []
         self._wider.reset()
         self._search.reset()
@@ -202,7 +202,7 @@ class ChangeWatch:
 
     def use(self, false_alarm_time: float | None, forgetting: float) -> None:
         """
-        Change the false-alarm time and the forgetting factor, and keep the estimate.
+        Set the mean time between false alarms and the forgetting factor, and keep the estimate.
 
         Parameters
         ----------
@@ -223,7 +223,7 @@ class ChangeWatch:
         self._queue(None)
 
     def update(self, row: Row) -> None:
-        """Update the estimator with one sample, and queue the sample for the search."""
+        """Update the estimator with a sample, and queue the sample for the change search."""
         if self._open is not None and row.t - self._open.begin >= BLOCK_LENGTH:
             self._queue(row.t)
         if self._open is None:
@@ -232,12 +232,12 @@ class ChangeWatch:
         self._estimator.update(*row.sample)
 
     def _with_nuisance(self, directions: FloatArray) -> FloatArray:
-        """Return directions of the parameters with zeros for the nuisance parameters."""
+        """Return directions of the parameters, extended by zeros for the nuisance parameters."""
         more = len(self._wider.parameters) - self._count
         return np.vstack([directions, np.zeros((more, directions.shape[1]))])
 
     def _queue(self, end: float | None) -> None:
-        """Queue the present block for the search, and start the search if it is idle."""
+        """Queue the present block for the change search, and start the search if it is idle."""
         assert self._open is not None
         self._open.end = end
         self._queued.append(self._open)
@@ -267,7 +267,7 @@ class ChangeWatch:
             self._searching = False
 
     def _unsearched(self) -> list[Row]:
-        """Remove and return all samples that are not searched yet."""
+        """Remove and return all samples that were not yet searched for changes."""
         stretches = (*self._queued, *([self._open] if self._open else ()))
         self._queued.clear()
         self._open = None
@@ -285,7 +285,7 @@ class ChangeWatch:
         return 4 if self._estimator.forgetting < 1.0 else _SAMPLES_PER_PIECE
 
     def _widened(self, rows: Sequence[Row]) -> Pieces[list[WeightedSample]]:
-        """Return successive samples with the columns of the nuisance parameters added."""
+        """Return samples whose regressor rows also have the columns of the nuisance parameters."""
         samples: list[WeightedSample] = []
         if not rows:
             return samples
@@ -341,7 +341,7 @@ class ChangeWatch:
         )
 
     def _apply(self, found: FoundChange) -> Job:
-        """Return to the state before a change, forget the changed directions, add the change."""
+        """Restore the state before a change, forget changed directions, repeat later samples."""
         change, before, after = found
         size, directions = change.size, change.changed_directions
         self._wider.restore(before.before)
@@ -370,6 +370,6 @@ class ChangeWatch:
 
 
 def _parts(items: Sequence[Item], size: int) -> Iterator[Sequence[Item]]:
-    """Yield successive slices of at most a given size."""
+    """Yield successive slices of a sequence, each of at most `size` items."""
     for first in range(0, len(items), size):
         yield items[first : first + size]

@@ -13,7 +13,7 @@ import numpy as np
 
 class StreamChecks:
     """
-    Faults of a stream that prevent identification, such as constant torques or wrong units.
+    Checks of a stream of joint states for faults, such as constant torques or wrong units.
 
     Parameters
     ----------
@@ -83,13 +83,13 @@ class MissingSamples:
         self.reset()
 
     def reset(self) -> None:
-        """Set the count to zero."""
+        """Set the count of missing samples to zero."""
         self.count = 0
         self._last: float | None = None
         self._doubtful = 0
 
     def take(self, t: float, period: float | None) -> None:
-        """Add the timestamp of a sample [s], with the sampling period if it is known."""
+        """Update the count with a timestamp [s] and, if it is known, the sampling period [s]."""
         last = self._last
         # a timestamp more than 1 s before the last one belongs to a restarted clock
         if last is not None and last - 1.0 < t <= last:
@@ -110,7 +110,7 @@ class MissingSamples:
             self._doubtful = 0
 
     def _subtract_late(self) -> None:
-        """Reduce the count by a sample that was missing and arrives late."""
+        """Reduce the count of missing samples by 1 for a sample that arrives late."""
         if self._doubtful:
             self._doubtful -= 1
             self.count -= 1

@@ -225,13 +225,13 @@ class OnlineIdentifier:
         return self.latest[-1] if self.latest else None
 
     def __getstate__(self) -> dict[str, Any]:
-        """Finish pending computations, as generators cannot be copied."""
+        """Finish pending computations, as generators cannot be copied, and return the state."""
         self._add_pending_row()
         self._work.finish()
         return self.__dict__
 
     def _process(self, sample: StreamSample) -> OnlineSample | None:
-        """Filter a valid joint state, and return its torque prediction if it is used."""
+        """Filter a valid joint state; return its torque prediction, or None if it is not used."""
         if sample.begins:
             self._filter.restart('position_step')
         self._checks.take(sample.t)
@@ -360,7 +360,7 @@ class OnlineIdentifier:
 
     @property
     def spikes(self) -> Mapping[tuple[str, str], int]:
-        """Return the number of joint states left out for spikes of each joint and signal."""
+        """Return, for each joint and signal, the number of joint states left out for a spike."""
         joints = self.arm.robot.joints
         signals = ('position', *(['velocity'] * self.settings.measured_velocity), 'effort')
         names = [(joint, signal) for signal in signals for joint in joints]
@@ -432,7 +432,7 @@ class OnlineIdentifier:
 
     @property
     def _negligible_error(self) -> FloatArray:
-        """Return the largest error of a signal that does not matter: 0 except for torques."""
+        """Return the largest negligible error of each signal, which is 0 except for torques."""
         n = self.arm.robot.n_joints
         if self._filter.pole is None:
             return np.zeros((3 if self.settings.measured_velocity else 2) * n)

@@ -83,7 +83,7 @@ class LearningProgress:
 
     def unidentified(self, t: float, estimate: Estimate) -> tuple[Unlearned, ...]:
         """
-        Return the parameters of each joint whose uncertainty has not fallen for ten seconds.
+        Return each joint's parameters whose standard deviation has hardly fallen for ten seconds.
 
         Parameters
         ----------

@@ -28,7 +28,7 @@ MAX_BLOCKS = 240
 
 class History:
     """
-    Buffer of constant size for the latest rows of numbers.
+    Buffer for the latest rows of a table of numbers, with a limited number of rows.
 
     Parameters
     ----------
@@ -113,7 +113,7 @@ class NullCalibration:
 
     def update(self, ratios: FloatArray, strength: FloatArray) -> Job:
         """
-        Update the calibration with a window without a change, in pieces.
+        Update the critical values with a window in which the arm did not change, in pieces.
 
         Parameters
         ----------
@@ -140,7 +140,7 @@ class NullCalibration:
         yield from self._fit_factors(self._ratios.values[len(self._ratios) // 4 :])
 
     def _fit_factors(self, later: FloatArray) -> Job:
-        """Compute the factors from the statistics of earlier windows; 0 means no data."""
+        """Compute the factors of the test statistics from earlier windows; 0 means no data."""
         counts = np.sum(later > 0.0, axis=0)
         independent = counts / self._overlap
         valid = independent >= 12.0  # too few independent windows for a test
@@ -207,7 +207,7 @@ class NullCalibration:
 
 
 def _in_pieces(values: FloatArray) -> Iterator[slice]:
-    """Yield slices of the columns, each small enough for one piece of work."""
+    """Yield slices of the columns of an array, each small enough for one piece of work."""
     width = max(1, 4_000 // max(1, len(values)))
     for first in range(0, values.shape[1], width):
         yield slice(first, first + width)
@@ -234,7 +234,7 @@ class ResidualScale:
 
     @property
     def value(self) -> FloatArray:
-        """Return the scale of each joint relative to the assumed noise, (m,); initially 1."""
+        """Return the standard deviation of residuals over the assumed noise, (m,); initially 1."""
         return np.ones(1) if self._value is None else self._value
 
     def learn(self, residual: FloatArray, weights: FloatArray) -> None:

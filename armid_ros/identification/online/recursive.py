@@ -139,7 +139,7 @@ class RecursiveLeastSquares:
         return fewer
 
     def reset(self) -> None:
-        """Forget all samples."""
+        """Forget all samples, and return to the prior mean."""
         self.samples = 0
         root = np.asfortranarray(np.eye(len(self._start)) / PRIOR_STD)
         self._take(root, self._start)
@@ -212,7 +212,7 @@ class RecursiveLeastSquares:
             self.update(*(np.concatenate(part) for part in zip(*samples, strict=True)))
 
     def scale(self, weights: FloatArray) -> FloatArray:
-        """Return the factors that give rows of given weights unit noise, shape (m,) [1/(N m)]."""
+        """Return the factors that scale the noise of weighted rows to 1, shape (m,) [1/(N m)]."""
         return np.asarray(np.sqrt(weights) / self._noise)
 
     def copied(self) -> RecursiveLeastSquares:
@@ -229,7 +229,7 @@ class RecursiveLeastSquares:
 
     def forget_directions(self, directions: FloatArray) -> None:
         """
-        Forget the information on some directions of the parameters.
+        Forget the information on some combinations of parameters.
 
         Parameters
         ----------
@@ -261,7 +261,7 @@ class RecursiveLeastSquares:
 
     @property
     def root(self) -> FloatArray:
-        """Return the triangle R of the information R^T R, shape (P, P); updates overwrite it."""
+        """Return the triangular factor R of the information matrix R^T R; updates overwrite R."""
         return self._root
 
     @property
@@ -298,14 +298,14 @@ class RecursiveLeastSquares:
         return Estimate(self.parameters, self._values.copy(), self.covariance)
 
     def _take(self, root: FloatArray, values: FloatArray) -> None:
-        """Set the triangle and the estimate, with R theta computed from them."""
+        """Set the triangle R and the estimate theta, and compute R theta from them."""
         self._root, self._values = root, values
         self._right = np.asfortranarray((root @ values)[:, np.newaxis])
 
 
 def forget_and_add(root: FloatArray, rows: FloatArray, forgetting: float) -> FloatArray:
     """
-    Return R with the information of new rows, and less old information in their directions.
+    Add the information of rows to the triangle R, and forget old information in their directions.
 
     In the directions b of U = rows R^-1 = A diag(s) B^T the old information, 1, becomes
     1 - f + s^2 with f = min(s^2, level). It never falls, so the new triangle is the old one

@@ -65,7 +65,7 @@ class RobustCovariance:
         self.reset()
 
     def reset(self) -> None:
-        """Clear all sums; no background computation may be pending."""
+        """Clear all sums of Fourier products; no background computation may be pending."""
         self._settled: _Bands | None = None
         self._latest: _Bands | None = None
         self._shape: tuple[FloatArray, FloatArray] | None = None
@@ -117,7 +117,7 @@ class RobustCovariance:
         self._work.begin(self._subtract_change(directions, values))
 
     def _add_window(self, columns: FloatArray, values: FloatArray) -> Job:
-        """Add a window of k regressor rows and torques, shape (m, k, P + 1), to the sums."""
+        """Add the products of a window of regressors and torques, (m, k, P + 1), to the sums."""
         window = yield from _transformed(columns)
         if not window.counts.any():
             return
@@ -144,7 +144,7 @@ class RobustCovariance:
         self._latest = window
 
     def _subtract_change(self, directions: FloatArray, values: FloatArray) -> Job:
-        """Fit a parameter change along directions, and subtract its torque from earlier sums."""
+        """Fit a parameter change in given directions; remove its torque from earlier sums."""
         self._latest = None
         if self._settled is None:
             return
@@ -186,7 +186,7 @@ class RobustCovariance:
 
 
 def _sum(some: _Bands, more: _Bands) -> Pieces[_Bands]:
-    """Return the sums of two sets of products, computed in pieces."""
+    """Return the sum of two sets of Fourier products, computed in pieces."""
     products = np.empty_like(some.products)
     for place, first, second in zip(products, some.products, more.products, strict=True):
         np.add(first, second, out=place)
@@ -195,7 +195,7 @@ def _sum(some: _Bands, more: _Bands) -> Pieces[_Bands]:
 
 
 def _transformed(columns: FloatArray) -> Pieces[_Bands]:
-    """Return the products of a window [W, y], shape (m, k, P + 1), in frequency octaves."""
+    """Return the Fourier products of a window of rows and torques, (m, k, P + 1), per octave."""
     # number of columns transformed in one piece of work
     at_once = 24
     joints, count, size = columns.shape
@@ -223,7 +223,7 @@ def _transformed(columns: FloatArray) -> Pieces[_Bands]:
 
 
 def _shape(bands: _Bands, values: FloatArray) -> Pieces[tuple[FloatArray, FloatArray]]:
-    """Return a root of R_M^-T J R_M^-1, R_M^T R_M = M, and factors of the standard deviations."""
+    """Return a root of the score covariance J, whitened by M, and factors of the deviations."""
     # level of the upper end of an interval
     level = 0.975
     # The noise power in a band is that of the residuals, corrected for the degrees of freedom of
@@ -271,7 +271,7 @@ def _shape(bands: _Bands, values: FloatArray) -> Pieces[tuple[FloatArray, FloatA
 
 
 def _triangle(information: FloatArray) -> FloatArray:
-    """Return R with R^T R = information; smaller eigenvalues are raised to the ridge."""
+    """Return triangular R, R^T R = information; eigenvalues below the ridge are raised to it."""
     try:
         return np.asarray(linalg.cholesky(information))
     except linalg.LinAlgError:
