@@ -26,7 +26,7 @@ _REST = 0.25
 
 class ArmWatch:
     """
-    Subscription to joint_states that supervises positions, their age and their stamps.
+    Subscription to joint_states that supervises joint positions, and age and stamps of messages.
 
     Attributes
     ----------
@@ -81,7 +81,7 @@ class ArmWatch:
         return np.array([known.get(joint, math.nan) for joint in self._joints])
 
     def now(self) -> float:
-        """Return the time of the steady or the simulated clock, for the age of messages [s]."""
+        """Return the time of a steady clock, or of /clock if used, for the age of messages [s]."""
         return self._age_clock(self._node.get_clock().now().nanoseconds)
 
     def catch_up(self) -> None:
@@ -146,7 +146,7 @@ class ArmWatch:
         )
 
     def _age_clock(self, clock_ns: int) -> float:
-        """Return `now` for a time of the node's clock [ns]."""
+        """Return the time of `now` [s] for a time of the node's clock [ns]."""
         if not self._node.get_clock().ros_time_is_active:
             return float(self._steady.now().nanoseconds * 1e-9)
         return (clock_ns - self._stepped_ns) * 1e-9

@@ -188,7 +188,7 @@ class BagPlayerNode(ArmidNode):
 
     @property
     def position(self) -> float:
-        """Return the time of the bag since its first message [s]."""
+        """Return the playback time since the first message of the bag [s]."""
         return (self._position - self._first) * 1e-9
 
     def play(self) -> None:

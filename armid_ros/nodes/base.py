@@ -151,7 +151,7 @@ class ArmidNode(Node):
         self._trouble_logged = bool(trouble)
 
     def warn_of_unknown(self) -> None:
-        """Log parameters that were given at the start and that the node does not have."""
+        """Log the parameters that were given at the start but do not exist in the node."""
         known = self.get_parameters_by_prefix('')
         given = [name for name in overrides(self) if not name.startswith('qos_overrides.')]
         wrong = [name for name in given if name not in known]
@@ -233,7 +233,7 @@ class ArmidNode(Node):
         return text
 
     def value(self, parameter: str) -> Any:
-        """Return the value of a parameter; empty names are removed from a list."""
+        """Return the value of a parameter; empty texts are removed from a list of texts."""
         value = self.get_parameter(parameter).value
         is_list = isinstance(value, list) and all(isinstance(one, str) for one in value)
         return tuple(filter(None, value)) if is_list else value

@@ -32,7 +32,7 @@ class Complaints:
     """
 
     def __init__(self, logger: RcutilsLogger) -> None:
-        """Log the messages with the logger of a node."""
+        """Log messages about rejected inputs with the logger of a node."""
         self._logger = logger
         self.counts: Counter[str] = Counter()
         self._logged: dict[str, set[str]] = {}

@@ -141,7 +141,7 @@ class ExcitationPublisherNode(ArmidNode):
         return elapsed if on_the_way else None
 
     def poll(self) -> None:
-        """Start the run once controller and joint states are available; stop it if one is lost."""
+        """Start a run once controller and joint states are there; stop it if either is lost."""
         self._controller.poll()
         now, patience = self._arm.now(), self.value('state_timeout')
         if self.elapsed is not None:
@@ -169,7 +169,7 @@ class ExcitationPublisherNode(ArmidNode):
                 self.get_logger().warning(f'{missing}; call ~/start when this is solved')
 
     def start(self) -> str:
-        """Plan the path from the measured position, and start the run."""
+        """Plan the path from the measured position to the excitation, and start the run."""
         return self._start(self.value('speed_scaling'))
 
     def rehearse(self) -> str:
@@ -181,7 +181,7 @@ class ExcitationPublisherNode(ArmidNode):
         return f'rehearsal at {100.0 * speed:.0f} % of the speed: {text}'
 
     def _start(self, speed: float) -> str:
-        """Plan a run at a share of the planned speed, and send it to the controller."""
+        """Plan a run at a share of the excitation's speed, and send it to the controller."""
         self._waiting = False
         if self.elapsed is not None:
             raise TrajectoryError('the excitation is under way; ~/stop ends it')
@@ -232,7 +232,7 @@ class ExcitationPublisherNode(ArmidNode):
         return self._arm.fault_at_start(patience, difference, self._simulated)
 
     def stop(self) -> str:
-        """Stop the arm on its path, or again if it still moves after a stop."""
+        """Stop the arm on its path, or send the stop again if the arm still moves after it."""
         self._waiting = False
         if self._gate is not None:
             elapsed = self._arm.now() - self._begun
@@ -324,7 +324,7 @@ class ExcitationPublisherNode(ArmidNode):
         return super().guarded(stopping, source)
 
     def _on_state(self, now: float) -> None:
-        """Compare the measured positions and efforts with the run; stop the arm if they differ."""
+        """Compare measured with planned positions and efforts; stop the arm if they differ."""
         if 0.0 <= now - self._tracked < 0.005:  # often enough
             return
         self._tracked = now
@@ -411,7 +411,7 @@ class ExcitationPublisherNode(ArmidNode):
             self._finish_run(gate)
 
     def _report_rehearsal(self, rehearsal: Rehearsal) -> None:
-        """Log the tracking errors and torques of a rehearsal, and the next step."""
+        """Log the tracking errors and torques of a rehearsal, and advise the next step."""
         self._rehearsal = None
         report, surprises = rehearsal.report()
         if surprises:
@@ -421,7 +421,7 @@ class ExcitationPublisherNode(ArmidNode):
             self._rehearsed = self.log(f'rehearsed: {report}; {advice}')
 
     def _on_experiment(self, message: String) -> None:
-        """Load the excitation of a message on experiment; only ~/start runs it."""
+        """Load an excitation from the topic experiment; only ~/start runs it."""
         if self.elapsed is not None or self._waiting:
             raise TrajectoryError(
                 'an excitation is under way or begins soon; the new excitation is ignored'

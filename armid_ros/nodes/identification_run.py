@@ -125,7 +125,7 @@ class IdentificationRunNode(ArmidNode):
 
     @property
     def finished(self) -> bool:
-        """Whether all steps are done, or one step has failed."""
+        """Whether all steps are done, or a step has failed."""
         return self._done
 
     @property
@@ -178,7 +178,7 @@ class IdentificationRunNode(ArmidNode):
         self._begun = []
 
     def _steps(self) -> Iterator[Wait]:
-        """Yield the name of each step, with the condition to wait for."""
+        """Yield each step's name, and a function that returns whether the step is complete."""
         deadline = time.monotonic() + self.value('patience')
         yield (
             'waits for the other nodes',
@@ -206,7 +206,7 @@ class IdentificationRunNode(ArmidNode):
             yield from self._run_command('diagnose', folder, bags, *model)
 
     def _run_excitation(self, service: str, name: str = 'rehearsal') -> Iterator[Wait]:
-        """Call a service of the publisher until it starts a run, and wait for its end."""
+        """Call a service of excitation_publisher until a run starts, and wait for its end."""
         before = int(self._state.get('runs', 0))
         deadline = time.monotonic() + self.value('patience')
         while True:

@@ -40,7 +40,7 @@ ROBOT_PARAMETERS = (
 
 class ListeningNode(ArmidNode):
     """
-    Node that processes the joint states of one robot, from parameters or robot_description.
+    Node that processes the joint states of the robot of its parameters or of robot_description.
 
     Attributes
     ----------
@@ -103,7 +103,7 @@ class ListeningNode(ArmidNode):
 
     @property
     def awaited(self) -> str:
-        """Return a text on the input that the node waits for; empty if all have arrived."""
+        """Return a text on the input that the node waits for; empty if all inputs have arrived."""
         if self.robot is None:
             return 'waiting for robot_description'
         return '' if self.received else 'no joint states so far'
@@ -138,7 +138,7 @@ class ListeningNode(ArmidNode):
         self.complaints.add(reason, '; '.join(filter(None, parts)))
 
     def poll(self) -> None:
-        """Match the publishers of joint states; report when joint states stop or resume."""
+        """Match the QoS of publishers of joint states; report when joint states stop or resume."""
         self.joint_states.match()
         if self.freshness.stopped != self._stopped:
             self._stopped = self.freshness.stopped

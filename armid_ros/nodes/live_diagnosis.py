@@ -180,7 +180,7 @@ class LiveDiagnosisNode(ListeningNode):
         return f'planning a motion; it will be published on {self._runs.topic_name}'
 
     def poll(self) -> None:
-        """Match the publishers of joint states, and process results of the diagnosis process."""
+        """Match the QoS of joint-state publishers; process results of the diagnosis process."""
         super().poll()
         self.take_answer()
 
@@ -282,12 +282,12 @@ class LiveDiagnosisNode(ListeningNode):
         self._adopt(self._described(urdf))
 
     def _settings(self, values: Mapping[str, Any]) -> LiveSettings:
-        """Return the settings that the parameters describe, with some new values."""
+        """Return the settings that the ROS parameters define, with some new values."""
         names = (*(entry.name for entry in LIVE_SETTINGS), 'learning')
         return LiveSettings(**{name: values.get(name, self.value(name)) for name in names})
 
     def _described(self, description: str | None = None) -> LiveDiagnosis:
-        """Return the schedule of diagnoses for a URDF text, or for the robot of the parameters."""
+        """Return the diagnosis schedule of a URDF text, or of the robot that a parameter names."""
         robot = model = None
         if description is not None or self.value('robot'):
             robot = self.described_robot(description)

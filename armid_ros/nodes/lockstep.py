@@ -213,6 +213,6 @@ class Stage(ExitStack):
 
 
 def matched(learner: OnlineIdentifierNode) -> bool:
-    """Match the publishers of joint states; return whether there is a publisher."""
+    """Match the QoS of publishers of joint states; return whether there is a publisher."""
     learner.joint_states.match()
     return learner.joint_states.publishers > 0

@@ -99,7 +99,7 @@ class OnlineIdentifierNode(ListeningNode):
     )
 
     def __init__(self, identifier: OnlineIdentifier | None = None, **kwargs: Any) -> None:
-        """Make the node; without an identifier, its parameters describe the identifier."""
+        """Make the node; by default, its ROS parameters define the identifier."""
         super().__init__('online_identifier', **kwargs)
         self.identifier: OnlineIdentifier | None = None
         self.update_times: deque[float] = deque(maxlen=2000)
@@ -258,13 +258,13 @@ class OnlineIdentifierNode(ListeningNode):
         return replace(identifier.settings, **can_change)
 
     def _described(self, description: str | None = None) -> OnlineIdentifier:
-        """Return the identifier for a URDF text, or for the robot of the parameters."""
+        """Return the identifier for a URDF text, or for the robot that a parameter names."""
         arm = ArmModel.of(self.described_robot(description), effects=self.value('effects'))
         settings = self._online_settings(arm, {})
         return OnlineIdentifier(arm, settings, rng=np.random.default_rng(0))
 
     def _online_settings(self, arm: ArmModel, values: Mapping[str, Any]) -> OnlineSettings:
-        """Return the settings that the parameters describe, with some new values."""
+        """Return the settings that the ROS parameters define, with some new values."""
 
         def value(name: str) -> Any:
             return values.get(name, self.value(name))
@@ -292,7 +292,7 @@ class OnlineIdentifierNode(ListeningNode):
         self._begin(self._described(urdf))
 
     def _on_model(self, message: String) -> None:
-        """Restart with the effects of a received model if they are new."""
+        """Restart the identification with the effects of a received model if they are new."""
         # Effects from the parameters are kept, even if the model lacks them.
         before = self._require()
         arm = read_model(message.data, before.arm.robot, 'model')
@@ -340,7 +340,7 @@ class OnlineIdentifierNode(ListeningNode):
             publisher.publish(message)
 
     def _begin(self, identifier: OnlineIdentifier) -> None:
-        """Use an identifier, whose effects later models do not remove."""
+        """Use an identifier; models that arrive later do not remove its effects."""
         self._own_effects = identifier.arm.effects
         self._adopt(identifier)
 

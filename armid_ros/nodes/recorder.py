@@ -209,7 +209,7 @@ class RecorderNode(ArmidNode):
         return {self.resolve_topic_name(name) for name in self.value('topics')}
 
     def _is_wanted(self, topic: str) -> bool:
-        """Return whether a topic is recorded; hidden topics are not, unless they are named."""
+        """Return whether to record a topic; hidden topics only if a parameter names them."""
         return topic in self._wanted if self._wanted else '/_' not in topic
 
     def _record(self, writer: BagWriter, topic: str, types: Sequence[str]) -> None:

@@ -74,7 +74,7 @@ class _ElasticTopics:
             self._imus.append((_measurement_publisher(node, Imu, imu_topic(link)), message))
 
     def publish(self, sample: LinkSample, stamp: TimeMessage) -> None:
-        """Publish the measurements of all links at one time."""
+        """Publish the measurements of all links and drives with the same stamp."""
         for (publisher, message), q, dq in (
             (self._link, sample.q, sample.dq),
             (self._reference, sample.asked_q, sample.asked_dq),
@@ -170,7 +170,7 @@ class SimulatedArmNode(ArmidNode):
         self.offer('~/reset', self.reset)
 
     def _described(self) -> SimulatedArm:
-        """Return the simulated arm that the parameters describe."""
+        """Return the simulated arm that the ROS parameters define."""
         gravity, drives = self.value('gravity'), None
         if self.value('model'):
             arm = load_model(self.value('model'))
@@ -330,7 +330,7 @@ class SimulatedArmNode(ArmidNode):
         self._arm.sensors = replace(self._arm.sensors, **known)
 
     def _with_effects(self, texts: Sequence[str]) -> ArmModel:
-        """Return the arm model of the parameters with other effects."""
+        """Return the arm model that the ROS parameters define, with other effects."""
         if self._without_effects is None:
             raise ModelError(
                 "the parameter 'effects' cannot change an arm that was given to the node in Python"

@@ -177,14 +177,14 @@ class TrajectoryController:
         return f'{self.readers} subscribers'
 
     def send_stop(self, trajectory: JointTrajectory) -> None:
-        """Send the trajectory that stops a run, by the interface of the run."""
+        """Send a stop trajectory as a goal or as a message, like the trajectory of the run."""
         if self._by_action:
             self._send_goal(trajectory, NO_TOLERANCE, NO_TOLERANCE)
         else:
             self._publisher.publish(trajectory)
 
     def send_stop_again(self, trajectory: JointTrajectory) -> None:
-        """Send a trajectory that stops a run by both action and topic."""
+        """Send a stop trajectory as a message and, if the run is a goal, also as a goal."""
         self.send_stop(trajectory)
         if self._by_action:
             self._publisher.publish(trajectory)

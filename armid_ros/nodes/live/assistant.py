@@ -37,14 +37,14 @@ Result = Answer | tuple[str, str] | IdentificationError
 
 
 class Worker:
-    """Executor of tasks in the diagnosis process, which keeps the last diagnosis."""
+    """Executor of the tasks of the diagnosis process; it keeps the last diagnosis."""
 
     def __init__(self) -> None:
         self._last: tuple[DiagnosisRequest, Diagnosis] | None = None
 
     def run(self, task: str, argument: Any) -> Result:
         """
-        Compute a diagnosis, save the last diagnosis to a folder, or plan its next motion.
+        Compute a diagnosis, save the last diagnosis, or plan a motion to separate its candidates.
 
         Errors of the data or the disk are returned, not raised. `argument` is that of
         `Assistant.ask`.

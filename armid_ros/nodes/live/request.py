@@ -56,7 +56,7 @@ class LiveSettings:
     material: float = 0.01
 
     def __post_init__(self) -> None:
-        """Raise an IdentificationError if the window is shorter than the shortest motion."""
+        """Raise an IdentificationError if the window is shorter than the motion to diagnose."""
         if not 0.0 < self.shortest <= self.window:
             raise IdentificationError(
                 f'window, {self.window:g} s, is shorter than the shortest diagnosed motion: '

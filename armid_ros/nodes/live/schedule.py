@@ -90,7 +90,7 @@ class LiveDiagnosis:
         self.learning = not known and self.settings.learning > 0.0
 
     def use(self, settings: LiveSettings) -> None:
-        """Change the settings, and empty the window."""
+        """Change the settings, and clear the window of samples."""
         self.settings = settings
         joints, period = self.accepted.robot.joints, 1.0 / settings.rate
         self.window = SampleWindow(joints, max(settings.window, settings.learning), period)
@@ -100,7 +100,7 @@ class LiveDiagnosis:
 
     @property
     def model(self) -> ArmModel:
-        """Return the proposed model, or the accepted one if nothing is proposed."""
+        """Return the proposed model; the accepted model if nothing is proposed."""
         return self.accepted if self.proposed is None else self.proposed
 
     @property
@@ -110,7 +110,7 @@ class LiveDiagnosis:
 
     @property
     def due(self) -> bool:
-        """Whether the arm has moved long enough since the last request."""
+        """Whether the arm has moved long enough since the last request for a diagnosis."""
         if self.learning or not self._contains(self.settings.shortest):
             return False
         return self.window.moved - self._asked_at >= self._next
@@ -134,7 +134,7 @@ class LiveDiagnosis:
             self._asked_at = self.window.moved
 
     def _contains(self, seconds: float) -> bool:
-        """Return whether the window contains enough motion, of a given duration [s]."""
+        """Return whether the window contains motion of at least a given duration [s]."""
         return self.window.moved >= seconds <= self.window.end - self.window.begin
 
     def request(self) -> DiagnosisRequest:
@@ -195,7 +195,7 @@ class LiveDiagnosis:
 
     def accept(self) -> None:
         """
-        Use the proposed model in later diagnoses; the last window replaces the baseline.
+        Use the proposed model in later diagnoses; the last diagnosed window replaces the baseline.
 
         Raises
         ------

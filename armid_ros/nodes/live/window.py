@@ -125,7 +125,7 @@ class SampleWindow:
 
     def recording(self, first: float = -np.inf, source: str = 'window') -> Recording:
         """
-        Return the samples after a given time as a recording.
+        Return the samples from a given time on as a recording.
 
         Parameters
         ----------

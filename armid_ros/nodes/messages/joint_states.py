@@ -106,7 +106,7 @@ class JointStateReader:
         return JointSample(stamp, q, dq, tau)
 
     def _find_joints(self, names: Sequence[str]) -> None:
-        """Find the index of each joint of the robot in messages with these names."""
+        """Find the index of each joint of the robot in the joint names of a message."""
         self._names = None
         try:
             self._order = joint_places(self._joints, names)
@@ -118,7 +118,7 @@ class JointStateReader:
         self._names = names
 
     def stamp(self, t: float) -> Time:
-        """Return the stamp of a sample time [s] of this reader."""
+        """Convert the time of a sample of this reader [s] to a ROS stamp."""
         return Time(nanoseconds=(self._epoch or 0) * 10**9 + round(t * 1e9))
 
     def _time(self, sec: int, nanosec: int) -> float:
@@ -145,7 +145,7 @@ class JointStateReader:
         return field[self._order]
 
     def _values(self, names: Sequence[str], field: FloatArray, name: str) -> FloatArray:
-        """Return the sorted values of a field; RecordingError if one is not a number."""
+        """Return the values of a field in joint order; RecordingError if any is not a number."""
         values = self._ordered(names, field, name)
         # a sum is faster than isfinite; skipped joints may be NaN
         if not math.isfinite(sum(values.tolist())) and not np.all(np.isfinite(values)):

@@ -57,7 +57,7 @@ SENSOR_PARAMETERS = ('torque_noise', 'position_noise', 'velocity_noise', 'resolu
 
 def sensors_of(value: Values, joints: Sequence[str]) -> Sensors:
     """
-    Return the noise, resolution and delay of the sensors that parameters describe.
+    Return the noise, resolution and delay of the sensors that ROS parameters define.
 
     Raises
     ------

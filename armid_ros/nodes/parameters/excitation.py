@@ -188,7 +188,7 @@ PUBLISHER_PARAMETERS = (
 
 def make_planner(value: Values) -> tuple[TransferPlanner, tuple[str, ...]]:
     """
-    Return the planner of paths to an excitation for the robot and obstacles of parameters.
+    Return a planner of paths to an excitation for the robot and obstacles that parameters name.
 
     Parameters
     ----------
@@ -224,7 +224,7 @@ def make_planner(value: Values) -> tuple[TransferPlanner, tuple[str, ...]]:
 
 def make_excitation(value: Values, rate: float, planner: TransferPlanner) -> Excitation:
     """
-    Return the excitation of a file, or design one for the robot of the parameters.
+    Load an excitation from the file that a parameter names; without a file, design an excitation.
 
     Parameters
     ----------
@@ -263,7 +263,7 @@ def make_excitation(value: Values, rate: float, planner: TransferPlanner) -> Exc
 
 def checked(excitation: Excitation, planner: TransferPlanner, source: str) -> Excitation:
     """
-    Return an excitation in the joint order of the arm, if it keeps limits and distances.
+    Check an excitation for limits and collisions, and return it in the joint order of the arm.
 
     For a joint without an acceleration limit, the limit of `Limits.of` is assumed.
 

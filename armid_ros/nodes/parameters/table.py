@@ -73,7 +73,7 @@ class NodeParameter:
         return descriptor
 
     def text(self) -> str:
-        """Return the description with the unit and the choices."""
+        """Return the description of the parameter with its unit and permitted texts."""
         unit = f' [{self.unit}]' if self.unit else ''
         choices = f' One of: {", ".join(self.choices)}.' if self.choices else ''
         return f'{self.description}{unit}{choices}'

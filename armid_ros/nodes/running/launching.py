@@ -61,7 +61,7 @@ def described(
     arguments: Sequence[Argument], start: Callable[[dict[str, Any]], Sequence[Any]]
 ) -> Any:
     """
-    Return a launch description with arguments, which starts actions with their values.
+    Return a launch description whose actions depend on the values of its arguments.
 
     Parameters
     ----------

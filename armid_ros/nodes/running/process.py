@@ -93,7 +93,7 @@ class _Ending:
 
 
 class _EndedAtOnce(BaseException):
-    """Exception of a signal during the construction of a node, which `run` catches."""
+    """Exception that a signal raises during the construction of a node; `run` catches it."""
 
 
 def run(make_node: Callable[[], ArmidNode], args: Sequence[str] | None = None) -> None:

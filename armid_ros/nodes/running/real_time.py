@@ -32,7 +32,7 @@ class RealTime:
         self.begin()
 
     def begin(self) -> None:
-        """Synchronise again from the present time on; the skipped time is kept."""
+        """Restart the synchronisation at the present time, and keep the sum of skipped time."""
         self._anchor = self._clock(), self._elapsed()
 
     def catch_up(self, factor: float, period: float) -> float:
