@@ -136,7 +136,7 @@ def _check_comparable(before: ParameterFile, after: ParameterFile) -> None:
 
 
 def _only_in(one: ParameterFile, other: ParameterFile) -> Iterator[NotCompared]:
-    """Yield the parameters of one result that another result lacks, each with the reason."""
+    """Yield parameters of a result that another result lacks, with the reason of each absence."""
     for name in one.values:
         if name in other.values:
             continue
@@ -259,7 +259,7 @@ def residual_changes(
     before: KnownFit | None, after: KnownFit | None
 ) -> tuple[ResidualChange, ...]:
     """
-    Return the change of the residual of each joint between two identified models.
+    Return the change of each joint's root mean square residual between two identified models.
 
     Empty if a file has no residuals. Model errors vary slowly, so even many samples contain few
     independent values of them.

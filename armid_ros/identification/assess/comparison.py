@@ -45,7 +45,7 @@ class ParameterChange:
 
     @property
     def std(self) -> float:
-        """Return the standard deviation of the difference."""
+        """Return the standard deviation of the difference between the two values."""
         return float(np.hypot(self.before_std, self.after_std))
 
     @property
@@ -108,7 +108,7 @@ class LoadChange:
 @dataclass(frozen=True)
 class ResidualChange:
     """
-    Change of the residual of one joint between two identified models.
+    Change of a joint's root mean square residual between two identified models.
 
     Attributes
     ----------
@@ -140,7 +140,7 @@ class ResidualChange:
 @dataclass(frozen=True)
 class NotCompared:
     """
-    A parameter of one result that the other result lacks, with the reason.
+    Parameter of one result that the other result lacks, with the reason of its absence.
 
     Attributes
     ----------

@@ -74,7 +74,7 @@ class PredictionError:
 
 
 def thinned(stretches: Sequence[Motion], rows: int) -> Motion | None:
-    """Return about `rows` evenly spaced samples of motions with torques; None without torques."""
+    """Return about `rows` evenly spaced samples of motions; None if no motion has torques."""
     parts = [motion for motion in stretches if motion.tau is not None and len(motion) > 2]
     if not parts:
         return None

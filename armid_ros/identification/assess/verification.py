@@ -97,7 +97,7 @@ class _RecordedTorque(Controller):
     feedback: LinearFeedback
 
     def feedforward(self, desired: Motion) -> FloatArray:
-        """Return the recorded torque at the times of a reference, shape (N, n) [N m]."""
+        """Return the recorded torque at the times of a reference motion, shape (N, n) [N m]."""
         assert self.motion.tau is not None
         t = self.motion.t
         return np.column_stack([np.interp(desired.t, t, column) for column in self.motion.tau.T])

@@ -275,7 +275,7 @@ class OnlineIdentifier:
         return estimate if covariance is None else replace(estimate, covariance=covariance)
 
     def model(self) -> ArmModel:
-        """Return the arm model with the estimated parameters; unidentified ones stay unchanged."""
+        """Return the arm model with the estimate; unidentified parameters keep their values."""
         self._add_pending_row()
         return self.arm.with_theta(self.base.lift(self._estimator.values, self.arm.theta))
 
@@ -406,7 +406,7 @@ class OnlineIdentifier:
         return OnlineSample(stamp, measured, measured - innovation * gain, used)
 
     def _add_pending_row(self) -> bool:
-        """Update the estimate with the pending regression row; return whether there was one."""
+        """Update the estimate with a pending regression row; return whether a row was pending."""
         if self._pending is None:
             return False
         (row, innovation), self._pending = self._pending, None

@@ -58,7 +58,7 @@ class History:
 
     @property
     def values(self) -> FloatArray:
-        """Return a view of the rows, oldest first; later appends do not change it."""
+        """Return the rows, oldest first, as a view that later appends do not change."""
         return self._rows[self._end - len(self) : self._end]
 
 
@@ -181,7 +181,7 @@ class NullCalibration:
 
     def excess(self, ratios: FloatArray, strength: FloatArray, chance: float) -> FloatArray:
         """
-        Return the test statistics over their critical values; 0 before the calibration.
+        Return the test statistics divided by their critical values; 0 before the calibration.
 
         Model discrepancy has biased the parameters, so the critical values are larger for motion
         that is stronger than usual.
@@ -238,7 +238,7 @@ class ResidualScale:
         return np.ones(1) if self._value is None else self._value
 
     def learn(self, residual: FloatArray, weights: FloatArray) -> None:
-        """Update the scale with the residuals of a block over the assumed noise, shape (k, m)."""
+        """Update the scale with residuals of a block, divided by assumed noise, shape (k, m)."""
         used = np.sum(weights > 0.0, axis=0)
         if not used.any():
             return  # residuals during motion are kept while the arm is at rest

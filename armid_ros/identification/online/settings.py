@@ -82,7 +82,7 @@ class OnlineSettings:
 @dataclass(frozen=True)
 class OnlineSample:
     """
-    Measured and predicted joint torques of one sample, and which of them were used.
+    Measured and predicted torques of a sample, and the joints that the estimator used.
 
     Attributes
     ----------
