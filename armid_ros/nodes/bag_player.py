@@ -192,7 +192,7 @@ class BagPlayerNode(ArmidNode):
         return (self._position - self._first) * 1e-9
 
     def play(self) -> None:
-        """Publish the messages whose time has come."""
+        """Publish the messages that are due at the present playback time."""
         now = self._pace.now().nanoseconds
         if self._anchor is None:
             if (self._lock_step and now == 0) or not self._ready():

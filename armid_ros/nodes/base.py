@@ -125,7 +125,7 @@ class ArmidNode(Node):
 
     @property
     def missing_clock(self) -> str:
-        """Return why the simulated time is not available; empty if it is, or is not used."""
+        """Return why the simulated time is missing; empty if it is available or not used."""
         clock = self.get_clock()
         if not clock.ros_time_is_active:
             return ''

@@ -166,7 +166,7 @@ class LiveDiagnosisNode(ListeningNode):
         return 'the diagnosis begins anew, with the original model'
 
     def save(self) -> str:
-        """Start to write the files of the last diagnosis; the end is logged."""
+        """Start to write the files of the last diagnosis; a later log entry reports the end."""
         self._require(diagnosed=True)
         folder = self.folder('save_to')
         refuse_replacing(folder, FILES)
@@ -174,7 +174,7 @@ class LiveDiagnosisNode(ListeningNode):
         return f'writing {", ".join(FILES)} to {folder}'
 
     def next_run(self) -> str:
-        """Start to plan the motion that separates the candidates; it is sent to ~/experiment."""
+        """Start to plan a motion that separates the candidates and will be sent to ~/experiment."""
         self._require(diagnosed=True)
         self._helper.ask('plan', self.value('seed'))
         return f'planning a motion; it will be published on {self._runs.topic_name}'
@@ -356,7 +356,7 @@ class LiveDiagnosisNode(ListeningNode):
         self._publish_model()
 
     def _require(self, *, diagnosed: bool = False) -> LiveDiagnosis:
-        """Return the schedule; raise an error before a robot, or a diagnosis, is known."""
+        """Return the schedule; raise an error without a robot or, if required, a diagnosis."""
         if self.live is None:
             raise IdentificationError('the robot is not known: no robot_description was received')
         if diagnosed and self.live.latest is None:

@@ -171,7 +171,7 @@ def _stepped(step: Callable[[], int], duration: float, on_progress: OnProgress |
 
 
 class Stage(ExitStack):
-    """ROS nodes in one process with their executor, which communicate on this machine only."""
+    """ROS nodes in one process, with an executor and communication on this machine only."""
 
     def __enter__(self) -> Stage:
         domain = os.environ.get('ROS_DOMAIN_ID')

@@ -282,7 +282,7 @@ class OnlineIdentifierNode(ListeningNode):
         )
 
     def level(self, troubled: bool) -> bytes:
-        """Return the level STALE without joint states, and ERROR for unusable joint states."""
+        """Return the diagnostics level: STALE without joint states, ERROR if they are unusable."""
         failed = self.identifier is not None and bool(self.identifier.error)
         stopped = self.freshness.stopped
         return DiagnosticStatus.ERROR if failed and not stopped else super().level(troubled)

@@ -68,7 +68,7 @@ def _profile(depth: int, reliable: bool, latched: bool) -> QoSProfile:
 
 class MatchedSubscription:
     """
-    Subscription that starts when its topic has publishers, with their quality of service.
+    Subscription that starts once its topic has publishers, and adopts their quality of service.
 
     A reliable subscription does not match a best-effort publisher. A best-effort subscription
     loses messages that a reliable publisher would send again. The QoS therefore depends on the
@@ -111,7 +111,7 @@ class MatchedSubscription:
 
     @property
     def several(self) -> str:
-        """Return a text with the publishers of the topic if there are several; else empty."""
+        """Return a text on the publishers of the topic; empty for fewer than two publishers."""
         found = self._node.get_publishers_info_by_topic(self.topic)
         if len(found) < 2:
             return ''

@@ -135,7 +135,7 @@ class TrajectoryController:
 
     @property
     def under_way(self) -> bool:
-        """Whether a goal was sent that the controller has not ended."""
+        """Whether the controller has not yet ended a goal of this node."""
         return self._by_action and self._goal is not None
 
     @property

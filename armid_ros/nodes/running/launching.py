@@ -43,7 +43,7 @@ class Argument(NamedTuple):
     default: str | None = ''
 
     def read(self, text: str) -> Any:
-        """Return the value of a text in the type of the argument; RuntimeError for other texts."""
+        """Convert a text to the type of the argument; RuntimeError for a text of another type."""
         try:
             if self.kind is list:
                 return [part.strip() for part in listed(text) if part.strip()]

@@ -183,7 +183,7 @@ def _shut_down(node: ArmidNode | None) -> list[str]:
 
 def unreadable(error: Exception) -> str:
     """
-    Return a readable message for an error of rclpy on its arguments, with their syntax.
+    Return a readable message, with the right syntax, for an error of rclpy in ROS arguments.
 
     Parameters
     ----------
