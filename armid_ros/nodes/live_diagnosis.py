@@ -174,7 +174,7 @@ class LiveDiagnosisNode(ListeningNode):
         return f'writing {", ".join(FILES)} to {folder}'
 
     def next_run(self) -> str:
-        """Start to plan a motion that separates the candidates and will be sent to ~/experiment."""
+        """Start to plan a motion that separates the candidates, to be sent to ~/experiment."""
         self._require(diagnosed=True)
         self._helper.ask('plan', self.value('seed'))
         return f'planning a motion; it will be published on {self._runs.topic_name}'
