@@ -28,7 +28,7 @@ Progress = Callable[[float, float], None]
 @dataclass(frozen=True)
 class Design:
     """
-    A designed excitation, with the information that its recording is predicted to carry.
+    A designed excitation, with the predicted information of its recording on the parameters.
 
     Attributes
     ----------
@@ -180,7 +180,7 @@ def with_run_in(problem: DesignProblem, trajectory: FourierTrajectory) -> Excita
     settings, limits = problem.settings, problem.limits
 
     def effort(run: Excitation) -> float:
-        """Return the largest share of a velocity or acceleration limit during the run-in."""
+        """Return the largest share of a velocity or acceleration limit that the run-in uses."""
         path = run.at(np.linspace(0.0, run.run_in, 40))
         velocity = np.abs(path.dq) / limits.velocity
         acceleration = np.abs(path.ddq) / limits.acceleration

@@ -27,7 +27,7 @@ _CHECK_SAMPLES = 200
 
 
 class Faults(tuple[Violation | Approach, ...]):
-    """Faults of a trajectory: the limits that it exceeds, and the bodies that come too close."""
+    """Faults of a trajectory: exceeded limits, and pairs of bodies closer than the clearance."""
 
     __slots__ = ()
 
@@ -43,7 +43,7 @@ def trajectory_faults(
     clearance: ClearanceModel | None,
 ) -> Faults:
     """
-    Return the limits that a periodic trajectory exceeds, and two bodies that come too close.
+    Return the limits that a periodic trajectory exceeds, and two bodies closer than the clearance.
 
     Parameters
     ----------
@@ -93,7 +93,7 @@ def _violations(arm: ArmModel, limits: Limits, motion: Motion) -> tuple[Violatio
 
 
 def _outward(values: FloatArray) -> FloatArray:
-    """Return samples moved away from their mean by a bound on the peaks between samples."""
+    """Return signals moved away from their mean by a bound on their peaks between samples."""
     # the bound is h^2 M / 8 for second derivatives below M, estimated from second differences.
     # Nothing is added where dry friction makes the second differences jump
     bend = np.zeros_like(values)
@@ -241,7 +241,7 @@ def _shrunk(
     clearance: ClearanceModel | None,
     shrinks: int,
 ) -> FourierTrajectory | None:
-    """Return a trajectory with amplitudes reduced until feasible; None after all reductions."""
+    """Return a trajectory with amplitudes reduced until feasible; None if this fails."""
 
     def clear(q: FloatArray) -> bool:
         if clearance is None:
@@ -265,7 +265,7 @@ CLEARANCE = 0.01
 @dataclass(frozen=True)
 class Template:
     """
-    Template of random motions of some or all joints at a share of the limits.
+    Settings for random motions of joints, at a share of velocity and acceleration limits.
 
     Attributes
     ----------
@@ -335,7 +335,7 @@ _WHOLE_ARM = (
 
 
 def templates(joints: Sequence[str]) -> tuple[Template, ...]:
-    """Return motion templates that identify effects on given joints, or on the whole arm."""
+    """Return templates of motions to identify effects: of the whole arm, and of given joints."""
     chosen = list(_WHOLE_ARM)
     if joints:
         names, alone = ', '.join(joints), tuple(joints)

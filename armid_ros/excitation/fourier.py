@@ -134,12 +134,12 @@ class FourierTrajectory:
         return self.motion(np.arange(n_samples) * (self.period / n_samples))
 
     def with_margins(self, n_samples: int) -> Motion:
-        """Return the samples of one period, with `MARGIN` samples more before and after it."""
+        """Return samples of a period, with `MARGIN` more samples before and after the period."""
         step = self.period / n_samples
         return self.motion(np.arange(-MARGIN, n_samples + MARGIN) * step)
 
     def shifted(self, time: float) -> FourierTrajectory:
-        """Return the same periodic motion with its start later by a given time [s]."""
+        """Return the same periodic motion, begun later in its period by a given time [s]."""
         angle = self.angular_frequency * time * np.arange(1, self.harmonics + 1)
         cosine, sine = np.cos(angle), np.sin(angle)
         a = self.a * cosine + self.b * sine

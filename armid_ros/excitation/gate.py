@@ -44,7 +44,7 @@ class MotionGate:
     @classmethod
     def of(cls, run: Run, planner: TransferPlanner) -> MotionGate:
         """
-        Check all samples of a run, and return the gate that checks all later motions.
+        Check all samples of a planned run, and return the gate for motions sent during the run.
 
         Parameters
         ----------
@@ -125,7 +125,7 @@ class MotionGate:
         self, set_point: FloatArray, speed: FloatArray, measured: FloatArray, largest: float
     ) -> Motion:
         """
-        Return the straight motion of the set point to the measured position of the arm.
+        Return the motion on a straight line from the set point to the measured position.
 
         Parameters
         ----------
@@ -162,7 +162,7 @@ class MotionGate:
 
     def overload(self, effort: FloatArray, factor: float) -> str:
         """
-        Return a message that names a joint beyond its predicted effort; empty if none is.
+        Return a message that names a joint with too large an effort; empty if there is none.
 
         Parameters
         ----------
@@ -183,7 +183,7 @@ class MotionGate:
         )
 
     def _time_of(self, step: FloatArray, speed: FloatArray) -> float:
-        """Return the time [s] that a small step from an initial speed needs within the limits."""
+        """Return the time [s] that moving joints need for a small step within their limits."""
         velocity = np.where(np.isfinite(self.limits.velocity), self.limits.velocity, SLOW_VELOCITY)
         stopping = speed / self.limits.acceleration
         slowest = stopping + np.sqrt(stopping**2 + step / self.limits.acceleration)

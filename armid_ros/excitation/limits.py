@@ -89,7 +89,7 @@ class Limits:
         reserve: bool = True,
     ) -> Limits:
         """
-        Return the limits of a robot for runs of a speed class, by default with a reserve.
+        Return the limits of a robot for a speed class such as 'slow', by default with a reserve.
 
         Parameters
         ----------
@@ -309,7 +309,7 @@ def with_joint_limits(
 
 
 def with_acceleration_limit(robot: Robot, limit: FloatArray) -> Robot:
-    """Return a robot with acceleration limits lowered to given ones, (n,) [rad/s^2, m/s^2]."""
+    """Return a robot with given, lower acceleration limits, shape (n,) [rad/s^2 or m/s^2]."""
     limit = np.nan_to_num(limit, nan=np.inf)
     _require_narrower(robot, 'acceleration', limit, robot.acceleration_limit)
     return replace(robot, acceleration_limit=np.minimum(limit, robot.acceleration_limit))
@@ -318,7 +318,7 @@ def with_acceleration_limit(robot: Robot, limit: FloatArray) -> Robot:
 def _require_narrower(
     robot: Robot, quantity: str, given: FloatArray, described: FloatArray
 ) -> None:
-    """Raise a TrajectoryError if a given limit, of shape (n,), exceeds the described one."""
+    """Raise a TrajectoryError if a given limit of a joint exceeds that of the robot."""
     for joint, value, limit, slides in zip(
         robot.joints, given, described, robot.prismatic, strict=True
     ):

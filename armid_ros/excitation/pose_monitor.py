@@ -34,7 +34,7 @@ class _State(NamedTuple):
 
 @dataclass
 class _Source:
-    """Sender of joint states: joints of the arm in its messages, limits and recent states."""
+    """Sender of joint states: the joints that it sends, their limits and their recent states."""
 
     columns: npt.NDArray[np.int_]
     joints: list[int]
@@ -91,12 +91,12 @@ class PoseMonitor:
 
     @property
     def last_stamp_ns(self) -> int:
-        """Return the oldest stamp of the accepted positions [ns]."""
+        """Return the oldest timestamp among the last accepted joint positions [ns]."""
         return min(self._stamps)
 
     @property
     def sources(self) -> int:
-        """Number of senders, which differ in the joint names of their messages."""
+        """Number of senders of joint states; each sender has its own list of joint names."""
         return len(self._sources)
 
     def update(
@@ -171,7 +171,7 @@ class PoseMonitor:
         return self._sources[names]
 
     def contradiction(self, now: float, count: int = MIN_AGREEING) -> str:
-        """Return the latest reason if many positions were rejected in 0.5 s; otherwise empty."""
+        """Return the last reason for rejection if many occurred within 0.5 s; otherwise empty."""
         recent = [
             fault for arrived, fault in self._rejections if now - arrived <= _REJECTION_WINDOW
         ]

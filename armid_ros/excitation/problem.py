@@ -95,7 +95,7 @@ class DesignSettings:
     time_budget: float = np.inf
 
     def __post_init__(self) -> None:
-        """Check the names of criterion and target, and the numbers."""
+        """Check that criterion and target exist, and that the numbers are valid."""
         for kind, name, known in (
             ('criterion', self.criterion, CRITERIA),
             ('target', self.target, TARGETS),
@@ -107,7 +107,7 @@ class DesignSettings:
         self._require_numbers()
 
     def _require_numbers(self) -> None:
-        """Raise a TrajectoryError for an impossible count, time or size."""
+        """Raise a TrajectoryError if a number among the settings is outside its valid range."""
         for setting in ('harmonics', 'n_periods', 'starts', 'candidates', 'iterations'):
             if (value := getattr(self, setting)) < 1:
                 raise TrajectoryError(f'{setting} is {value}, but has to be at least 1')
@@ -132,7 +132,7 @@ class DesignSettings:
 
 def whole_period(duration: float, n_periods: int, run_in: float, rate: float) -> float:
     """
-    Return the period of a run with a given duration, as a whole number of samples [s].
+    Return the period [s], a whole number of samples, for an excitation of given duration.
 
     Parameters
     ----------
@@ -247,7 +247,7 @@ class DesignProblem:
         return problem
 
     def _require_visible(self, matrix: FloatArray) -> None:
-        """Raise a TrajectoryError if random motions have no information on the target."""
+        """Raise a TrajectoryError if random motions carry no information for the criterion."""
         criterion = self.criterion
         if criterion.name != 'T':
             if not criterion.wanted.any():
@@ -263,12 +263,12 @@ class DesignProblem:
             )
 
     def columns(self, motion: Motion) -> FloatArray:
-        """Return the regressor of a motion with rows divided by their noise, shape (N n, P)."""
+        """Return the regressor of a motion, with rows divided by their torque noise, (N n, P)."""
         columns = _target_columns(self.arm, self.settings.target, motion)
         return (columns / self.noise[:, np.newaxis]).reshape(-1, columns.shape[-1])
 
     def recorded(self, trajectory: FourierTrajectory, n_periods: int) -> Information:
-        """Return the information of a recorded trajectory on the base parameters."""
+        """Return the information on the base parameters in a recording of n_periods periods."""
         # six times as many samples as in the search
         count, margin = 6 * self.settings.samples, MARGIN * trajectory.n_joints
         columns = self.columns(trajectory.with_margins(count))[margin:-margin]
@@ -296,7 +296,7 @@ class DesignProblem:
 
 
 def _target_columns(arm: ArmModel, target: str, motion: Motion) -> FloatArray:
-    """Return the regressor, shape (N, n, P); zero for parameters outside the target."""
+    """Return the regressor, (N, n, P); columns outside the design target are zero."""
     effects = arm.effect_columns(motion)
     if target == 'effects':
         rigid = np.zeros((*motion.q.shape, len(arm.robot.rigid_parameters)))
@@ -340,7 +340,7 @@ def _joined(arm: ArmModel, rival: ArmModel) -> ArmModel:
 
 
 def parameter_mask(arm: ArmModel, names: Collection[str]) -> npt.NDArray[np.bool_]:
-    """Return a mask of all parameters, shape (P,), that is True for named effects."""
+    """Return a mask of the P parameters, True for those of the named effects."""
     rigid = np.zeros(len(arm.robot.rigid_parameters), dtype=bool)
     named = [np.full(len(e.parameters(arm.robot)), e.name in names) for e in arm.effects]
     return np.concatenate([rigid, *named])

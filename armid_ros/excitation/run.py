@@ -22,7 +22,7 @@ import numpy.typing as npt
 @dataclass(frozen=True)
 class Run:
     """
-    A transfer to an excitation, the excitation, and a transfer back to the start pose.
+    An excitation, with a path from the start pose to it and a path back to the start pose.
 
     Attributes
     ----------
@@ -43,7 +43,7 @@ class Run:
     rate: float
 
     def __post_init__(self) -> None:
-        """Check that transfers meet the excitation; round their durations up to whole samples."""
+        """Check that the paths join the excitation; round path durations up to whole samples."""
         ends = self.excitation.at([0.0, self.excitation.duration]).q
         for transfer, own, end in ((self.approach, -1, 0), (self.back, 0, 1)):
             # tolerance for rounding [rad or m]
@@ -71,7 +71,7 @@ class Run:
 
     @property
     def _excitation_duration(self) -> float:
-        """Duration of the excitation in whole samples [s]."""
+        """Duration of the excitation, as a whole number of samples [s]."""
         return self.excitation.sampled_duration(self.rate)
 
     def at(self, t: npt.ArrayLike) -> Motion:
@@ -102,7 +102,7 @@ class Run:
 
     def require_waypoints(self) -> None:
         """
-        Raise a TrajectoryError if a controller leaves the path between the samples of `motion`.
+        Raise a TrajectoryError if interpolation by a controller leaves the path between samples.
 
         A controller interpolates between its waypoints with quintic polynomials. Limits and
         collisions are checked only on the path itself. A polynomial through samples of a sine
@@ -132,7 +132,7 @@ def plan_run(
     seed: int = 0,
 ) -> Run:
     """
-    Plan the run of an excitation from the present pose of the arm and back to it.
+    Plan a run from the present pose of the arm to an excitation, along it, and back.
 
     Parameters
     ----------

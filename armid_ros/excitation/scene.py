@@ -93,7 +93,7 @@ class CollisionScene:
 
     @property
     def unchecked(self) -> tuple[str, ...]:
-        """Return what a check of motions leaves out, such as a floor, mesh or limit not given."""
+        """Return items that a check of motions leaves out, such as a missing floor or limit."""
         robot = self.collision.robot
         found: list[str] = []
         if self.floor.height is None and not any(o.kind == 'plane' for o in self.obstacles):
@@ -199,7 +199,7 @@ class Fitness:
 
     @property
     def remedy(self) -> str:
-        """Return what to do before the run; empty if the run is fit."""
+        """Return the advice to the user before the run; empty if no action is needed."""
         if self.word == UNFIT:
             return 'Do not run it. Design it with another --start or --seed, or more --clearance.'
         items = ' '.join(self.unchecked)

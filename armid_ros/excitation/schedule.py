@@ -82,7 +82,7 @@ class Excitation:
 
     def at(self, t: npt.ArrayLike) -> Motion:
         """
-        Evaluate position, velocity and acceleration of the run.
+        Evaluate position, velocity and acceleration of the excitation at given times.
 
         Parameters
         ----------
@@ -114,7 +114,7 @@ class Excitation:
 
     def for_joints(self, joints: tuple[str, ...]) -> Excitation:
         """
-        Return the run with its joints in another order.
+        Return the excitation with its joints in another order.
 
         Raises
         ------
@@ -158,7 +158,7 @@ class Excitation:
 
     def motion(self, rate: float) -> Motion:
         """
-        Return samples of the run at a constant rate.
+        Return samples of the excitation at a constant rate.
 
         Parameters
         ----------

@@ -122,7 +122,7 @@ def jump_fault(
     tolerance: float,
 ) -> str:
     """
-    Return a message if the start of a trajectory is too far from the present position.
+    Return a message if a trajectory starts too far from the present position of the arm.
 
     Parameters
     ----------
@@ -158,7 +158,7 @@ def jump_fault(
 
 def slowed(path: Path, phase: float, duration: float, rate: float) -> Motion:
     """
-    Return a motion that stops along a path, starting at a given time of the path.
+    Return a motion that follows a path from a given time on and slows down to rest.
 
     Parameters
     ----------
@@ -240,7 +240,7 @@ class Rehearsal:
         return np.asarray(np.abs(self._arm.joint_torque(wanted)).max(axis=0))
 
     def report(self) -> tuple[str, tuple[str, ...]]:
-        """Return a summary of a rehearsal, and a sentence on each joint of unexpected torque."""
+        """Return a summary of a rehearsal, and a sentence on each joint with unexpected torque."""
         if not self._count:
             fault = 'no joint state was received during the rehearsal'
             return fault, (fault,)

@@ -24,7 +24,7 @@ class Transfer(Reference):
     """Motion on straight lines in joint space from pose to pose, with a stop at each pose."""
 
     def __post_init__(self) -> None:
-        """Set velocity and acceleration of every pose to zero."""
+        """Set velocity and acceleration to zero at every waypoint."""
         for name in ('dq', 'ddq'):
             object.__setattr__(self, name, np.zeros_like(self.q))
         super().__post_init__()
@@ -45,7 +45,7 @@ class Transfer(Reference):
 @dataclass(frozen=True)
 class TransferPlanner:
     """
-    Planner of transfers between poses, within limits and clearance.
+    Planner of motions between two poses that keep the limits and the clearance.
 
     Attributes
     ----------
@@ -64,7 +64,7 @@ class TransferPlanner:
 
     @classmethod
     def of(cls, arm: ArmModel, scene: CollisionScene, speed: str | float) -> TransferPlanner:
-        """Return the transfer planner of an arm and its surroundings, for a speed of the run."""
+        """Return the planner of an arm among its obstacles, with the limits for a run's speed."""
         clearance = ClearanceModel.of(scene.bodies, scene.clearance)
         return cls(arm, transfer_limits(arm.robot, speed), clearance)
 
@@ -72,7 +72,7 @@ class TransferPlanner:
         self, start: FloatArray, goal: FloatArray, shortest: float = 0.0, seed: int = 0
     ) -> Transfer:
         """
-        Plan a transfer from a start pose to a goal pose, around obstacles.
+        Plan a motion from a start pose to a goal pose, around obstacles.
 
         Parameters
         ----------
@@ -143,7 +143,7 @@ class TransferPlanner:
 
     @property
     def zero_pose(self) -> FloatArray:
-        """Return the zero pose, clipped to the position limits with reserve, shape (n,)."""
+        """Return the pose with all joints at zero, clipped to the position limits with reserve."""
         return self._as_start(self.arm.robot.zero_pose)
 
     def _as_start(self, q: FloatArray) -> FloatArray:
@@ -188,7 +188,7 @@ class TransferPlanner:
         )
 
     def _overload(self, q: FloatArray) -> str:
-        """Return a message if a joint cannot hold some of the poses, shape (N, n)."""
+        """Return a message if a joint is too weak to hold the arm in some of N poses, (N, n)."""
         if not np.isfinite(self.limits.torque).any():
             return ''
         torque = np.abs(self.arm.joint_torque(Motion.of_states(self.limits.joints, q, 0.0, 0.0)))
@@ -206,7 +206,7 @@ class TransferPlanner:
 
 def transfer_limits(robot: Robot, speed: str | float = 'slow') -> Limits:
     """
-    Return the limits of a transfer, which is slow because it identifies no parameters.
+    Return the limits of a motion between poses: slow, because it identifies no parameters.
 
     Parameters
     ----------

@@ -75,7 +75,7 @@ class Approach:
 @dataclass(frozen=True)
 class ClearanceModel:
     """
-    Collision bodies of an arm, prepared for distances in many poses.
+    Collision bodies of an arm, prepared to compute their distances in many poses.
 
     Attributes
     ----------
@@ -112,7 +112,7 @@ class ClearanceModel:
 
     @classmethod
     def of(cls, collision: CollisionModel, margin: float = 0.0) -> ClearanceModel:
-        """Return the clearance model of bodies that have to keep a margin [m]."""
+        """Return the clearance model of bodies that have to stay a margin [m] apart."""
         robot, bodies = collision.robot, list(collision.geometry.geometryObjects)
         joints = np.array([int(body.parentJoint) - 1 for body in bodies], dtype=np.intp)
         spheres, planes = np.zeros((len(bodies), 4)), np.full((len(bodies), 4), np.nan)
@@ -150,7 +150,7 @@ class ClearanceModel:
         return cls(collision, margin, joints, spheres, planes, numbers, pairs, between, most)
 
     def without_distant_pairs(self, q: FloatArray, reach: float) -> ClearanceModel:
-        """Return the model without pairs farther apart than ``reach`` [m] in all poses q."""
+        """Return the model without pairs of bodies ``reach`` [m] or more apart in all poses q."""
         kept = np.unique(self.near(q, reach).pair)
         return replace(
             self,
@@ -190,7 +190,7 @@ class ClearanceModel:
         return result
 
     def closest(self, motion: Motion) -> Approach | None:
-        """Return the closest approach of two bodies in a sampled motion; None without pairs."""
+        """Return the closest approach of two bodies in a motion; None if no pair is checked."""
         if not len(self.pairs):
             return None
         reach = 0.05
@@ -209,7 +209,7 @@ class ClearanceModel:
         times: FloatArray,
     ) -> Approach | None:
         """
-        Prove that all pairs keep the margin along a path, or return the closest approach found.
+        Prove that all bodies keep the margin along a path, or return the closest approach found.
 
         On an interval, the joints between two bodies move them by a limited travel. Their distance
         is at least the mean of the distances at both ends, minus half this travel. An interval
@@ -270,7 +270,7 @@ class ClearanceModel:
         return None
 
     def _bound(self, frames: LinkFrames) -> FloatArray:
-        """Return a lower bound on the distance of every pair, shape (N, number of pairs) [m]."""
+        """Return a lower bound on distances of all pairs of bodies, (N, number of pairs) [m]."""
         centre = np.empty((frames.lines.shape[2], len(self.joints), 3))
         for body, joint in enumerate(self.joints):
             place = self.spheres[body, :3]
@@ -285,7 +285,7 @@ class ClearanceModel:
     def _measure(
         self, q: FloatArray, sample: IntArray, pair: IntArray
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return distances, normals to the second body, and nearest points of the first body."""
+        """Return distances of pairs, normals to the second body, nearest points of the first."""
         model, geometry = self.collision.robot.model, self.collision.geometry
         data, placed = model.createData(), geometry.createData()
         q, distance = self.collision.robot.positions(q), np.empty(len(sample))

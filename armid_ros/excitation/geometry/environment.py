@@ -172,7 +172,7 @@ def with_obstacles(collision: CollisionModel, obstacles: Sequence[Obstacle]) -> 
 
 
 def obstacles_alone(collision: CollisionModel, obstacles: Sequence[Obstacle]) -> CollisionModel:
-    """Return the bodies of ``with_obstacles``, with pairs of arm and obstacle only."""
+    """Return the bodies of arm and obstacles, to check only the arm against the obstacles."""
     geometry = collision.geometry.copy()
     geometry.removeAllCollisionPairs()
     return with_obstacles(replace(collision, geometry=geometry), obstacles)
@@ -199,7 +199,7 @@ _Shape = tuple[str, tuple[float, ...], pin.SE3]
 
 def load_environment(path: str | Path, robot: Robot | None = None) -> tuple[Obstacle, ...]:
     """
-    Read obstacles from a list of obstacles or from a planning scene of MoveIt.
+    Read obstacles from a YAML list or from a planning scene of MoveIt.
 
     Parameters
     ----------
@@ -307,7 +307,7 @@ def _shapes(entry: Mapping[str, Any], robot: Robot | None) -> Iterator[_Shape]:
 
 
 def _frame(name: str, robot: Robot | None) -> pin.SE3:
-    """Return the placement in the base frame of a fixed frame with a given name."""
+    """Return the placement of a fixed frame, given by its name, in the base frame."""
     if robot is None:
         return pin.SE3.Identity()
     model = robot.model

@@ -124,7 +124,7 @@ def vertical(gravity: FloatArray) -> FloatArray:
 
 
 def outline(shape: coal.CollisionGeometry) -> tuple[FloatArray, float]:
-    """Return points and a radius whose spheres enclose a body; no points if it is unbounded."""
+    """Return centres and the radius of spheres whose hull encloses a body; none if unbounded."""
     if isinstance(shape, coal.Convex):
         return np.array(shape.points()), 0.0
     if isinstance(shape, coal.Sphere):
@@ -141,7 +141,7 @@ def outline(shape: coal.CollisionGeometry) -> tuple[FloatArray, float]:
 
 
 def _support(shape: coal.CollisionGeometry, direction: FloatArray) -> FloatArray:
-    """Return how far a body extends along unit vectors in its frame, (N, 3) to (N,) [m]."""
+    """Return the extent of a body from its origin along N unit vectors in its frame, (N,) [m]."""
     if isinstance(shape, coal.Cylinder):
         axial = np.abs(direction[:, 2])
         radial = np.sqrt(np.maximum(1.0 - axial**2, 0.0))

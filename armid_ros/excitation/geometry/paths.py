@@ -121,7 +121,7 @@ class _Tree:
     parents: list[int] = field(default_factory=lambda: [-1])
 
     def grow(self, target: FloatArray) -> int | None:
-        """Step towards a pose from the nearest node; return the index of the new node, if any."""
+        """Extend the tree towards a pose; return the index of the new pose, or None if blocked."""
         nearest = int(np.argmin([np.linalg.norm(target - q) for q in self.poses]))
         difference = target - self.poses[nearest]
         reach = float(np.abs(difference).max())
@@ -136,7 +136,7 @@ class _Tree:
         return len(self.poses) - 1
 
     def connect(self, target: FloatArray) -> int | None:
-        """Step towards a pose while possible; return the index of its node if it is reached."""
+        """Extend the tree up to a pose; return the index of this pose, or None if blocked."""
         while (reached := self.grow(target)) is not None:
             if np.array_equal(self.poses[reached], target):
                 return reached
@@ -167,7 +167,7 @@ def _shortened(path: list[FloatArray], free: _Free, rng: np.random.Generator) ->
 
 
 def _skipped(path: list[FloatArray], free: _Free) -> list[FloatArray]:
-    """Connect each pose with the farthest pose on a collision-free straight line."""
+    """Shorten a path: connect each pose to the farthest pose in a collision-free straight line."""
     short, here = [path[0]], 0
     while here < len(path) - 1:
         here = next(

@@ -37,7 +37,7 @@ _MIN_EIGENVALUE = 1e-13
 @dataclass(frozen=True)
 class Information:
     """
-    Information of a recorded motion on r parameters.
+    Fisher information of a recorded motion on r parameters.
 
     Attributes
     ----------
@@ -56,7 +56,7 @@ class Information:
     scale: FloatArray
 
     def __post_init__(self) -> None:
-        """Freeze the information matrix and the scale."""
+        """Freeze the information matrix and the sizes of the parameters."""
         freeze(self, 'matrix', 'scale')
 
     @property
@@ -67,7 +67,7 @@ class Information:
 
     @property
     def condition(self) -> float:
-        """Condition number of the weighted regressor, not of its square."""
+        """Condition number of the weighted regressor: root of that of the information matrix."""
         values = np.linalg.eigvalsh(self.matrix)
         return float(np.sqrt(values[-1] / values[0])) if values[0] > 0 else np.inf
 
@@ -171,7 +171,7 @@ class Criterion:
         return cost, (vectors * slope) @ vectors.T
 
     def _of_eigenvalues(self, values: FloatArray, norm: float) -> tuple[float, FloatArray]:
-        """Return the cost of ascending eigenvalues, and its derivative by the eigenvalues."""
+        """Return the cost as a function of the ascending eigenvalues, and its derivative."""
         if self.name == 'A':
             total = np.sum(1.0 / values)
             return float(np.log(total / len(values))), -1.0 / (values**2 * total)

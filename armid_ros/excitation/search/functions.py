@@ -110,7 +110,7 @@ class Objective:
         return cost, gradient
 
     def _state_gradient(self, motion: Motion, here: FloatArray, weights: FloatArray) -> FloatArray:
-        """Differentiate sum(weights * columns) by the coefficients, for columns without memory."""
+        """Differentiate sum(weights * columns of `_state_columns`) by the Fourier coefficients."""
         count, n = motion.q.shape
         total = np.zeros((n, self.basis[0].shape[1]))
         state = np.array([motion.q, motion.dq, motion.ddq])
@@ -145,7 +145,7 @@ class Objective:
 
 
 def _weighted(blocks: Sequence[FloatArray], weights: FloatArray) -> FloatArray:
-    """Return the weighted sum of columns in each sample of k copies of a motion, (k, N)."""
+    """Return the weighted sum of regressor columns in each sample of k motions, (k, N)."""
     total, start = 0.0, 0
     for block in blocks:
         stop = start + block.shape[2]
@@ -249,7 +249,7 @@ class Constraints:
         upper: FloatArray,
         unit: FloatArray,
     ) -> Part:
-        """Return constraints on positions, velocities or accelerations, one for each joint."""
+        """Return a constraint on position, velocity or acceleration for each limited joint."""
         values = basis @ x.T
         limited, totals, signed = self._between(values, lower, upper, unit)
 
@@ -284,7 +284,7 @@ class Constraints:
         return totals, gradients
 
     def _clear(self, motion: Motion) -> Part:
-        """Return one clearance constraint for each of the equal parts of the period."""
+        """Divide the period into equal parts; return a clearance constraint for each part."""
         assert self.clearance is not None
         # unit of the constraint [m]; bodies that are 0.6 units beyond the margin are ignored. At a
         # sharpness of 60, their weight in the soft maximum is exp(-36)
@@ -311,7 +311,7 @@ class Constraints:
     def _between(
         self, values: FloatArray, lower: FloatArray, upper: FloatArray, unit: FloatArray
     ) -> tuple[npt.NDArray[np.intp], FloatArray, FloatArray]:
-        """Return joints with limits, their soft maximum excess, and its derivatives."""
+        """Return the limited joints, soft maxima of their excess over limits, and derivatives."""
         limited = np.flatnonzero(np.isfinite(lower) | np.isfinite(upper))
         signed = np.empty((len(limited), len(values)))
         totals = np.empty(len(limited))

@@ -51,7 +51,7 @@ class _OutOfTime(Exception):
 
 class Search:
     """
-    Search for the best trajectory, which keeps the best so far if it is stopped.
+    Search for the best trajectory; if it is stopped, the best trajectory so far remains.
 
     Parameters
     ----------
@@ -142,7 +142,7 @@ class Search:
         return cost
 
     def step(self) -> None:
-        """Count a step of the search, report the progress, and end the search out of time."""
+        """Count a step of the search, report progress, and stop the search at the time budget."""
         self._steps += 1
         self._watch(min(self._steps / self._work, 1.0), self.cost)
         if time.process_time() - self._begun > self.problem.settings.time_budget:
@@ -170,7 +170,7 @@ class Search:
 
 @dataclass
 class _Branch:
-    """One local search, with its trajectory and the settings of its next round."""
+    """Local search, with its last feasible trajectory and the settings of its next round."""
 
     search: Search
     objective: Objective
@@ -179,7 +179,7 @@ class _Branch:
     cost: float = np.inf
 
     def __post_init__(self) -> None:
-        """Set the scales of the coefficients from the limits, and their bounds in these scales."""
+        """Set the scales of the Fourier coefficients, and the bounds of scaled coefficients."""
         limits, settings = self.search.problem.limits, self.search.problem.settings
         low, high = limits.position_range()
         half = 0.5 * (high - low)[:, np.newaxis]
@@ -279,7 +279,7 @@ class _Branch:
 def _made_feasible(
     problem: DesignProblem, clearance: ClearanceModel | None, trajectory: FourierTrajectory
 ) -> FourierTrajectory | None:
-    """Return a trajectory with amplitudes reduced until feasible; None if never."""
+    """Return a trajectory with amplitudes reduced until feasible; None if this fails."""
     # a joint beyond its own limits is reduced alone; torque and clearance reduce all joints
     for _ in range(12):
         faults = trajectory_faults(problem.arm, problem.limits, trajectory, clearance)
