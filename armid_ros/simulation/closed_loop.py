@@ -139,7 +139,7 @@ class CompiledLoop:
         self, targets: Motion, rows: range, moved: FloatArray, tau: FloatArray
     ) -> Callable[[State, int], int]:
         """
-        Return a function that computes steps until a friction mode changes or a stop is reached.
+        Return a function that computes steps until a friction mode changes or a joint hits a stop.
 
         Parameters
         ----------
@@ -177,7 +177,7 @@ class CompiledLoop:
         return advance
 
     def _smooth_effects(self) -> int:
-        """Compute the smooth effects of the plant for the kernel; return 1 after an exception."""
+        """Compute the torque of the smooth effects for the kernel; return 1 after an exception."""
         n = len(self._law_torque)
         t, q, dq = self._law_input[0], self._law_input[1 : n + 1], self._law_input[n + 1 :]
         assert self._torque is not None
@@ -215,7 +215,7 @@ class Trace(NamedTuple):
 def command(
     plant: Plant, controller: Controller, state: State, targets: Motion, row: int
 ) -> FloatArray:
-    """Return the controller torque for a row of targets, clipped to the limits, (n,) [N m]."""
+    """Return controller torque at a sample of the desired motion, within limits, (n,) [N m]."""
     assert targets.tau is not None
     desired = targets.q[row], targets.dq[row], targets.ddq[row]
     q, dq = (state.q, state.dq) if state.rotors is None else plant.motors(state)[:2]

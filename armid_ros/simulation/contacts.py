@@ -139,7 +139,7 @@ class Contacts:
         return cls(friction.directions, friction.lower, friction.upper, axes, single, loaded)
 
     def with_load(self, load: FloatArray) -> Contacts:
-        """Return the contacts with friction levels under a rigid-body torque, shape (n,) [N m]."""
+        """Return the contacts with dry friction under a load (rigid-body torque), (n,) [N m]."""
         if self.friction is None:
             return self
         more = self.friction.widening(load)

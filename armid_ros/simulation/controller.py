@@ -67,7 +67,7 @@ class LinearFeedback:
 
     @classmethod
     def of(cls, arm: ArmModel, **terms: Any) -> LinearFeedback:
-        """Return a feedback law for the rigid body of an arm and the inertia of its effects."""
+        """Return a feedback law for the rigid body of an arm and the inertia that effects add."""
         action = arm.action()
         robot = action.robot or arm.robot
         none = np.zeros((robot.n_joints, robot.n_joints))
@@ -128,7 +128,7 @@ class Controller:
         return desired.with_torque(self.feedforward(desired))
 
     def feedforward(self, desired: Motion) -> FloatArray:
-        """Return the torques that depend on the reference only, shape (N, n) [N m]."""
+        """Return the controller torques that depend only on the reference, shape (N, n) [N m]."""
         return np.zeros_like(desired.q)
 
     def torque(
@@ -174,7 +174,7 @@ class ComputedTorque(Controller):
         self.feedback = LinearFeedback.of(arm, bandwidth=bandwidth, follows=True)
 
     def feedforward(self, desired: Motion) -> FloatArray:
-        """Return damping, dry friction and other torques at the reference, shape (N, n)."""
+        """Return damping, dry friction and other effect torques along the reference, (N, n)."""
         action = self.arm.action()
         depends = action.dry_friction is not None and action.dry_friction.load_share is not None
         load = self.arm.load(desired) if depends else np.zeros_like(desired.q)
@@ -267,7 +267,7 @@ class MotorControl(Controller):
         return cls(VelocityLoop(gain, gain**2 / (4.0 * inertia)), plant.dt, plant)
 
     def in_initial_state(self) -> MotorControl:
-        """Return a controller with the same loops and zero integrals."""
+        """Return a controller with the same velocity loops, and with zero integrals."""
         return replace(self)
 
     def targets(self, desired: Motion, previous: FloatArray | None = None) -> Motion:

@@ -56,7 +56,7 @@ def two_link_loop(shipped: TwoLinkSet, share: float = 1.0) -> VelocityLoop:
 
 def shipped_arm(robot: Robot) -> tuple[ArmModel, TwoLinkSet | None]:
     """
-    Return the arm model of a shipped robot, and its drives if they are known.
+    Return the arm model of a shipped robot; for the two-link arm, also its parameter set.
 
     The model has no effects, except for the two-link arm: the springs, friction and drives of that
     arm are in its parameter set 'after'.
@@ -70,7 +70,7 @@ def shipped_arm(robot: Robot) -> tuple[ArmModel, TwoLinkSet | None]:
 
 def elastic_joints(arm: ArmModel) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """
-    Return the names of elastic joints with rotor inertia, and of those without.
+    Return the names of elastic joints with rotor inertia, and of those without rotor inertia.
 
     A motor without inertia has no independent motion. The twist of its spring follows the load
     without delay.
@@ -163,7 +163,7 @@ def multisine(
     rng: np.random.Generator,
 ) -> FloatArray:
     """
-    Return one period of sines of equal amplitude and random phase at every frequency of a band.
+    Return a period of signals: sums of sines at every frequency of a band, with random phases.
 
     Parameters
     ----------
@@ -300,7 +300,7 @@ def step_course(
 def _next_pose(
     robot: Robot, here: FloatArray, rng: np.random.Generator, clear: Clear, beyond: FloatArray
 ) -> FloatArray:
-    """Draw a pose that a straight line can reach and from which a given step is allowed."""
+    """Draw a pose that a free straight line reaches and that leaves room for a given step."""
     middle = robot.middle_pose
     reach, tries = np.pi / 3.0, 1000  # largest distance from the middle [rad or m]; drawn poses
     lower = np.maximum(robot.lower, middle - reach)
@@ -317,7 +317,7 @@ def _next_pose(
 
 
 def _finite(robot: Robot, limit: FloatArray, quantity: str) -> FloatArray:
-    """Return the limits of all joints; raise a TrajectoryError if a joint has none."""
+    """Return a limit of each joint; raise a TrajectoryError if a joint has no such limit."""
     for joint, value in zip(robot.joints, limit, strict=True):
         if not np.isfinite(value):
             raise TrajectoryError(

@@ -83,7 +83,7 @@ def _end_velocity(
     dq: FloatArray,
     modes: Modes,
 ) -> tuple[FloatArray, FloatArray, Modes]:
-    """Return velocity and acceleration at the end of a step, and modes of the contacts."""
+    """Return velocity and acceleration at the end of a time step, and modes of the contacts."""
     dt, directions = plant.dt, contacts.directions
     right = np.empty((1 + len(directions), len(force)))
     right[0], right[1:] = force, directions
@@ -122,7 +122,7 @@ def _stop(
     q_next: FloatArray,
     load: FloatArray | None,
 ) -> tuple[FloatArray, FloatArray, FloatArray, Modes]:
-    """Repeat a step with contacts at the joint stops that it reached; return its result."""
+    """Repeat a time step with contacts at the joint stops that were hit; return its result."""
     robot, count = plant.robot, len(state.modes)
     at_upper, at_lower = q_next > robot.upper, q_next < robot.lower
     while True:
@@ -180,7 +180,7 @@ def spring_substep(
 
 
 def _propagated(springs: ElasticJoints, rates: FloatArray, x: FloatArray) -> FloatArray:
-    """Return twists and velocities after a substep, and their change per friction torque."""
+    """Return spring twists and velocities after a substep, with changes per friction torque."""
     e, size = len(springs.joints), len(x)
     z = np.zeros((size, size))
     z[:e, e:] = springs.to_twists

@@ -25,7 +25,7 @@ from scipy.linalg import eigh, LinAlgError
 
 
 def require_masses(robot: Robot) -> None:
-    """Raise a ModelError that names the links of a robot with a negative mass."""
+    """Raise a ModelError if links of a robot have a negative mass; the message names them."""
     masses = robot.rigid_parameters[::PER_LINK]
     negative = [
         f"'{name}' ({mass:g} kg)"
@@ -39,7 +39,7 @@ def require_masses(robot: Robot) -> None:
 
 def possible_loads(robot: Robot, values: FloatArray) -> bool:
     """
-    Return whether parameters of loads belong to possible bodies within reach of an arm.
+    Return whether the inertial parameters of loads are those of possible bodies within reach.
 
     Parameters
     ----------
@@ -95,7 +95,7 @@ def inertia_error(robot: Robot) -> ModelError:
 
 class Rotors(NamedTuple):
     """
-    The motion of the e motors with elastic transmissions, on the joint side of the gear.
+    Motion of the e motors of elastic joints, converted to the joint side of the gears.
 
     Attributes
     ----------
@@ -286,7 +286,7 @@ class Plant:
         return State(steps, t, position, velocity, acceleration, modes, memory, rotors)
 
     def weight(self, q: FloatArray, dq: FloatArray) -> FloatArray:
-        """Return the joint torques due to gravity and velocities, shape (n,) [N m]."""
+        """Return the joint torques due to gravity, Coriolis and centrifugal forces, (n,) [N m]."""
         if self.robot.mechanism is None:
             return np.asarray(pin.nonLinearEffects(self.robot.model, self.data, q, dq))
         return self.robot.inverse_dynamics(self.data, q, dq, np.zeros(len(q)))
@@ -339,7 +339,7 @@ class Plant:
 
 
 def _damping_weight(robot: Robot, inertia: FloatArray, damping: FloatArray, dt: float) -> float:
-    """Return the implicit share of the damping: the weight of the velocity after a step."""
+    """Return the weight of the velocity after a step in the mean damping torque of the step."""
     # 1/2 (second order) for weak damping, 1 (no overshoot) for stiff damping. In between, the
     # value for which the fastest decay rate of the arm is exact (Liniger and Willoughby 1970)
     try:

@@ -61,7 +61,7 @@ class SimulatedRun:
 
     @property
     def temperature(self) -> Temperatures | None:
-        """Return the temperatures of the joints; None if the simulation has none."""
+        """Return the temperatures of the joints; None if the simulation has no temperatures."""
         return self.truth.temperature
 
 

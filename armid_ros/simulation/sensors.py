@@ -49,7 +49,7 @@ class Sensors:
     _quantised: bool = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        """Raise a ModelError if a value is negative; note which errors the readings have."""
+        """Raise a ModelError if a value is negative; set whether readings have noise and steps."""
         noises = ('torque_noise', 'position_noise', 'velocity_noise', 'acceleration_noise')
         for setting in (*noises, 'resolution'):
             value = np.asarray(getattr(self, setting), dtype=float)
@@ -175,11 +175,11 @@ class RecentPast:
         self._steps = trace.state.steps
 
     def _read(self, tau: FloatArray) -> FloatArray:
-        """Return the torque readings at the ends of steps from the torques of the steps."""
+        """Return the torque readings at the ends of steps, from the torques during the steps."""
         return (tau[1:] + tau[:-1]) / 2 if self._plant.springs is None else tau[1:]
 
     def drop(self, count: int) -> None:
-        """Remove the latest samples of the history."""
+        """Remove the latest `count` samples."""
         self._rows, self._steps = self._rows[:, :-count], self._steps - count
 
     def latest(self, ahead: int = 0) -> tuple[FloatArray, FloatArray, FloatArray]:

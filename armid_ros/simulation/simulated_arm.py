@@ -217,7 +217,7 @@ class SimulatedArm:
 
     def successor(self, arm: ArmModel) -> Plant:
         """
-        Return the plant that simulates another arm model in place of the present one.
+        Return the plant that simulates another arm model in place of the present arm model.
 
         Raises
         ------
@@ -301,7 +301,7 @@ class SimulatedArm:
             yield trace
 
     def _take(self, steps: int) -> Trace:
-        """Simulate steps, at most to the end of the present targets, and return their trace."""
+        """Simulate steps, at most to the end of the computed targets, and return their trace."""
         row = self._row + 1
         if row >= len(self._targets):
             self._look_ahead(self._targets.q[-1])
@@ -314,7 +314,7 @@ class SimulatedArm:
         return trace
 
     def _end_block(self) -> None:
-        """Set the state to the present one: repeat the steps of the block up to the present."""
+        """Compute the present state: repeat the steps of the simulated block up to the present."""
         if self._ahead <= 0:
             return
         (state, torque), present = self._block_start, self.steps
@@ -375,11 +375,11 @@ class SimulatedArm:
 
     @property
     def _row(self) -> int:
-        """Row of the present step in the targets."""
+        """Index of the present step in the targets of the controller."""
         return self._state.steps - self._first
 
     def _look_ahead(self, commanded: FloatArray | None = None, steps: int = 1000) -> None:
-        """Set the targets of the next steps, from the last commanded motor position."""
+        """Set the controller targets of the next steps, from the last commanded motor position."""
         self._first = self._state.steps
         self._targets = self.controller.targets(self._desired(steps + 1), commanded)
 
@@ -392,7 +392,7 @@ class SimulatedArm:
     def _require_small(
         self, quantity: str, values: FloatArray, tolerance: float, per: str, advice: str
     ) -> None:
-        """Raise a TrajectoryError if a value of a joint exceeds a tolerance."""
+        """Raise a TrajectoryError if a joint quantity exceeds a tolerance in absolute value."""
         worst = int(np.argmax(np.abs(values)))
         if abs(values[worst]) > tolerance:
             joint, unit = self.joints[worst], self.plant.robot.position_units[worst] + per

@@ -46,7 +46,7 @@ class Elasticity:
 @dataclass(frozen=True, eq=False)
 class ElasticJoints:
     """
-    The e elastic joints of an arm; velocities are those of e motors, then of n links.
+    The e elastic joints of an arm; velocity vectors contain e motors, then n links.
 
     Attributes
     ----------
@@ -161,7 +161,7 @@ class ElasticJoints:
         return np.hstack([-w.T * stiffness, -self.damping - (w.T * damping) @ w])
 
     def meshing(self, twist: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return the `pull` of engaged springs, and minus their torque at zero twist, (e,)."""
+        """Return the `pull` of engaged springs, and the torque offset due to backlash, (e,)."""
         springs = self.transmission
         meshes = np.abs(twist) > springs.gap
         stiffness = np.where(meshes, springs.stiffness, 0.0)

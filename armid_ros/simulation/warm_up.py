@@ -12,7 +12,7 @@ import numpy as np
 
 def temperature_course(text: str, n_joints: int, duration: float) -> Temperatures:
     """
-    Return the joint temperatures of a run from a text such as 20:45:600.
+    Return the joint temperatures of a run from a text START:END:TIME_CONSTANT.
 
     Parameters
     ----------
