@@ -49,7 +49,7 @@ _REMEDY = 'record a run of armid zero plan'
 @dataclass(frozen=True)
 class FittedQuantity:
     """
-    Fitted quantity with the half-width of its 95 % interval, 0 for a known quantity.
+    Fitted quantity with the half-width of its 95 % interval, which is 0 if the value is known.
 
     The joint is empty for a quantity of the whole arm. The reason why the quantity is not
     determined ends with a remedy; it is empty for a determined one.
@@ -67,7 +67,7 @@ class FittedQuantity:
 @dataclass(frozen=True)
 class ZeroFit:
     """
-    Result of a fit of zeros, gains, gravity and tool to K rests of an arm.
+    Result of a fit of torque sensor zeros and gains, gravity and tool to K rests of an arm.
 
     Attributes
     ----------
@@ -94,7 +94,7 @@ class ZeroFit:
     outliers: int
 
     def of(self, name: str, joint: str = '') -> FittedQuantity:
-        """Return the fitted quantity with a name, of a joint or of the whole arm ('')."""
+        """Return the fitted quantity of a name and a joint; joint '' is the whole arm."""
         return next(one for one in self.quantities if (one.name, one.joint) == (name, joint))
 
     def model(self) -> ArmModel:
@@ -112,7 +112,7 @@ class ZeroFit:
 
 
 def arm_at_rest(robot: Robot, known: Collection[str] = ()) -> ArmModel:
-    """Return a quasi-static arm with the effects to fit; known gains add gravity magnitude."""
+    """Return a quasi-static arm with effects to fit, such as gravity if the gains are known."""
     names = ['payload', 'base_tilt', 'coulomb_friction', 'torque_offset', 'torque_gain']
     if 'gain' in known and 'tilt' not in known:
         names.append('gravity_magnitude')
@@ -125,7 +125,7 @@ def arm_at_rest(robot: Robot, known: Collection[str] = ()) -> ArmModel:
 
 def quantities_of(arm: ArmModel) -> dict[tuple[str, str, str], float]:
     """
-    Return zeros, gains, friction, gravity and tool of a fitted arm by name, joint and unit.
+    Return fitted zeros, gains, friction, gravity and tool, keyed by name, joint and unit.
 
     A zero is the reading without any torque. The centre of the tool is in the frame of the last
     joint.
@@ -156,7 +156,7 @@ def fit_rests(
     link_error: float = 0.0,
 ) -> ZeroFit:
     """
-    Fit zeros, gains, gravity, tool and friction to the rests of recordings.
+    Fit torque sensor zeros and gains, gravity, tool and friction to the rests of recordings.
 
     Parameters
     ----------
@@ -205,7 +205,7 @@ def fit_rests(
 def _predicted(
     arms: Sequence[ArmModel], rests: Sequence[Motion], x: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Return predicted torques (K, n) and their derivatives (K, n, P) for changed parameters."""
+    """Return torques (K, n) predicted with changed parameters, and derivatives (K, n, P)."""
     pairs = [(a.with_theta(a.theta + x), motion) for a, motion in zip(arms, rests, strict=True)]
     torque = np.concatenate([arm.torque(motion) for arm, motion in pairs])
     return torque, np.concatenate([arm.columns(motion) for arm, motion in pairs])
@@ -213,7 +213,7 @@ def _predicted(
 
 class _Solution(NamedTuple):
     """
-    Solution of the fit: change x of all P parameters, indices and covariance of F free ones.
+    Solution: change x of all P parameters, indices and covariance of the F fitted parameters.
 
     Covariances (F, F) are from the variances of joints and from the scatter of the rests;
     information (F, F) is without the prior; freedom is the fewest redundant readings of a joint.
@@ -233,7 +233,7 @@ class _Solution(NamedTuple):
 def _solved(
     arms: Sequence[ArmModel], rests: Sequence[Motion], prior: FloatArray, scales: FloatArray
 ) -> _Solution:
-    """Fit by Gauss-Newton iterations, with estimated variances and without outliers."""
+    """Fit the free parameters by Gauss-Newton, with estimated noise and without outliers."""
     y = np.concatenate([np.asarray(one.tau) for one in rests])
     # readings without a motion of the joint before only bound its dry friction
     approached = np.concatenate([one.dq for one in rests]).astype(bool)
@@ -267,7 +267,7 @@ def _solved(
 def _quantities(
     arm: ArmModel, solved: _Solution, units: Mapping[str, float], few: str
 ) -> tuple[FittedQuantity, ...]:
-    """Return the fitted quantities with intervals; `few` is the reason if poses are too few."""
+    """Return the fitted quantities with intervals; `few` is the message on too few poses."""
     factor = float(student.ppf(0.975, max(solved.freedom, 1.0)))
     middle, std = quantities_of(arm), np.sqrt(np.diag(solved.covariance))
     found, tool = [], True
@@ -343,7 +343,7 @@ def fit_document(
 
 
 def fit_summary(found: ZeroFit, document: dict[str, Any], step: str, noise: FloatArray) -> Summary:
-    """Return the terminal summary of a fit; `noise` is that of a reading at rest, shape (n,)."""
+    """Return the terminal summary of a fit; `noise` is the torque noise of rests, shape (n,)."""
     names = ('zero', 'gain', 'friction')
     rows = [
         (joint, *(_cell(found.of(name, joint)) for name in names), f'{residual:.2g}')

@@ -78,7 +78,7 @@ def _poses(
     rng: np.random.Generator,
 ) -> FloatArray:
     """
-    Return the most informative free poses, shape (count, n), in the order of a short tour.
+    Return the most informative collision-free poses, (count, n), in the order of a short tour.
 
     The determinant of the information on all effects is maximised, pose by pose and then by
     exchange. Source: Fedorov 1972.

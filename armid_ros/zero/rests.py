@@ -17,7 +17,7 @@ _WINDOW, _SETTLING_TIME, _MIN_REST = 1.0, 0.5, 0.5
 
 
 def reading_noise(recording: Recording) -> FloatArray:
-    """Return the noise of a torque averaged over the shortest rest, shape (n,) [N m or N]."""
+    """Return the standard deviation of the mean torque over the shortest rest, (n,) [N m or N]."""
     assert recording.tau is not None
     count = max(_MIN_REST / max(recording.period, 1e-6), 1.0)
     # the median leaves out steps of friction; for white noise it is 0.954 standard deviations
