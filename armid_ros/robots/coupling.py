@@ -46,7 +46,7 @@ def moving_joints(description: Description, driven: Sequence[str]) -> tuple[str,
 
 def couple(tree: Robot, driven: Sequence[Joint], known: Mapping[str, float]) -> Robot:
     """
-    Return the robot in which only given joints are driven, and all other joints follow these.
+    Return the robot in which only given joints are driven and all other moving joints follow.
 
     Parameters
     ----------

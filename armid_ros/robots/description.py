@@ -62,7 +62,7 @@ class Mimic:
 
     @property
     def joint(self) -> str:
-        """Return the name of the followed joint, or of the first if the joint follows several."""
+        """Return the name of the leader, the first leader if the mimic joint has several."""
         return next(iter(self.multipliers))
 
 
@@ -103,7 +103,7 @@ class Joint:
 
 @dataclass(frozen=True)
 class Description:
-    """Links, by name with inertial data, joints and closed loops of a URDF, in document order."""
+    """Contents of a URDF: links with inertial data, joints and closed loops, in file order."""
 
     name: str
     links: dict[str, Inertial | None]
@@ -221,7 +221,7 @@ def _loop(element: ElementTree.Element, links: Iterable[str], joints: Mapping[st
 
 
 def _mimic(element: ElementTree.Element, where: str, known: Mimic | None) -> Mimic:
-    """Return a mimic relation with the leader of a <mimic> element added."""
+    """Return the mimic relation of a joint, extended by the leader in a <mimic> element."""
     joint = element.get('joint', '')
     before = {} if known is None else dict(known.multipliers)
     before[joint] = before.get(joint, 0.0) + _number(element, 'multiplier', where, 1.0)
@@ -390,7 +390,7 @@ def _origin(element: ElementTree.Element, where: str) -> tuple[Vector, Vector]:
 
 
 def _vector(element: ElementTree.Element, name: str, where: str) -> Vector:
-    """Return the three numbers of an attribute, or zeros if the attribute is missing."""
+    """Return the three numbers of an XML attribute, or zeros if the attribute is missing."""
     text = element.get(name, '0 0 0')
     attribute = f"{where}: {name}='{text}' of <{element.tag}>"
     try:
@@ -412,7 +412,7 @@ def _number(
     *,
     endless: bool = False,
 ) -> float:
-    """Return the number of an attribute, which may be infinite if it is `endless`."""
+    """Return the number in an XML attribute; it may be infinite only if `endless` is True."""
     text = element.get(name, '' if default is None else repr(default))
     attribute = f"{where}: {name}='{text}' of <{element.tag}>"
     try:

@@ -181,7 +181,7 @@ def sticks(model: pin.Model) -> list[tuple[int, FloatArray]]:
 
 
 def combined_mesh_note(notes: Sequence[str]) -> tuple[str, ...]:
-    """Return one note on several missing meshes, with their number and the first note."""
+    """Combine notes on missing meshes into a note with their number and the first note."""
     if len(notes) < 2:
         return tuple(notes)
     return (f'{len(notes)} meshes not found, such as that of {notes[0]}',)
@@ -313,7 +313,7 @@ def collision_model(
 
 
 def _leave_out_touching(robot: Robot, geometry: pin.GeometryModel) -> tuple[tuple[str, str], ...]:
-    """Remove the pairs of links that touch in the zero pose; return them alphabetically sorted."""
+    """Remove the collision pairs of links that touch in the zero pose; return the links sorted."""
     data, placed = robot.model.createData(), geometry.createData()
     pin.computeDistances(robot.model, data, geometry, placed, robot.positions(robot.zero_pose))
     touching = {
@@ -328,7 +328,7 @@ def _leave_out_touching(robot: Robot, geometry: pin.GeometryModel) -> tuple[tupl
 
 
 def _leave_out_separate(robot: Robot, geometry: pin.GeometryModel) -> None:
-    """Remove the pairs of bodies that only one joint moves and that touch nowhere in its range."""
+    """Remove pairs of bodies with a single joint between them that never touch in its range."""
     robot = robot.tree
     data, placed = robot.model.createData(), geometry.createData()
     by_joint: dict[int, list[int]] = {}

@@ -336,7 +336,7 @@ def _text(numbers: Sequence[float]) -> str:
 
 def read_mounting(robot: Robot) -> tuple[float | None, Path] | None:
     """
-    Read the height of the floor from NAME.mounting.yaml beside NAME.urdf; None without this file.
+    Read the floor height from NAME.mounting.yaml next to NAME.urdf; None without this file.
 
     Returns
     -------

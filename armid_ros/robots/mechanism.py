@@ -48,7 +48,7 @@ class Configuration(NamedTuple):
 @dataclass(frozen=True, eq=False)
 class Mechanism:
     """
-    The map from n driven joints to m moving joints, q = A u + B p(u) + b.
+    Map from positions u of n driven joints to those of m moving joints, q = A u + B p(u) + b.
 
     Attributes
     ----------
@@ -131,14 +131,14 @@ class Mechanism:
         return Configuration(q.reshape(-1, m), jacobian.reshape(-1, m, n), drift)
 
     def along(self, motion: Motion) -> tuple[Motion, FloatArray]:
-        """Return the motion of the moving joints for that of the driven ones, and J, (N, m, n)."""
+        """Convert a motion of the driven joints to the moving joints; return also J, (N, m, n)."""
         q, jacobian, drift = self.states(motion.q, motion.dq)
         dq, ddq = (np.einsum('kmn,kn->km', jacobian, x) for x in (motion.dq, motion.ddq))
         return Motion(self.joints, motion.t, q, dq, ddq + drift), jacobian
 
     def _solved(self, u: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """
-        Solve the closure of loops for one pose of the driven joints; return positions and J.
+        Solve loop closure for a pose of the driven joints; return all joint positions and J.
 
         The third result, (m, 3 L), is the change of the moving joints per metre between the ends.
 

@@ -255,7 +255,7 @@ class _Writer:
         return min(limits)
 
     def _mimic(self, element: ElementTree.Element, joint: int) -> None:
-        """Write a linear equality of two joints as a mimic joint."""
+        """Write a linear equality constraint between two joints as a <mimic> element."""
         model = self.model
         for number in range(model.neq):
             follows, leader = int(model.eq_obj1id[number]), int(model.eq_obj2id[number])
@@ -272,7 +272,7 @@ class _Writer:
             ElementTree.SubElement(element, 'mimic', values | {'offset': _number(offset)})
 
     def _loop(self, equality: int, anchors: Mapping[int, FloatArray]) -> bool:
-        """Write a connect equality as a closed loop; return False if it closes no such loop."""
+        """Write a connect equality as a closed loop; return False if this is not possible."""
         model, kinds = self.model, self.mujoco.mjtEq
         bodies = [int(model.eq_obj1id[equality]), int(model.eq_obj2id[equality])]
         of_bodies = model.eq_objtype[equality] == self.mujoco.mjtObj.mjOBJ_BODY

@@ -103,12 +103,12 @@ class Reference:
 
     @property
     def duration(self) -> float:
-        """Time of the last point [s]."""
+        """Time of the last waypoint [s]."""
         return float(self.t[-1])
 
     def sample(self, t: FloatArray) -> Motion:
         """
-        Evaluate the curve at given times.
+        Evaluate the smooth curve through the waypoints at given times.
 
         Parameters
         ----------

@@ -159,7 +159,7 @@ class Robot:
         return bool(own.prismatic[own.index(joint)])
 
     def body_of(self, joint: str) -> int:
-        """Return the index of the body that a joint moves; for a motor, of the last such body."""
+        """Return the index of the body of a joint; for a motor, of the last body it drives."""
         if self.mechanism is None or joint in self.moving:
             return self.moving.index(joint)
         return int(np.flatnonzero(self.mechanism.driven[:, self.index(joint)])[-1])

@@ -83,7 +83,7 @@ def driven_joints(description: Description, names: Sequence[str] | None) -> tupl
 
 
 def several_arms(description: Description, driven: Sequence[str]) -> tuple[str, ...]:
-    """Return a note that lists the arms if the driven joints belong to several; else no note."""
+    """Return a note that lists the arms if driven joints belong to several arms, or no note."""
     arms = _arms(description, driven)
     if len(arms) < 2:
         return ()
@@ -92,7 +92,7 @@ def several_arms(description: Description, driven: Sequence[str]) -> tuple[str, 
 
 
 def _arms(description: Description, joints: Sequence[str]) -> list[list[str]]:
-    """Return the arms: chains of three or more joints between the last fork and a tip."""
+    """Return the arms of a robot: chains of at least three joints from the last fork to a tip."""
     carriers = {name: _carriers(description, [name]) for name in joints}
     kept = list(joints)
     while kept:

@@ -99,7 +99,7 @@ def package_folders(
     name: str, file: Path | None, given: Mapping[str, str | Path] | None = None
 ) -> Iterator[Path]:
     """
-    Yield the possible folders of a package, the most likely folder first.
+    Yield the possible folders of a ROS package, the most likely folder first.
 
     Parameters
     ----------
