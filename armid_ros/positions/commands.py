@@ -82,7 +82,7 @@ def read_commands(
 
 
 def _topic(path: Path, recording: Recording, name: str | None, settings: ReadSettings) -> Topic:
-    """Return the topic of commanded positions in a bag: the named topic, or the only one."""
+    """Return the topic of commanded positions in a bag: the named topic, or the only candidate."""
     with Bag(path, settings) as bag:
         topics = bag.topics()
     if name is None:

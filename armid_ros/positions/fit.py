@@ -119,7 +119,7 @@ def start_values(
     model: LoopModel, runs: Sequence[Run], gains: FloatArray | None
 ) -> tuple[FloatArray, FloatArray]:
     """
-    Return start values of the P parameters, and the size of each that alone explains the torque.
+    Return start values of the parameters, and the size at which each alone explains the torque.
 
     The torque balance of each joint is linear in gains, rotor inertia and friction. It is solved
     for nonnegative values and several delays. The result has the delay with the smallest
@@ -193,7 +193,7 @@ class _Problem:
         return np.concatenate(simulated) - np.concatenate(measured)
 
     def slopes(self, x: FloatArray, places: npt.NDArray[np.intp]) -> FloatArray:
-        """Return position derivatives by chosen parameters, relative to their sizes, (M, n, k)."""
+        """Return derivatives of simulated positions by k scaled parameters, shape (M, n, k)."""
         share = 1e-3  # step of a parameter, as a share of its size
         now, steps = self.residual(x), share * np.diag(self.size)[places]
         columns = [(self.residual(x + step) - now) / share for step in steps]
@@ -242,7 +242,7 @@ class _Problem:
 def _errors(
     information: FloatArray, scores: FloatArray, some: npt.NDArray[np.intp]
 ) -> tuple[FloatArray, FloatArray]:
-    """Return covariance and standard errors of chosen parameters, relative to their sizes."""
+    """Return covariance and standard errors of chosen parameters, in units of their sizes."""
     inside = information[np.ix_(some, some)] + np.eye(len(some)) / _PRIOR_STD**2
     covariance = np.linalg.inv(inside)
     blocks = len(scores)
@@ -253,7 +253,7 @@ def _errors(
 
 
 def _fit_at(problem: _Problem, x: FloatArray, free: npt.NDArray[np.bool_]) -> PositionFit:
-    """Return the fit at fitted parameters x, with standard errors and reasons for missing ones."""
+    """Return the fit at parameters x, with standard errors, or reasons why they are missing."""
     model, n, count = problem.model, problem.model.robot.n_joints, len(x)
     residuals = problem.residual(x)
     sigma = np.sqrt(np.mean(residuals**2, axis=0)) + 1e-9

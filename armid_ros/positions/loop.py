@@ -148,7 +148,7 @@ class LoopModel:
 
     @cached_property
     def parameters(self) -> tuple[ParameterName, ...]:
-        """Return the parameters: delay, gains of the joints, effects, centre of the payload."""
+        """Return names and units of the parameters: delay, gains, effects, payload centre."""
         robot = self.robot
         units = list(zip(robot.torque_units, robot.position_units, strict=True))
         gains = [
@@ -166,7 +166,7 @@ class LoopModel:
         )
 
     def arm(self, x: FloatArray) -> ArmModel:
-        """Return the arm model for given parameters, shape (P,); the tool is taken as a ball."""
+        """Return the arm model for P parameters; the tool has equal moments of inertia."""
         n, (mass, *center, radius) = self.robot.n_joints, x[-5:]
         tool = pin.Inertia(mass, np.array(center), mass * radius**2 * np.eye(3))
         values = (*np.split(x[2 * n + 1 : -5], 3), tool.toDynamicParameters())

@@ -83,7 +83,7 @@ def fit_document(found: PositionFit, hints: Sequence[str] = ()) -> dict[str, Any
 
 
 def fit_summary(found: PositionFit, document: dict[str, Any], step: str) -> Summary:
-    """Return the terminal summary of a fit; `step` is the next step for the user if it is good."""
+    """Return the terminal summary of a fit; `step` is the user's next step after a good fit."""
     verdict = document['verdict']
     joints = found.arm.robot.joints
 
