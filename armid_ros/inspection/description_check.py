@@ -95,7 +95,7 @@ class LinkCheck:
 
 def description_remarks(robot: Robot) -> tuple[Remark, ...]:
     """
-    Check inertias, densities and limits of a description without a recording, the worst first.
+    Return remarks on inertias, densities and limits of a robot description, the worst first.
 
     Raises
     ------
@@ -112,7 +112,7 @@ def description_remarks(robot: Robot) -> tuple[Remark, ...]:
 
 
 def _thin_inertias(robot: Robot) -> Iterator[Remark]:
-    """Yield a remark on each inertia of a body thinner than `THINNEST` times its length."""
+    """Yield a remark on each inertia whose body would be thinner than `THINNEST` of its length."""
     for link, inertial in robot.description.links.items():
         if inertial is None or inertial.doubt():
             continue
@@ -151,7 +151,7 @@ def _joint_remarks(robot: Robot) -> Iterator[Remark]:
 
 
 def _limit_remarks(robot: Robot) -> Iterator[Remark]:
-    """Yield remarks on effort and velocity limits that weight or other joints contradict."""
+    """Yield remarks on effort and velocity limits that are improbably small or large."""
     if robot.mechanism is not None:  # not every pose of the driven joints exists
         return
     # largest torque of each joint that holds the arm in random poses [N m]
@@ -330,7 +330,7 @@ def check_links(found: Identification, robot: Robot, grade: str, fault: str) -> 
 
 
 def _errors(found: Identification, theta: FloatArray) -> tuple[float, float]:
-    """Return the torque errors with other parameters theta, and with the fitted parameters [%]."""
+    """Return the relative torque errors [%] with parameters theta, and with those of the fit."""
     before = found.arm.with_theta(theta)
     fits = [
         replace(
@@ -344,7 +344,7 @@ def _errors(found: Identification, theta: FloatArray) -> tuple[float, float]:
 
 
 def _selected(rows: FloatArray, spread: FloatArray, total: float) -> list[int]:
-    """Select the wrong links by forward selection; drop a link that became redundant."""
+    """Return the links with wrong parameters, by forward selection without redundant links."""
     every = range(len(spread) // PER_LINK)
     wrong: list[int] = []
     rest = total
@@ -365,7 +365,7 @@ def _selected(rows: FloatArray, spread: FloatArray, total: float) -> list[int]:
 def _fit(
     rows: FloatArray, spread: FloatArray, links: Sequence[int]
 ) -> tuple[FloatArray, FloatArray, float]:
-    """Fit the parameters of some links; return change, covariance and remaining chi-squared."""
+    """Fit inertial parameters of links; return changes, covariance and remaining chi-squared."""
     size = PER_LINK
     own = [size * k + i for k in links for i in range(size)]
     columns, target = rows[:, own] * spread[own], rows[:, -1]

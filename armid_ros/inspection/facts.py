@@ -234,7 +234,7 @@ class TrialFit:
     def of(
         cls, found: Identification, graded: Grade, recording: Recording, scale: FloatArray
     ) -> TrialFit:
-        """Return the quality of an identification; `scale` is efforts over described torques."""
+        """Return the quality of an identification; `scale` is effort over described torque."""
         robot, motions = found.arm.robot, [fit.motion for fit in found.training]
         score = Score.of(found.training)
         errors = score.joint_relative_error_percent

@@ -187,7 +187,7 @@ def notes_on(robot: Robot) -> list[str]:
 
 
 def worst_first(remarks: Iterable[Remark]) -> tuple[Remark, ...]:
-    """Sort remarks by weight; remarks of equal weight keep their order."""
+    """Sort remarks from the worst to the mildest; remarks of equal weight keep their order."""
     return tuple(sorted(remarks, key=lambda remark: get_args(Weight).index(remark.weight)))
 
 
@@ -291,7 +291,7 @@ def _motion_remarks(joints: tuple[JointFacts, ...], sampling: Sampling) -> Itera
 
 
 def _effort_remarks(joints: tuple[JointFacts, ...], trial: TrialFit | None) -> Iterator[Remark]:
-    """Yield remarks on missing or constant efforts, and on factors to described torques."""
+    """Yield remarks on efforts that are missing, constant or multiples of described torques."""
     if joints[0].effort_rms is None:
         yield Remark('bad', 'no efforts: nothing can be identified; is JointState.effort filled?')
         return
