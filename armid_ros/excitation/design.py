@@ -63,13 +63,13 @@ class Design:
     stopped: str = ''
 
     def robot_limits_used(self, arm: ArmModel) -> dict[str, FloatArray]:
-        """Return the largest share of each limit of the robot that the excitation uses."""
+        """Return the share of each limit of the robot that the excitation uses at its peak."""
         full = Limits.of(arm.robot, speed=1.0, reserve=False)
         return replace(self, limits=full).limits_used(arm)
 
     def limits_used(self, arm: ArmModel) -> dict[str, FloatArray]:
         """
-        Return the largest share of each limit of the design that the excitation uses.
+        Return the share of each limit of the design that the excitation uses at its peak.
 
         Transfers to and from the excitation do not count.
 

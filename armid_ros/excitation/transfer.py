@@ -38,7 +38,7 @@ class Transfer(Reference):
         return replace(self, t=self.t * (duration / self.duration))
 
     def reversed(self) -> Transfer:
-        """Return the transfer in the opposite direction."""
+        """Return the transfer in the opposite direction, from its last pose to its first pose."""
         return replace(self, t=self.duration - self.t[::-1], q=self.q[::-1])
 
 

@@ -49,7 +49,7 @@ class NearPairs:
 @dataclass(frozen=True)
 class Approach:
     """
-    An approach of two bodies: names, time and distance.
+    Approach of two bodies: their names, the time of the approach, and their distance.
 
     Attributes
     ----------
