@@ -153,7 +153,7 @@ class Contacts:
 
 
 def split_constant(friction: DryFriction | None, n_joints: int) -> tuple[DryFriction, FloatArray]:
-    """Return the friction elements that can stick, and the constant torque of all others."""
+    """Return the dry friction elements that can stick, and the constant torque of the others."""
     if friction is None:
         return DryFriction(np.empty((0, n_joints)), np.empty(0), np.empty(0)), np.zeros(n_joints)
     span = friction.upper - friction.lower

@@ -60,7 +60,7 @@ class LinearFeedback:
     _data: pin.Data = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        """Set the rigid body of the inverse dynamics, and its scratch memory."""
+        """Set the rigid body of the inverse dynamics, and the memory for its computation."""
         body = self.robot if self.weighs else self.robot.with_gravity(np.zeros(3))
         object.__setattr__(self, '_body', body)
         object.__setattr__(self, '_data', body.model.createData())
@@ -76,7 +76,7 @@ class LinearFeedback:
     def torque(
         self, q: FloatArray, dq: FloatArray, desired: Desired, feedforward: FloatArray
     ) -> FloatArray:
-        """Return feedback torque plus feedforward, shape (n,) [N m]; see `Controller.torque`."""
+        """Return feedback plus feedforward torque, shape (n,) [N m]; see `Controller.torque`."""
         behind, slower = desired[0] - q, desired[1] - dq
         ddq = self.bandwidth**2 * behind
         ddq += 2.0 * self.bandwidth * slower

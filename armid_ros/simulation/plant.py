@@ -313,14 +313,14 @@ class Plant:
             force -= self.action.hysteresis.torque(memory)
 
     def times(self, first: int, count: int) -> FloatArray:
-        """Return the times of successive steps [s], shape (count,)."""
+        """Return the times of successive steps of the plant [s], shape (count,)."""
         return np.asarray(self.dt * np.arange(first, first + count), dtype=np.float64)
 
     def contacts_at(
         self, at_lower: npt.NDArray[np.bool_], at_upper: npt.NDArray[np.bool_]
     ) -> Contacts:
         """
-        Return the contacts of the friction elements, followed by the active joint stops.
+        Return the contacts: dry friction elements, followed by the joint stops that are active.
 
         A stop holds any torque in one direction: w <= 0, f >= 0, w f = 0 at the upper limit.
 

@@ -72,7 +72,7 @@ class Sensors:
         rng: np.random.Generator,
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
         """
-        Add noise and quantisation to successive samples; the caller applies the delay.
+        Add sensor noise and quantisation to successive samples; the caller applies the delay.
 
         Parameters
         ----------

@@ -86,7 +86,7 @@ class ElasticJoints:
 
     @cached_property
     def pull(self) -> FloatArray:
-        """Torques of engaged springs and dampers per twist and velocity, (e + n, e + e + n)."""
+        """Matrix from twists and velocities to spring and damper torques, (e + n, e + e + n)."""
         return self._pull_of(self.transmission.stiffness, self.transmission.damping)
 
     @cached_property
@@ -156,7 +156,7 @@ class ElasticJoints:
         )
 
     def _pull_of(self, stiffness: FloatArray, damping: FloatArray) -> FloatArray:
-        """Return the torques of springs and dampers per twist and velocity, (e + n, e + e + n)."""
+        """Return the matrix from twists and velocities to torques, (e + n, e + e + n)."""
         w = self.to_twists
         return np.hstack([-w.T * stiffness, -self.damping - (w.T * damping) @ w])
 
@@ -179,7 +179,7 @@ class ElasticJoints:
 
 
 def _required_springs(robot: Robot, action: Action) -> Transmission:
-    """Return the springs of an arm; raise a ModelError if no motor moves independently."""
+    """Return the springs of an arm; raise a ModelError if they cannot be simulated."""
     springs = action.transmission
     if springs is None or not np.any(np.isfinite(springs.stiffness)):
         raise ModelError(
