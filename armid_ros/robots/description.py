@@ -127,7 +127,7 @@ class Description:
 
     @cached_property
     def by_name(self) -> Mapping[str, Joint]:
-        """Return the joints as a mapping from their names."""
+        """Return a mapping from joint names to joints."""
         return {joint.name: joint for joint in self.joints}
 
 

@@ -27,7 +27,7 @@ from scipy.linalg.lapack import dposv
 
 class Configuration(NamedTuple):
     """
-    State of the moving joints for one or N states of the driven joints.
+    State of the moving joints for a state of the driven joints, or for N states.
 
     Attributes
     ----------

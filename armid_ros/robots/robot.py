@@ -182,7 +182,7 @@ class Robot:
     def state(
         self, q: FloatArray, dq: FloatArray, ddq: FloatArray
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return position, velocity and acceleration of the moving joints, each (m,)."""
+        """Return position, velocity and acceleration of the moving joints, from driven joints."""
         if self.mechanism is None:
             return q, dq, ddq
         position, jacobian, drift = self.mechanism.at(q, dq)

@@ -165,7 +165,7 @@ def main() -> None:
 
 
 class _Arguments(dict[str, str]):
-    """Arguments of a xacro, with the names that its files declare or use."""
+    """Arguments of a xacro file, with the argument names that the file declares or uses."""
 
     def __init__(self, given: Mapping[str, str]) -> None:
         super().__init__(given)
