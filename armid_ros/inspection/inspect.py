@@ -212,7 +212,7 @@ def _fit_remarks(trial: TrialFit, known: Sequence[str]) -> Iterator[Remark]:
 
 
 def _time_remarks(recording: Recording, sampling: Sampling) -> Iterator[Remark]:
-    """Yield remarks on damage, time stamps, gaps, jitter and repetition of a recording."""
+    """Yield remarks on damaged data, time stamps, gaps, jitter and repetition of a recording."""
     report = recording.report
     if report.damage:
         yield Remark('doubt', report.damage)
