@@ -28,7 +28,7 @@ NO_FRICTION = 1e-12
 
 
 class Displacement(NamedTuple):
-    """Change of position, velocity and acceleration, each of shape (N, n, ...)."""
+    """Changes of joint positions, velocities and accelerations, each of shape (N, n, ...)."""
 
     q: FloatArray
     dq: FloatArray
@@ -58,7 +58,7 @@ class DryFriction:
 
     def torque(self, dq: FloatArray, load: FloatArray | None = None) -> FloatArray:
         """
-        Return the friction torques of the joints; an element at rest has its mean level.
+        Return the joints' friction torques; an element at rest has the mean of its two levels.
 
         Parameters
         ----------
@@ -79,7 +79,7 @@ class DryFriction:
         return np.asarray(half @ np.abs(self.directions))
 
     def widening(self, load: FloatArray) -> FloatArray:
-        """Return the increase of the friction levels under a load, shape (..., m) [N m]."""
+        """Return the increase of each element's friction levels under a load, (..., m) [N m]."""
         if self.load_share is None:
             return np.zeros((*load.shape[:-1], len(self.lower)))
         return np.asarray(self.load_share * np.abs(load @ self.directions.T))
@@ -137,7 +137,7 @@ class Transmission:
 @dataclass(frozen=True)
 class Action:
     """
-    Terms that effects with given values add to the plant and its sensors; None if absent.
+    Terms that effects with given values add to plant and sensors; an absent term is None.
 
     On the motor side, the actuators have to supply damping @ dq + inertia @ ddq + dry friction +
     hysteresis + torque(t, q, dq). On the link side, they have to supply the torque of the rigid
@@ -229,7 +229,7 @@ def law_derivatives(law: TorqueLaw, motion: Motion) -> tuple[FloatArray, FloatAr
 
 def merge_actions(robot: Robot, actions: Sequence[Action]) -> Action:
     """
-    Return the action of several effects on one robot together.
+    Return the combined action of several effects on the same robot.
 
     Matrices and torques are summed. Dry friction along one direction becomes one element.
     Actions on readings are applied in the given order.
@@ -288,7 +288,7 @@ def merge_actions(robot: Robot, actions: Sequence[Action]) -> Action:
 
 
 def sum_laws(laws: Sequence[TorqueLaw]) -> TorqueLaw | None:
-    """Return the sum of torque functions of time and motion; None if there are none."""
+    """Return the sum of torque functions of time and motion; None for an empty sequence."""
 
     def torque(t: FloatArray, q: FloatArray, dq: FloatArray) -> FloatArray:
         return np.asarray(sum(law(t, q, dq) for law in laws))
@@ -299,7 +299,7 @@ def sum_laws(laws: Sequence[TorqueLaw]) -> TorqueLaw | None:
 
 
 def _merge_friction(elements: list[DryFriction]) -> DryFriction | None:
-    """Return all friction elements; elements along one direction become one with summed levels."""
+    """Merge friction elements that act along the same direction, and sum their levels."""
     if not elements:
         return None
     directions = np.vstack([e.directions for e in elements])

@@ -86,7 +86,7 @@ class Effect(ABC):
     lasting: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
-        """Set the default shape parameters, and check the number and range of given ones."""
+        """Set default shape parameters, or check number and range of given shape parameters."""
         defaults = tuple(s.default for s in self.shapes) * len(self.owners)
         values = tuple(float(value) for value in self.shape) or defaults
         if len(values) != len(defaults):
@@ -144,7 +144,7 @@ class Effect(ABC):
     @classmethod
     def places(cls, robot: Robot) -> tuple[tuple[str, ...], ...]:
         """
-        Return the sets of joints on which one such effect can act: joints, pairs, or all.
+        Return the sets of joints on which the effect can act: single joints, pairs, or the arm.
 
         Raises
         ------
@@ -161,11 +161,11 @@ class Effect(ABC):
         return cls
 
     def particulars(self) -> dict[str, Any]:
-        """Return further entries of the effect for model.yaml, such as a reference temperature."""
+        """Return entries for model.yaml beyond values and shapes, such as temperatures."""
         return {}
 
     def with_particulars(self, entry: Mapping[str, Any]) -> Self:
-        """Return the effect with the further entries that model.yaml has; see `particulars`."""
+        """Return the effect with those entries of model.yaml that `particulars` wrote."""
         return self
 
     def named_as(self, values: FloatArray, arm: Arm) -> tuple[tuple[Effect, FloatArray], ...]:
@@ -173,12 +173,12 @@ class Effect(ABC):
         return ((self, values),)
 
     def _default_shape(self, robot: Robot) -> FloatArray:
-        """Return the default shape parameters for this robot, with one row for each owner."""
+        """Return default shape parameters for this robot, with a row for each of the `owners`."""
         return self.shape_values
 
     @property
     def shape_values(self) -> FloatArray:
-        """Shape parameters of all owners, shape (number of owners, S)."""
+        """Array of the S shape parameters, with a row for each of the `owners`."""
         return np.array(self.shape).reshape(len(self.owners), len(self.shapes))
 
     def with_shape(self, values: npt.ArrayLike) -> Effect:
@@ -220,7 +220,7 @@ class Effect(ABC):
 
     def shape_starts(self, unexplained: Unexplained, arm: Arm) -> tuple[FloatArray, ...]:
         """
-        Return start values for the search of each shape parameter, (number of owners, G).
+        Return G start values for the search of each shape parameter, arrays (owners, G).
 
         Parameters
         ----------
@@ -234,7 +234,7 @@ class Effect(ABC):
 
     @property
     def owners(self) -> tuple[str, ...]:
-        """Joints with parameters of their own; one empty name for an effect on the whole arm."""
+        """Names of joints with own parameters; an empty name for an effect on the whole arm."""
         return self.joints or ('',)
 
     def parameters(self, robot: Robot) -> tuple[ParameterName, ...]:
@@ -252,7 +252,7 @@ class Effect(ABC):
         return lower, upper
 
     def adds_to(self, robot: Robot) -> tuple[int, ...]:
-        """Return the indices of rigid-body parameters to which the effect adds; often none."""
+        """Return the indices of rigid-body parameters to which effect values are added, if any."""
         return ()
 
     @property
@@ -266,7 +266,7 @@ class Effect(ABC):
         return ()
 
     def along(self, motion: Motion) -> Self:
-        """Return the effect with recorded signals that it needs, such as temperatures."""
+        """Return the effect with the recorded signals that its torque depends on, if any."""
         return self
 
     def referred_to(self, temperatures: Mapping[str, float]) -> Self:
@@ -306,7 +306,7 @@ class Effect(ABC):
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
         """
-        Return what the effect adds to the plant and its sensors for given parameter values.
+        Return the terms that the effect adds to plant and sensors for given parameter values.
 
         By default, the torque on the link side is columns @ values. This is correct for a torque
         that is linear in the values and depends on time, position and velocity only.
@@ -380,13 +380,13 @@ class Arm(Protocol):
 
     @property
     def body(self) -> Robot:
-        """Return the rigid body with effects, such as a payload or a changed gravity."""
+        """Return the rigid body with the effects that change it, such as a payload."""
 
     def values_of(self, effect: Effect) -> FloatArray:
         """Return the parameter values of an effect, shape (P_e,)."""
 
     def action(self) -> Action:
-        """Return the action of all effects together."""
+        """Return the combined action of all effects on plant and sensors."""
 
     def link_motion(self, motion: Motion) -> Motion:
         """Return the true motion of the links for a recorded motion."""
@@ -395,25 +395,25 @@ class Arm(Protocol):
         """Return the frames of all links along a recorded motion."""
 
     def smoothed(self, motion: Motion) -> Motion:
-        """Return a recorded motion without frequencies beyond its band."""
+        """Return a recorded motion without frequencies above its band (`band_hz`)."""
 
     def load(self, motion: Motion) -> FloatArray:
         """Return the torque of the rigid body along a motion of the links, (N, n) [N m]."""
 
     def load_derivatives(self, motion: Motion) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return the derivatives of the load by q, dq and ddq, each of shape (N, n, n)."""
+        """Return the derivatives of the rigid body's torque by q, dq and ddq, (N, n, n) each."""
 
     def body_columns(self, motion: Motion) -> FloatArray:
-        """Return the regressor of the load along a recorded motion, (N, n, 10 n)."""
+        """Return the regressor of the rigid body along a recorded motion, (N, n, 10 n)."""
 
     def gravity_columns(self, motion: Motion) -> FloatArray:
-        """Return the derivatives of the load by the gravity vector, shape (N, n, 3)."""
+        """Return the derivatives of the rigid body's torque by the gravity vector, (N, n, 3)."""
 
     def joint_torque(self, motion: Motion) -> FloatArray:
-        """Return the true torques of a recorded motion, (N, n) [N m]."""
+        """Return the true joint torques along a recorded motion, (N, n) [N m]."""
 
     def torque_before(self, effect: Effect, motion: Motion) -> FloatArray:
-        """Return the torque that the reading of an effect receives, shape (N, n) [N m]."""
+        """Return the torque that a sensor effect converts to a reading, shape (N, n) [N m]."""
 
     def torque_change(self, motion: Motion, change: Displacement) -> FloatArray:
         """Return the change of the joint torques due to changes of the links' motion."""

@@ -109,7 +109,7 @@ class Catalogue(Mapping[str, type[Effect]]):
         self.broken: dict[str, str] = {}
 
     def __getitem__(self, name: str) -> type[Effect]:
-        """Return the effect class of a name; installed packages are loaded if needed."""
+        """Return the effect class with this name; load effects of installed packages if needed."""
         if name not in self._kinds:
             self._complete_once()
         return self._kinds[name]
@@ -126,7 +126,7 @@ class Catalogue(Mapping[str, type[Effect]]):
 
     def find(self, name: str) -> type[Effect]:
         """
-        Return the effect class of a name; the error suggests similar names.
+        Return the effect class with this name; the error message suggests a similar name.
 
         Raises
         ------
@@ -182,7 +182,7 @@ class Catalogue(Mapping[str, type[Effect]]):
         self._kinds[kind.name] = kind
 
     def remove(self, name: str) -> None:
-        """Remove an effect class that is not shipped, if the catalogue has it."""
+        """Remove a user-defined effect class; a shipped or unknown name is ignored."""
         if name not in self._shipped:
             self._kinds.pop(name, None)
 
@@ -240,7 +240,7 @@ def check_kind(kind: type[Effect]) -> None:
 
 
 def part_names(kind: type[Effect]) -> list[str]:
-    """Return the names of the quantities and shapes of an effect."""
+    """Return the names of the quantities and shape parameters of an effect."""
     return [*(one.name for one in kind.quantities), *(one.name for one in kind.shapes)]
 
 
@@ -305,7 +305,7 @@ def register(kind: _Kind) -> _Kind:
 
 def make_effect(text: str, robot: Robot) -> Effect:
     """
-    Make an effect from its name, optionally with joints.
+    Make an effect from a text that contains its name and, optionally, its joints.
 
     Parameters
     ----------
@@ -386,7 +386,7 @@ def parse_effect(text: str, robot: Robot) -> tuple[Effect, FloatArray]:
 
 
 def _number(text: str, effect: Effect, key: str, number: str) -> float:
-    """Return the number given for a quantity or shape; the error explains values per joint."""
+    """Parse the value of a quantity or shape parameter; raise a ModelError if it is no number."""
     try:
         value = float(number)
     except ValueError:

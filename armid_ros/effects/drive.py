@@ -100,7 +100,7 @@ class TorqueRipple(JointLaw):
 
 def wave_orders(unexplained: Unexplained, joint: int, between: tuple[float, float]) -> FloatArray:
     """
-    Return the ripple orders over a joint position that explain most of the residual, (K,).
+    Return the K ripple orders of a joint that explain most of the residual, (K,).
 
     All recordings are used together, because a ripple has the same order and phase in each.
 
@@ -194,7 +194,7 @@ class ActuatorSaturation(TorqueReading):
         return (np.outer(highest, [0.3, 0.4, *np.linspace(0.5, 0.95, 10)]),)
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
-        """Return the torque that saturated drives lose, and the torque that they hide."""
+        """Return the lost and the unreported torque of saturated drives, as an action."""
         lost = scatter(self, values, arm.robot)[0]
         (level,) = scatter(self, self.shape_values, arm.robot)
 
@@ -215,13 +215,13 @@ class ActuatorSaturation(TorqueReading):
     def transfer(
         self, values: FloatArray, motion: Motion, tau: FloatArray, columns: FloatArray
     ) -> FloatArray:
-        """Convert regressor columns of true torque to columns of reported torque, (N, n, Q)."""
+        """Convert the regressor of true torques to that of reported torques, shape (N, n, Q)."""
         lost, clipped, level = self._spread(values, motion)
         slope = (lost / (1.0 - lost) if motion.tau is None else 0.0) - clipped
         return np.asarray((1.0 + slope * (np.abs(tau) > level))[:, :, np.newaxis] * columns)
 
     def sensitivity(self, values: FloatArray, motion: Motion, tau: FloatArray) -> FloatArray:
-        """Return the derivatives of the reported torque by both shares, shape (N, n, P)."""
+        """Return the derivatives of the reported torque by lost and clipped share, (N, n, P)."""
         lost, _, level = self._spread(values, motion)
         beyond = _excess(tau, level)
         asked = beyond / (1.0 - lost) ** 2 if motion.tau is None else _excess(motion.tau, level)

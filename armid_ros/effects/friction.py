@@ -186,7 +186,7 @@ class ThermalFriction(JointLaw):
 @dataclass(frozen=True)
 class ThermalChange(ThermalFriction):
     """
-    Change of viscous friction, from the beginning and while the joint warms up.
+    Change of viscous friction since the baseline, in the cold joint and while it warms up.
 
     tau = (c + dFv (1 - exp(-t / T))) dq. A joint that starts colder has more friction at first,
     and the same friction when warm. Reported as thermal_friction and viscous_friction.
@@ -241,7 +241,7 @@ class TemperatureDependentFriction(Effect):
     lasting = True
 
     def __post_init__(self) -> None:
-        """Set the reference temperature of joints without one to its default."""
+        """Set the default reference temperature of joints for which no temperature is given."""
         super().__post_init__()
         known = dict.fromkeys(self.joints, _REFERENCE_TEMPERATURE) | dict(self.reference)
         object.__setattr__(self, 'reference', tuple(known.items()))
@@ -270,7 +270,7 @@ class TemperatureDependentFriction(Effect):
         return {joint: known[joint] for joint in self.joints}
 
     def plausible(self, values: FloatArray, std: FloatArray, arm: Arm) -> bool:
-        """Return whether friction changes by at most 5 % per kelvin, and falls if viscous."""
+        """Return whether friction changes at most 5 % per kelvin, and viscous friction falls."""
         action, n = arm.action(), arm.robot.n_joints
         known = np.zeros((2, n))
         if action.damping is not None:

@@ -106,7 +106,7 @@ class BaseTilt(_GravityEffect):
 @dataclass(frozen=True)
 class GravityVector(_GravityEffect):
     """
-    Difference of the gravity vector from that of the model: any mounting on any planet.
+    Difference of the gravity vector from that of the model, in direction and magnitude.
 
     The torque is exactly linear in the vector at any angle. A search uses this effect, and reports
     the result as base_tilt and gravity_magnitude.
@@ -141,13 +141,13 @@ class GravityVector(_GravityEffect):
 
 
 def with_exact_vector(kinds: Sequence[type[Effect]]) -> list[type[Effect]]:
-    """Return effect classes with BaseTilt replaced by GravityVector, if gravity may change too."""
+    """Replace BaseTilt by GravityVector in effect classes that include GravityMagnitude."""
     both = BaseTilt in kinds and GravityMagnitude in kinds
     return [GravityVector if both and kind is BaseTilt else kind for kind in kinds]
 
 
 def _turned(gravity: FloatArray, tilt: FloatArray) -> FloatArray:
-    """Return gravity in the frame of a base turned by a rotation vector, (2,) [rad]."""
+    """Return the gravity vector in the frame of a base with tilt angles (2,) [rad]."""
     rotation = Rotation.from_rotvec(tilt @ _horizontal_axes(gravity))
     return np.asarray(rotation.inv().apply(np.array(gravity)))
 

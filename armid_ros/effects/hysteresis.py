@@ -38,7 +38,7 @@ class LoadDependentFriction(Effect):
         return joint_columns(self, motion, np.abs(load) * direction(motion))
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
-        """Return dry friction of the plant whose levels rise with the load."""
+        """Return load-dependent friction as dry friction whose levels rise with the load."""
         (share,) = scatter(self, values, arm.robot)
         zero = np.zeros_like(share)
         return Action(dry_friction=DryFriction(np.eye(len(share)), zero, zero, share))
@@ -84,6 +84,6 @@ class PreslidingHysteresis(Effect):
         return Action(hysteresis=self._elements(values, arm.robot.joints))
 
     def _elements(self, level: FloatArray, joints: tuple[str, ...]) -> Hysteresis:
-        """Return the slipping springs of the joints, with given levels."""
+        """Return slipping springs on the effect's joints, with given torque levels."""
         directions = np.eye(len(joints))[self.indices(joints)]
         return Hysteresis(directions, level, self.shape_values[:, 0])

@@ -43,7 +43,7 @@ class Attached(Effect):
         return robot.moving
 
     def _default_shape(self, robot: Robot) -> FloatArray:
-        """Return shape parameters that attach springs to the centres of mass, within reach."""
+        """Return shape parameters that attach the springs at or near centres of mass of links."""
         values, model = self.shape_values, robot.model
         reach = max(float(np.linalg.norm(place.translation)) for place in model.jointPlacements)
         for row, joint in zip(values, self.joints, strict=True):
@@ -54,7 +54,7 @@ class Attached(Effect):
         return values
 
     def shape_starts(self, unexplained: Unexplained, arm: Arm) -> tuple[FloatArray, ...]:
-        """Return start values: present coordinates of points, and grids of other shapes."""
+        """Return start values of shapes: present coordinates of points, grids of other shapes."""
         return tuple(
             self.shape_values[:, [index]]
             if shape.unit == 'm' and shape.lower < 0.0
@@ -69,7 +69,7 @@ class Attached(Effect):
 
     @abstractmethod
     def _anchor(self, arm: Arm) -> Anchor:
-        """Return the function that gives the anchors of the springs at times."""
+        """Return a function from times to positions and velocities of the springs' anchors."""
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
         """Return the joint torques of attached springs, as an action on the links."""
@@ -165,7 +165,7 @@ class InterfaceSlack(Attached):
     )
 
     def _default_shape(self, robot: Robot) -> FloatArray:
-        """Return shape parameters with anchors at the attachments in the middle pose."""
+        """Return shape parameters with anchors at the attachment points in the middle pose."""
         values = super()._default_shape(robot)
         middle = LinkFrames.in_the_middle(robot)
         for row, joint in zip(values, self.joints, strict=True):

@@ -21,7 +21,7 @@ import numpy.typing as npt
 
 class JointStates(NamedTuple):
     """
-    States of the k joints of an effect.
+    Time, position, velocity and direction of motion of the k joints of an effect.
 
     Attributes
     ----------
@@ -65,7 +65,7 @@ class JointLaw(Effect):
         return _placed(self, motion, self.law(JointStates(motion.t[:, np.newaxis], *states)))
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
-        """Return the levels of a joint at rest as dry friction, and the other torque."""
+        """Return the torque as an action; torque levels that hold a joint are dry friction."""
         places, n = self.indices(arm.robot.joints), arm.robot.n_joints
         first, *others = values.reshape(len(places), -1).T
         # a slice takes less time than indices, and the plant calls the law in every step
@@ -102,7 +102,7 @@ class JointLaw(Effect):
 
 def joint_columns(effect: Effect, motion: Motion, *quantities: FloatArray) -> FloatArray:
     """
-    Return the columns of an effect that acts on each of its joints separately.
+    Return the regressor of an effect that acts on each of its joints separately.
 
     Parameters
     ----------
@@ -125,7 +125,7 @@ def joint_columns(effect: Effect, motion: Motion, *quantities: FloatArray) -> Fl
 
 def scatter(effect: Effect, values: FloatArray, robot: Robot) -> FloatArray:
     """
-    Put the values of an effect into the columns of its joints; zero in all other columns.
+    Return effect values as an array with a column for each joint of the robot.
 
     Parameters
     ----------
@@ -148,7 +148,7 @@ def scatter(effect: Effect, values: FloatArray, robot: Robot) -> FloatArray:
 
 
 def _placed(effect: Effect, motion: Motion, quantities: Sequence[FloatArray]) -> FloatArray:
-    """Return the regressor (N, n, P) with the values (N, k) of each quantity of k joints."""
+    """Assemble the regressor (N, n, P) from the torques (N, k) per unit of each quantity."""
     size = len(quantities) * len(effect.joints)
     columns = np.zeros((len(motion), motion.n_joints * size))
     _, places = _flat_places(effect.joints, motion.joints, len(quantities))
@@ -161,7 +161,7 @@ def _placed(effect: Effect, motion: Motion, quantities: Sequence[FloatArray]) ->
 def _flat_places(
     joints: tuple[str, ...], among: tuple[str, ...], count: int
 ) -> tuple[npt.NDArray[np.intp], tuple[npt.NDArray[np.intp], ...]]:
-    """Return the indices of joints among others, and those of their regressor entries."""
+    """Return indices of joints among other joints, and of their entries in a regressor row."""
     own = np.array(places_among(joints, among), dtype=np.intp)
     size = count * len(own)
     return own, tuple(own * size + np.arange(first, size, count) for first in range(count))

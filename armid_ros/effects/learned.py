@@ -37,7 +37,7 @@ _DIGITS = '.9g'
 @dataclass(frozen=True, eq=False)
 class TorqueMap:
     """
-    The posterior of a Gaussian process over position, velocity and load of one joint.
+    Learned torque of a joint: Gaussian-process posterior over position, velocity and load.
 
     k(x, x') = s^2 exp(-sum of ((u_i - u_i') / l_i)^2 / 2); the mean is the sum of a_m k(x, x_m) /
     s^2. The velocity is scaled as u = v asinh(dq / v): proportional below the knee v and
@@ -108,11 +108,11 @@ class TorqueMap:
         return replace(self, weights=cho_solve(self._factor, torque))
 
     def torque(self, inputs: FloatArray) -> FloatArray:
-        """Return the learned torque at inputs, shape (..., 3) to (...) [N m or N]."""
+        """Return the learned torque at positions, velocities and loads, (..., 3), [N m or N]."""
         return np.asarray(self._nearness(inputs) @ self.weights)
 
     def std(self, inputs: FloatArray) -> FloatArray:
-        """Return the standard deviation of the learned torque at inputs, (..., 3) to (...)."""
+        """Return the standard deviation of the learned torque at inputs (..., 3); see `torque`."""
         near = self._nearness(inputs)
         solved = cho_solve(self._factor, near.reshape(-1, len(self.weights)).T).T
         explained = np.sum(near * solved.reshape(near.shape), axis=-1)
@@ -124,7 +124,7 @@ class TorqueMap:
         return cho_factor(self._nearness(self.points) + np.diag(share))
 
     def _nearness(self, inputs: FloatArray) -> FloatArray:
-        """Return the kernel between inputs and inducing points, over s^2, shape (..., M)."""
+        """Return the kernel divided by s^2 between inputs and inducing points, shape (..., M)."""
         own, others = (scaled_inputs(x, self.knee) for x in (inputs, self.points))
         difference = (own[..., np.newaxis, :] - others) / self.lengths
         return np.asarray(np.exp(-0.5 * np.sum(difference**2, axis=-1)))
@@ -227,7 +227,7 @@ class LearnedTorque(Effect):
         return tau
 
     def columns(self, motion: Motion, arm: Arm) -> FloatArray:
-        """Return the torque of each map in the row of its joint, shape (N, n, P) [N m]."""
+        """Return the learned torque of each joint in a column of its own, (N, n, P) [N m]."""
         link = arm.link_motion(motion)
         return joint_columns(self, motion, self.torque(arm.body, link.q, link.dq))
 
@@ -243,7 +243,7 @@ class LearnedTorque(Effect):
 
 
 def scaled_inputs(inputs: FloatArray, knee: float) -> FloatArray:
-    """Return inputs, (..., 3), with the velocity converted to the scale u of `TorqueMap`."""
+    """Return inputs (position, velocity, load) with velocities on the scale u of `TorqueMap`."""
     velocity = knee * np.arcsinh(inputs[..., 1] / knee)
     return np.stack([inputs[..., 0], velocity, inputs[..., 2]], axis=-1)
 

@@ -23,7 +23,7 @@ class _LinkBody(Effect):
     changes_body = True
 
     def parameters(self, robot: Robot) -> tuple[ParameterName, ...]:
-        """Return names of the parameters; units are the same on a prismatic joint."""
+        """Return parameter names; their units are the same on revolute and prismatic joints."""
         return tuple(
             ParameterName(q.name, owner, q.unit) for owner in self.owners for q in self.quantities
         )
@@ -81,7 +81,7 @@ class Payload(_LinkBody):
 
     @classmethod
     def places(cls, robot: Robot) -> tuple[tuple[str, ...], ...]:
-        """Return all moving links as places of a payload."""
+        """Return the joint of each moving link, as a possible place of a payload."""
         return tuple((joint,) for joint in robot.moving)
 
     @classmethod
@@ -107,7 +107,7 @@ class Payload(_LinkBody):
         return not most * heaviest < np.maximum(aside, 0.0) ** 2
 
     def _weighs(self, values: FloatArray, std: FloatArray, arm: Arm) -> bool:
-        """Return whether the mass may be positive, with its centre within the arm's length."""
+        """Return whether the mass can be positive, and its centre within the arm's length."""
         if std[0] == 0.0:  # noqa: RUF069 - set exactly to zero if no motion identifies it, as for an inner link
             return bool(np.any(values[1:4]))
         places = [placement.translation for placement in arm.robot.model.jointPlacements]
@@ -118,7 +118,7 @@ class Payload(_LinkBody):
 
     def spread(self, robot: Robot) -> FloatArray:
         """
-        Return the values of the largest expected payload, as heavy as the arm, shape (P,).
+        Return the parameters of the largest expected payload, which has the arm's mass, (P,).
 
         First moments and inertia are proportional to the mass.
 
@@ -131,7 +131,7 @@ class Payload(_LinkBody):
 @dataclass(frozen=True)
 class PayloadChange(Payload):
     """
-    Change of the payload of a link, which may be negative.
+    Change of the payload of a link; its mass may be negative.
 
     A negative mass is a payload that was put down, and that the model has as part of the link.
 

@@ -57,7 +57,7 @@ class _Pairs(Effect):
 
     @property
     def owners(self) -> tuple[str, ...]:
-        """First joint of every pair, which gives its parameters their names."""
+        """First joint of every pair, which appears in the parameter names of the pair."""
         return self.joints[::2]
 
     def parameters(self, robot: Robot) -> tuple[ParameterName, ...]:
@@ -195,7 +195,7 @@ class TorqueCrosstalk(_Pairs, TorqueReading):
 
     @classmethod
     def places(cls, robot: Robot) -> tuple[tuple[str, ...], ...]:
-        """Return all ordered pairs of joints: that of the reading, then that of the torque."""
+        """Return all ordered pairs of joints: joint of the reading, then joint of the torque."""
         return tuple(permutations(robot.joints, 2))
 
     def parameters(self, robot: Robot) -> tuple[ParameterName, ...]:
@@ -217,7 +217,7 @@ class TorqueCrosstalk(_Pairs, TorqueReading):
     def transfer(
         self, values: FloatArray, motion: Motion, tau: FloatArray, columns: FloatArray
     ) -> FloatArray:
-        """Convert regressor columns of true torques to columns of readings with crosstalk."""
+        """Convert the regressor of true torques to that of torque readings with crosstalk."""
         return np.asarray(columns + self._shares(values, motion) @ columns)
 
     def sensitivity(self, values: FloatArray, motion: Motion, tau: FloatArray) -> FloatArray:

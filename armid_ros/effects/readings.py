@@ -78,7 +78,7 @@ class TorqueReading(Effect):
         self, values: FloatArray, motion: Motion, tau: FloatArray, columns: FloatArray
     ) -> FloatArray:
         """
-        Convert regressor columns of true torque to columns of torque readings, (N, n, Q).
+        Convert the regressor of true torques to that of torque readings, shape (N, n, Q).
 
         By default, the reading is linear in the torque, and `read` takes columns as well.
 
@@ -87,7 +87,7 @@ class TorqueReading(Effect):
 
     @abstractmethod
     def sensitivity(self, values: FloatArray, motion: Motion, tau: FloatArray) -> FloatArray:
-        """Return the derivatives of the reading of a torque by the parameters, shape (N, n, P)."""
+        """Return the derivatives of the reading of `tau` by effect parameters, shape (N, n, P)."""
 
     def memory(self, values: FloatArray) -> float:
         """Return the time span of the past torque on which the reading depends [s]."""

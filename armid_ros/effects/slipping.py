@@ -71,7 +71,7 @@ class Hysteresis:
 
     def pullback(self, q: FloatArray, dq: FloatArray, weights: FloatArray) -> FloatArray:
         """
-        Return the derivative of the weighted sum of torques along a path by the positions.
+        Return the derivative of a weighted sum of torques along a path by joint positions.
 
         Parameters
         ----------
@@ -103,7 +103,7 @@ class Hysteresis:
 
 
 def _monotone_parts(travel: FloatArray) -> list[tuple[int, int, float]]:
-    """Return first and last sample of every motion between reversals, and its direction."""
+    """Return first sample, last sample and direction of each motion between two reversals."""
     step = np.sign(np.diff(travel))
     turns = np.flatnonzero(np.diff(step)) + 1
     ends = zip(np.append(0, turns), np.append(turns, len(step)), strict=True)

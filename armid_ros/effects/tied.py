@@ -97,7 +97,7 @@ class Tied(Attached):
         return self.shape_values
 
     def particulars(self) -> dict[str, Any]:
-        """Return the other machine and the end points of the springs, for model.yaml."""
+        """Return name of the other machine and end points of the springs, for model.yaml."""
         rows = [
             {
                 'name': tie.name,
@@ -183,7 +183,7 @@ def tied_effect(
 
 def tied_as_written(entry: Mapping[str, Any], robot: Robot) -> Tied:
     """
-    Make the springs to another machine from their entry in model.yaml.
+    Make springs between the arm and another machine from an entry of model.yaml.
 
     Raises
     ------
@@ -232,6 +232,6 @@ class Partner:
     source: str = ''
 
     def tied(self, arm: Robot, joints: Sequence[str] | None = None, *, slack: bool) -> Effect:
-        """Make springs and dampers, or straps with slack, on given joints or on all tied ones."""
+        """Make springs with dampers, or straps with slack, on given joints or all tied joints."""
         name = (TiedSlack if slack else TiedInteraction).name
         return tied_effect(name, self.ties, self.source or self.robot.name, arm, joints)

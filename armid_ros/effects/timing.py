@@ -39,7 +39,7 @@ class LateReading(TorqueReading):
         return ((), *((joint,) for joint in robot.joints))
 
     def _joints_of_delays(self, motion: Motion) -> list[list[int]]:
-        """Return the indices of the joints that share each delay: all joints, or single ones."""
+        """Return indices of the joints that share each delay: all joints, or single joints."""
         joints = self.indices(motion.joints)
         return [[joint] for joint in joints] or [list(range(motion.n_joints))]
 
@@ -193,7 +193,7 @@ def low_pass(t: FloatArray, x: FloatArray, lag: float) -> FloatArray:
 
 
 def _as_columns(effect: TorqueReading, motion: Motion, values: FloatArray) -> FloatArray:
-    """Return derivatives (N, n) as columns: one for each joint, or one for the whole arm."""
+    """Return derivatives (N, n) as a regressor: a column per joint, or a single column."""
     if effect.joints:
         return joint_columns(effect, motion, values)
     return values[:, :, np.newaxis]

@@ -54,7 +54,7 @@ class JointElasticity(Displacing):
         return _twist(self, motion, load)
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
-        """Return springs and dampers of the plant, and displaced encoder readings."""
+        """Return springs and dampers of transmissions, and link displacements from readings."""
         if not np.any(values):
             return Action()
         (compliance,) = scatter(self, values, arm.robot)
@@ -89,7 +89,7 @@ class Backlash(Displacing):
     instantaneous = False
 
     def displacements(self, motion: Motion, arm: Arm) -> Displacement:
-        """Return the link displacement per unit of backlash, as a share of the gap."""
+        """Return the link displacement per backlash: minus the position in the gap over width."""
         load = arm.load(motion)
         inertia = np.diagonal(arm.load_derivatives(motion)[2], axis1=1, axis2=2)
         place = np.zeros(motion.q.shape)
@@ -100,7 +100,7 @@ class Backlash(Displacing):
         return _twist(self, motion, place)
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
-        """Return gaps of the plant's transmissions, and displaced encoder readings."""
+        """Return gaps of transmissions, and the displacement of links from encoder readings."""
         if not np.any(values):
             return Action()
         (gap,) = scatter(self, values, arm.robot)
@@ -134,7 +134,7 @@ def place_in_gap(t: FloatArray, pull: FloatArray, width: float) -> FloatArray:
 
 
 def _twist(effect: Displacing, motion: Motion, twist: FloatArray) -> Displacement:
-    """Return the link displacement of each parameter for twists of transmissions, (N, n)."""
+    """Return the link displacement per unit of each parameter, from transmission twists."""
     speed = rate_of_change(motion.t, twist)
     parts = (-twist, -speed, -rate_of_change(motion.t, speed))
     return Displacement(*(joint_columns(effect, motion, part) for part in parts))
