@@ -293,7 +293,7 @@ def _with_shares(
     explanation: Explanation, explainer: Explainer
 ) -> tuple[Explanation, Attribution, Evidence | None]:
     """
-    Measure the share of the gap of each cause; causes with a small share become minor.
+    Measure which share of the gap each cause explains; a small share makes a cause minor.
 
     Returns
     -------
@@ -324,7 +324,7 @@ def _with_shares(
 def _not_visible(
     explanation: Explanation, found: Sequence[Finding], explainer: Explainer
 ) -> tuple[str, ...]:
-    """Return the names of effects that the data show on no joint, in catalogue order."""
+    """Return the names of effects that the data cannot show on any joint, in catalogue order."""
     hidden = {name for name, _ in explanation.invisible}
     hidden -= {one.effect.name for one in explanation.candidates}
     hidden -= {finding.name for finding in found}

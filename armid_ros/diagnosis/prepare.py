@@ -98,7 +98,7 @@ def prepare(
     misfit: bool = False,
 ) -> Prepared:
     """
-    Measure the torque noise of trajectories, and select the rows next to reversals that are used.
+    Measure the torque noise of trajectories, and decide which rows next to reversals are used.
 
     Rows next to reversals are used if their noise exceeds the error of dry friction. They are not
     used if the floor is a misfit: dry friction is then the largest error of a model, and it
@@ -123,7 +123,7 @@ def prepare(
 
 
 def with_friction(arm: ArmModel, library: Sequence[str]) -> tuple[ArmModel, tuple[Effect, ...]]:
-    """Add usual friction and offsets to all joints; return the arm and the added effects."""
+    """Add the friction and offsets that joints lack; return the arm and the added effects."""
     there = {(effect.name, joint) for effect in arm.effects for joint in effect.joints}
     added: list[Effect] = []
     fuller = arm

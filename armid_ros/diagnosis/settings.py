@@ -151,7 +151,7 @@ class DiagnosisSettings:
     thresholds: Thresholds = field(default_factory=Thresholds)
 
     def __post_init__(self) -> None:
-        """Check the names and frequencies of priors."""
+        """Check the effect names and the frequency words in `prior`."""
         names = [kind.name for kind in self.kinds]
         for effect, frequency in self.prior.items():
             for word, known, kind in (
@@ -172,7 +172,7 @@ class DiagnosisSettings:
 
 
 def log_prior(effect: Effect, robot: Robot, changed: bool) -> float:
-    """Return the prior log odds of an effect on its joints, as an error or as a change."""
+    """Return the prior log odds of an effect on its joints, as a model error or as a change."""
     names, name = list(CATALOGUE), effect.name
     odds = RARER * (names.index(name) if name in CATALOGUE else len(names))
     odds += SHAPE * len(effect.shape)

@@ -48,7 +48,7 @@ def diagnose_ties(
     explainer: Explainer, recordings: Sequence[Recording], partner: Partner
 ) -> Explanation | None:
     """
-    Explain a residual by springs to another machine (ties), and its remainder by other causes.
+    Explain a residual by springs between arm and other machine (ties), then by other causes.
 
     Returns
     -------
@@ -137,7 +137,7 @@ class _Ties:
 
     def without_bias(self, found: Explanation) -> Explanation:
         """
-        Replace the stiffness of each tie by its estimate without the bias of noisy angles.
+        Replace the stiffness of each tie by an estimate without the bias due to angle noise.
 
         The described links are kept if they explain the torques as well as fitted links.
 
@@ -200,7 +200,7 @@ class _Ties:
 
 def _with_springs(explanation: Explanation, found: Interaction) -> Fitted:
     """
-    Return the fitted arm with the stiffness of ties replaced, and base parameters refitted.
+    Replace the stiffness of ties in a fitted arm, and refit its base parameters.
 
     If other effects were fitted jointly, the standard deviations of the stiffness are the larger
     ones of both fits.
@@ -235,7 +235,7 @@ def _with_springs(explanation: Explanation, found: Interaction) -> Fitted:
 def _as_one_cause(
     explainer: Explainer, evidence: Evidence, partner: Partner, fitted: Fitted
 ) -> tuple[tuple[CauseResult, ...], tuple[tuple[str, tuple[str, ...]], ...]]:
-    """Compare all ties, as one cause, with other causes; return the results as `survey` does."""
+    """Rank all ties together, as a single cause, among other causes; results as of `survey`."""
     settings, robot = explainer.settings, explainer.arm.robot
     free = [one for one in grid_without_baseline() if one.body]
     comparison = explainer.comparison(Rows.over_noise(evidence), free)

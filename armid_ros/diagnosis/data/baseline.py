@@ -37,7 +37,7 @@ import scipy.linalg
 def excited_parameters(
     arm: ArmModel, theory: BaseParameters, data: Sequence[Trajectory]
 ) -> tuple[BaseParameters, list[FloatArray]]:
-    """Return the base parameters that are identifiable in the data, and their columns."""
+    """Return the base parameters that are identifiable in the data, and their regressors."""
     columns = [part.base_columns(arm, arm.effects, theory.independent) for part in data]
     stacked = np.concatenate([block.reshape(-1, theory.rank) for block in columns])
     names = tuple(theory.standard[column] for column in theory.independent)
@@ -95,7 +95,7 @@ def described_precision(
 def refitted_arm(
     arm: ArmModel, base: BaseParameters, data: Sequence[Trajectory], sigma: Sequence[FloatArray]
 ) -> ArmModel:
-    """Return the arm with base parameters fitted to trajectories of noise sigma (n,) [N m]."""
+    """Return the arm with base parameters fitted to trajectories with torque noise `sigma`."""
     columns = [part.base_columns(arm, arm.effects, base.independent) for part in data]
     weight = row_weights(data, sigma)
     x = (np.concatenate(columns) * weight[:, :, np.newaxis]).reshape(-1, base.rank)
@@ -184,7 +184,7 @@ def known_misfit(
     held_out: Sequence[Recording] = (),
 ) -> Misfit:
     """
-    Measure the rms residual of a model in sound recordings, as reference of later diagnoses.
+    Measure the rms residual of a model in recordings, as reference for later diagnoses.
 
     Rows in which a joint rests or reverses are not used, as in a diagnosis: friction there is
     the largest error of a model.

@@ -77,5 +77,5 @@ def discrepancy_columns(data: Sequence[Trajectory], arm: Arm) -> list[FloatArray
 
 
 def hat_functions(x: FloatArray, knots: FloatArray) -> list[FloatArray]:
-    """Return the linear B-spline (hat) basis at x, one array of the shape of x per knot."""
+    """Return the values of linear B-splines (hat functions) at x, an array like x per knot."""
     return [np.interp(x, knots, row) for row in np.eye(len(knots))]

@@ -61,7 +61,7 @@ class Evidence:
 
     @classmethod
     def over_noise(cls, data: Sequence[Trajectory], noise: Sequence[FloatArray]) -> Evidence:
-        """Return recordings whose residuals are weighted by their noise, (n,) each [N m]."""
+        """Return recordings whose residuals are divided by their noise, (n,) each [N m]."""
         return cls(tuple(data), tuple(noise), tuple(noise))
 
     @cached_property
@@ -76,7 +76,7 @@ class Evidence:
         return np.sqrt(self.power([part.torque for part in self.data]))
 
     def chi2_per_row(self, residual: Sequence[FloatArray]) -> FloatArray:
-        """Return the mean square of residual over `sigma` for each joint, shape (n,)."""
+        """Return the mean square of the residual divided by `sigma` for each joint, (n,)."""
         return self.power([rows / s for rows, s in zip(residual, self.sigma, strict=True)])
 
     def relative_errors(self, residual: Sequence[FloatArray]) -> FloatArray:
@@ -122,17 +122,17 @@ class Evidence:
         return np.where(misfit, self.misfit_limit(settings), noise) + self.material_loss(settings)
 
     def misfit_limit(self, settings: DiagnosisSettings) -> FloatArray:
-        """Return the largest `chi2_per_row` of a known misfit in another motion, (n,)."""
+        """Return the largest `chi2_per_row` that a known misfit explains in another motion."""
         varies = np.ones_like(self.count) if self.varies is None else self.varies
         return np.asarray(settings.thresholds.same_fit * np.maximum(varies, 1.0))
 
     def material_loss(self, settings: DiagnosisSettings) -> FloatArray:
-        """Return the `chi2_per_row` of a residual as large as `settings.material` allows, (n,)."""
+        """Return the `chi2_per_row` of the largest immaterial residual of each joint, (n,)."""
         unit = np.mean(np.square(self.sigma), axis=0)
         return np.asarray((settings.material * self.torque_rms) ** 2 / unit)
 
     def _correlation_length(self, residual: Sequence[FloatArray]) -> FloatArray:
-        """Return the number of neighbouring rows with correlated squared residuals, (n,)."""
+        """Return the correlation length of each joint's squared residual, in rows, (n,)."""
         products = np.zeros((21, len(self.count)))  # correlated over 20 rows at most
         for part, own in zip(self.data, residual, strict=True):
             rows = np.where(part.informative, own, 0.0)
@@ -151,7 +151,7 @@ def torque_rms(data: Sequence[Trajectory]) -> FloatArray:
 @dataclass(frozen=True)
 class NoiseFloor:
     """
-    Torque noise of each joint in one trajectory: all of it, its slow part, and its fast part.
+    Torque noise of each joint in a trajectory: total, low-frequency part, and upper limit.
 
     Attributes
     ----------
@@ -265,7 +265,7 @@ def _difference(
     trajectory: Trajectory, residual: FloatArray, first: npt.NDArray[np.intp], lag: int, joint: int
 ) -> tuple[FloatArray, npt.NDArray[np.bool_]]:
     """
-    Return the difference of two equal periods in one joint, and the samples in which it moves.
+    Return a joint's residual difference between equal periods, and its samples in motion.
 
     Linear drifts of offset and viscous friction are regressed out, because they are effects.
 

@@ -43,13 +43,13 @@ class Rows:
 
     @classmethod
     def over_noise(cls, evidence: Evidence) -> Rows:
-        """Return the rows of recordings without a baseline, weighted by their noise."""
+        """Return the rows of diagnosed recordings without a baseline, divided by their noise."""
         torque = np.maximum(evidence.torque_rms, 1e-3 * evidence.torque_rms.max())
         amplitude = (torque,) * count_recordings(evidence.data)
         return cls(evidence.data, evidence.sigma, 0, amplitude).above_rounding()
 
     def above_rounding(self) -> Rows:
-        """Raise `sigma` and `amplitude` to 1e-4 of the rms torque, its rounding error."""
+        """Raise `sigma` and `amplitude` to at least the rounding error, 1e-4 of the rms torque."""
         least = 1e-4 * self.torque
         return replace(
             self,
@@ -65,7 +65,7 @@ class Rows:
 
     @cached_property
     def diagnosed(self) -> npt.NDArray[np.bool_]:
-        """Return whether each recording is a diagnosed one, and no baseline, shape (K,)."""
+        """Return whether each of K recordings is diagnosed, and not part of the baseline."""
         return np.arange(max(part.fold for part in self.data) + 1) >= self.n_baseline
 
     @cached_property
@@ -74,7 +74,7 @@ class Rows:
         return [k for k, part in enumerate(self.data) if self.diagnosed[part.fold]]
 
     def rms_of_diagnosed(self, columns: Sequence[FloatArray]) -> FloatArray:
-        """Return the rms of columns (M, n, p) over the diagnosed rows in motion, (n, p)."""
+        """Return the rms of columns (M, n, p) over moving rows of diagnosed recordings."""
         squares, count = np.zeros(columns[0].shape[1:]), np.zeros((columns[0].shape[1], 1))
         for k in self.diagnosed_parts:
             moving = self.weight[k][:, :, np.newaxis] > 0.0
@@ -90,7 +90,7 @@ class Rows:
         return np.asarray(np.maximum(rms, 1e-3 * rms.max()))
 
     def weighted(self, columns: Sequence[FloatArray], joints: Sequence[int]) -> list[FloatArray]:
-        """Weight columns (M, n, p) of each trajectory; return (joints, M, p) per recording."""
+        """Divide columns (M, n, p) by `sigma`; return them per recording, as (joints, M, p)."""
         index = list(joints)
         rows = [
             (own[:, index] * weight[:, index, np.newaxis]).swapaxes(0, 1)

@@ -90,12 +90,12 @@ class Trajectory:
 
     @cached_property
     def at_rows(self) -> Motion:
-        """Return the motion at the samples of the rows."""
+        """Return the motion at the central sample of each row."""
         return self.motion.select(self.rows)
 
     @cached_property
     def period(self) -> tuple[int, slice] | None:
-        """Return lag and samples of the repeated period, or None without; see `find_period`."""
+        """Return lag and samples of the repeated period, or None if no period repeats."""
         return find_period(self.motion.t, self.motion.q)
 
     @property
@@ -110,7 +110,7 @@ class Trajectory:
         return self.reduce(self.motion.tau - arm.torque(self.motion))
 
     def columns(self, arm: ArmModel, effect: Effect) -> FloatArray:
-        """Return torque per unit of each of P values of an effect, in the rows, (M, n, P)."""
+        """Return the torque per unit of each parameter of an effect in the rows, (M, n, P)."""
         if effect.smooth:
             return arm.columns_of(effect, self.at_rows)
         return self.reduce(arm.columns_of(effect, self.motion))
@@ -219,7 +219,7 @@ def _widest(used: Conditioning) -> int:
 
 
 def _thinned(motion: Motion, used: Conditioning) -> tuple[Motion, Conditioning]:
-    """Return a motion at the sample rate of its columns, and the decimation from it to rows."""
+    """Decimate a motion to the sample rate of columns; return it, and the filter to rows."""
     thin = max(d for d in range(1, _widest(used) + 1) if used.decimation % d == 0)
     if thin == 1:
         return motion, used

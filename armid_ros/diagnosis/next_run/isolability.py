@@ -32,7 +32,7 @@ DISTINCT = 0.1
 @dataclass(frozen=True)
 class Isolability:
     """
-    Smallest detectable size of E effects in a planned motion, and how well it separates them.
+    Detectable sizes of E effects in a planned motion, and how well the motion separates them.
 
     Attributes
     ----------
@@ -48,11 +48,11 @@ class Isolability:
 
     @property
     def seen(self) -> npt.NDArray[np.bool_]:
-        """Whether the motion makes each effect detectable at a possible size, shape (E,)."""
+        """Whether the motion makes each effect detectable at a physically possible size, (E,)."""
         return np.array([np.isfinite(one.size) for one in self.effects])
 
     def rivals(self, k: int) -> list[Detectable]:
-        """Return the detectable effects that resemble effect k too much, most similar first."""
+        """Return detectable effects that are not distinguishable from effect k, closest first."""
         order = np.argsort(self.apart[k])
         near = [j for j in order if j != k and self.seen[j] and self.apart[k, j] < DISTINCT]
         return [self.effects[j] for j in near]
@@ -68,7 +68,7 @@ class Isolability:
         )
 
     def document(self) -> list[dict[str, Any]]:
-        """Return the rows of the effects in excitation.json."""
+        """Return the entry of each effect in excitation.json."""
         return [
             {
                 'name': one.name,
@@ -84,7 +84,7 @@ class Isolability:
         ]
 
     def of_kinds(self) -> tuple[tuple[str, ...], FloatArray]:
-        """Return the names of detectable effects, and the smallest `apart` of each two, (K, K)."""
+        """Return the K names of detectable effects, and the smallest `apart` of each pair."""
         names = [one.name for one in self.effects]
         kinds = tuple(dict.fromkeys(np.array(names)[self.seen].tolist()))
         places = [np.flatnonzero(self.seen & (np.array(names) == kind)) for kind in kinds]
@@ -127,7 +127,7 @@ def isolability(arm: ArmModel, motion: Motion, noise: FloatArray, samples: float
 
 
 def _detectable(effect: Effect, columns: FloatArray, arm: ArmModel) -> Detectable:
-    """Return the smallest detectable size of the first detectable parameter of an effect."""
+    """Return the first detectable parameter of an effect, and its smallest detectable size."""
     for k, parameter in enumerate(effect.parameters(arm.robot)):
         others = basis_of(np.delete(columns, k, axis=1))
         own = columns[:, k] - others @ (others.T @ columns[:, k])

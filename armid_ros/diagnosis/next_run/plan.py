@@ -68,7 +68,7 @@ class NextRun:
 
     @property
     def expected_z(self) -> float:
-        """Return the smallest z-score of all pairs of effects."""
+        """Return the smallest predicted separation of all pairs of effects, as a z-score."""
         return min(pair.z for pair in self.separations)
 
     @property
@@ -92,7 +92,7 @@ class NextRun:
         )
 
     def document(self) -> dict[str, Any]:
-        """Return the entry of the run in diagnosis.json."""
+        """Return the planned run as an entry of diagnosis.json."""
         return {
             'file': EXPERIMENT_FILE,
             'motion': self.template,
@@ -187,7 +187,7 @@ def next_run(
 
 def _in_order(candidates: Sequence[_Candidate]) -> list[_Candidate]:
     """
-    Sort motions by the sum of log(1 + z^2) over pairs of effects, the best first.
+    Sort motions by the sum of log(1 + z^2), with z-scores z of effect pairs, largest first.
 
     Motions with a payload come last if a motion without payload separates all pairs sufficiently.
 
@@ -202,7 +202,7 @@ def _in_order(candidates: Sequence[_Candidate]) -> list[_Candidate]:
 
 
 def _pairs(diagnosis: Diagnosis) -> list[tuple[Effect, Effect]]:
-    """Return each pair of a named effect and a rival, once for two names."""
+    """Return the pairs of a named effect and a rival, each combination of names only once."""
     explanation = diagnosis.explanation
     if explanation is None:
         return []

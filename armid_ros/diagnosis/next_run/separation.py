@@ -71,7 +71,7 @@ class Load:
 
 
 def _of_last_link(robot: Robot) -> slice:
-    """Return the slice of the rigid parameters of the last link."""
+    """Return the slice of all rigid-body parameters that belongs to the last link."""
     last = robot.moving.index(robot.tip)
     return slice(10 * last, 10 * last + 10)
 
@@ -184,7 +184,7 @@ def _nuisance_columns(
 
 
 def basis_of(columns: FloatArray) -> FloatArray:
-    """Return an orthonormal basis of the span of columns (R, p), without rounding errors."""
+    """Return an orthonormal basis of the column space, without axes due to rounding errors."""
     length = np.linalg.norm(columns, axis=0)
     columns = columns[:, length > 0.0] / length[length > 0.0]
     if not columns.shape[1]:

@@ -27,7 +27,7 @@ def next_steps(
     learned: bool = False,
 ) -> list[str]:
     """
-    Return sentences that advise the user what to inspect, record or run next, in order.
+    Return sentences with advice on inspection, recording and use of the model, in order.
 
     Parameters
     ----------
@@ -81,7 +81,7 @@ def next_steps(
 
 
 def _use_of_model(diagnosis: Diagnosis, model: str, worse: Sequence[str]) -> list[str]:
-    """Return sentences on the model to use, or on steps before its use."""
+    """Return sentences on the use of the model, or on steps that have to precede it."""
     if diagnosis.not_checked:
         return [f'Move {", ".join(diagnosis.not_checked)} as well, and record again.']
     if worse:

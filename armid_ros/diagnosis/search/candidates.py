@@ -76,7 +76,7 @@ class Causes:
     )
 
     def causes(self, nuisance: Nuisance, posterior: NuisancePosterior) -> list[Cause]:
-        """Return all causes that are not accepted, one for each starting shape."""
+        """Return all causes that are not accepted yet, each at all start values of its shapes."""
         arm, result, families = nuisance.arm, list[Cause](), list[Cause]()
         there = [one.effect for one in nuisance.accepted]
         taken = {(one.name, place) for one in there for place in (one.joints, *zip(one.joints))}
@@ -169,7 +169,7 @@ class Causes:
         return [part.columns(self.nuisance.arm, effect) for part in self._predicted]
 
     def reshaped(self, cause: Cause, shape: FloatArray) -> Cause | None:
-        """Return the cause with another shape, or None if that is impossible or has no torque."""
+        """Return the cause with other shape values; None if impossible or without any torque."""
         try:
             effect = cause.effect.with_shape(shape)
             columns = self._columns(effect)
@@ -184,7 +184,7 @@ class Causes:
         self, effect: Effect, kept: tuple[int, ...], columns: Sequence[FloatArray]
     ) -> Cause | None:
         """
-        Return the cause with given columns (M, n, p), or None if they are zero.
+        Return the cause with given regression columns (M, n, p), or None if these are zero.
 
         Columns are zero in diagnosed recordings without any torque of the effect. None as well for
         a strap that is taut in all samples: it equals a spring.
@@ -213,7 +213,7 @@ def value_unit(
     nuisance: Nuisance, effect: Effect, kept: Sequence[int], torque: FloatArray
 ) -> FloatArray:
     """
-    Return the scale of each value of an effect, at which its torque equals the joint torque, (p,).
+    Return the parameter values at which the torque of an effect equals the joint torque, (p,).
 
     A scale is at most the largest plausible value. The torque per unit value is the root mean
     square in the diagnosed recordings, (n, p) [N m].
@@ -288,7 +288,7 @@ def cause_of(
 
 
 def _unexplained(nuisance: Nuisance, posterior: NuisancePosterior) -> Unexplained:
-    """Return motion, residual and nuisance columns, from which effects guess their shapes."""
+    """Return motion, residual and nuisance columns, from which effects choose start values."""
     rows = nuisance.rows
     values = nuisance.means(posterior)
     motions = [part.motion for part in rows.data]
@@ -335,7 +335,7 @@ def candidate_effects(
 def with_starting_shapes(
     effect: Effect, members: list[Effect], arm: ArmModel, unexplained: Unexplained
 ) -> Iterator[tuple[Effect, list[Effect]]]:
-    """Yield an effect and its copies on single joints with each starting shape, if it has any."""
+    """Yield an effect and its single-joint copies, once for each start value of its shapes."""
     if not effect.shapes:
         yield effect, members
         return
@@ -356,7 +356,7 @@ def with_starting_shapes(
 def line_search(
     gain: Callable[[FloatArray], float], shape: FloatArray, index: int, kind: Shape
 ) -> FloatArray:
-    """Return the shape values with one of them moved to the maximum of a function (Brent 1973)."""
+    """Return shape parameters, with one moved to the maximum of `gain` (Brent 1973)."""
     value = float(shape[index])
     positive = kind.lower > 0.0 and value > 0.0 and kind.near is None and kind.unit != '1/rev'
 

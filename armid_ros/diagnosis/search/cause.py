@@ -17,7 +17,7 @@ import numpy.typing as npt
 @dataclass(frozen=True)
 class Cause:
     """
-    A candidate cause: an effect on certain joints with one shape, and its regression columns.
+    A candidate cause: an effect with given joints and shape values, and its regressor.
 
     Attributes
     ----------
@@ -64,11 +64,11 @@ class Cause:
 
     @property
     def key(self) -> tuple[str, tuple[str, ...], tuple[int, ...]]:
-        """Name, joints and parameter indices, which identify the cause in any shape."""
+        """Key of the cause, equal for all shape values: name, joints, indices of fitted values."""
         return self.effect.name, self.effect.joints, self.kept
 
     def acts(self, diagnosed: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
-        """Return whether the cause acts in each recording, given which are diagnosed, (K,)."""
+        """Return whether the cause acts in each recording; `diagnosed` is a mask of recordings."""
         return np.ones_like(diagnosed) if self.always or self.effect.lasting else diagnosed
 
     def at(self, values: FloatArray, robot: Robot) -> NamedEffect:

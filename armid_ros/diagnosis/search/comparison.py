@@ -120,7 +120,7 @@ class CauseComparison:
         return typical_spread_of(some, self.nuisance, self._likeliest(self.nuisance))
 
     def initial(self) -> Selection:
-        """Return the ranking of all causes, with none accepted."""
+        """Return a selection with a ranking of all causes, and without accepted causes."""
         ranking = self.rank_all(self.nuisance)
         effects = tuple(self.catalogue.effects)
         return Selection((), self.nuisance, ranking.posterior, ranking, effects)
@@ -168,7 +168,7 @@ class CauseComparison:
         return accepted, nuisance
 
     def _exchange_causes(self, accepted: list[CauseResult], nuisance: Nuisance) -> Accepted:
-        """Replace a cause that resembles several others by these if they are likelier."""
+        """Replace a cause that resembles several other causes by those if they are likelier."""
         # the last cause was selected with all others in the model
         for k, one in enumerate(accepted[:-1]):
             ranking = self.rank_all(nuisance.without_cause(k))
@@ -243,7 +243,7 @@ class CauseComparison:
         return self._posteriors[id(nuisance)][1]
 
     def _likeliest(self, nuisance: Nuisance) -> NuisancePosterior:
-        """Return the posterior for the likeliest hyperparameters."""
+        """Return the posterior of the nuisance parameters for the likeliest hyperparameters."""
         return max(self._all_posteriors(nuisance), key=lambda one: one.evidence)
 
     def _causes_of(self, nuisance: Nuisance) -> list[Cause]:
@@ -301,7 +301,7 @@ class CauseComparison:
     def _with_best_shape(
         self, cause: Cause, nuisance: Nuisance, posterior: NuisancePosterior
     ) -> Cause:
-        """Return a cause with the shape that maximises its Bayes factor."""
+        """Return a cause with the shape values that maximise its Bayes factor."""
         best = [(fit_cause(cause, nuisance, posterior).factor, cause)]
 
         def gain(shape: FloatArray) -> float:
@@ -317,7 +317,7 @@ class CauseComparison:
         return max(best, key=lambda one: one[0])[1]
 
     def _drop_redundant(self, accepted: list[CauseResult], nuisance: Nuisance) -> Accepted:
-        """Drop accepted causes whose log odds fell below the alarm, except the last cause."""
+        """Drop accepted causes with log odds below the alarm threshold, except the last cause."""
         while len(accepted) > 1:
             values, covariance = nuisance.moments(self._likeliest(nuisance))
             log_odds = []

@@ -270,7 +270,7 @@ class Explainer:
         return CauseComparison(nuisance, catalogue, settings, used)
 
     def _reference(self) -> dict[str, float] | None:
-        """Return reference temperatures by joint [degC], or None if none were measured."""
+        """Return reference temperatures by joint [degC]; None if no temperature was measured."""
         today = [part.motion for part in (*self.prepared.data, *self.held_out)]
         before = [part.motion for part in self.baseline.data] if self.baseline else today
         if mean_temperatures([*before, *today]) is None:

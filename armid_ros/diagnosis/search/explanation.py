@@ -82,7 +82,7 @@ class Explanation:
 
     @property
     def refitted(self) -> bool:
-        """Whether the rigid body is refitted; False in a finished diagnosis, which states it."""
+        """Whether the rigid body is refitted; see `Diagnosis.refitted` after a diagnosis."""
         problem = self.problem
         return problem is not None and problem.patches_body and problem.hyperparameters.body > 0.0
 

@@ -93,7 +93,7 @@ class JointFit:
         known: FloatArray | None = None,
     ) -> JointFit:
         """
-        Return a problem with a free rigid body and no model discrepancy.
+        Return the least-squares problem with a free rigid body and no model discrepancy.
 
         Parameters
         ----------
@@ -162,7 +162,7 @@ class JointFit:
         return Fitted(self.arm_at(named, means), named, estimate, means[:size])
 
     def arm_at(self, named: Sequence[NamedEffect], means: FloatArray) -> ArmModel:
-        """Return the arm with named effects, and with fitted body and friction if requested."""
+        """Return the arm with named effects, and with the fitted body if `patches_body`."""
         change = means[: self.nuisance.rank]
         arm, base, theta = self.arm, self.nuisance.base, self.arm.theta
         if self.patches_body and np.any(change):
@@ -175,7 +175,7 @@ class JointFit:
 
     def unexplained_residual(self, fitted: Fitted) -> list[FloatArray]:
         """
-        Return the diagnosed residual minus named effects, body, friction and discrepancy.
+        Subtract all fitted torques and the discrepancy from residuals of diagnosed recordings.
 
         Returns
         -------
@@ -206,7 +206,7 @@ class JointFit:
     def _weighted_residual(
         self, model: ArmModel, torque: Sequence[FloatArray]
     ) -> list[FloatArray]:
-        """Return weighted residuals (n, M), of a model minus `torque` in diagnosed recordings."""
+        """Return weighted residuals: those of the model plus `torque` in diagnosed recordings."""
         rows, residual = self.nuisance.rows, list(self.nuisance.residual)
         rest = [
             own + part.residual(model) if rows.diagnosed[part.fold] else own
@@ -322,7 +322,7 @@ def _shape_bounds(effect: Effect) -> tuple[FloatArray, FloatArray, FloatArray]:
 def patch_columns(
     arm: ArmModel, named: Sequence[NamedEffect], part: Trajectory
 ) -> list[FloatArray]:
-    """Return the Jacobian of the torque in rows by values and shapes of each effect, (M, n, p)."""
+    """Return each effect's Jacobian of the torque by its values and shapes, (M, n, p)."""
     model, blocks = memoized_arm(patched_arm(arm, named)), []
     for own in named:
         columns = [model.columns_of(own.effect, part.motion)[:, :, list(own.kept)]]
@@ -339,7 +339,7 @@ def _shape_columns(model: ArmModel, effect: Effect, motion: Motion) -> FloatArra
     shape = np.array(effect.shape)
 
     def torque(index: int, value: float) -> FloatArray:
-        """Return the torque for another shape, up to a part independent of the shape."""
+        """Return the torque for another shape value, up to a part that does not depend on it."""
         moved = shape.copy()
         moved[index] = value
         other = effect.with_shape(moved)

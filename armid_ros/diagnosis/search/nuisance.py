@@ -162,7 +162,7 @@ class Nuisance:
 
     @cached_property
     def count(self) -> npt.NDArray[np.intp]:
-        """Return the number of rows of each recording with weight, summed over joints, (K,)."""
+        """Return the number of informative rows of each recording, summed over joints, (K,)."""
         folds = [part.fold for part in self.rows.data]
         return np.bincount(folds, [np.count_nonzero(w) for w in self.rows.weight]).astype(int)
 
@@ -203,7 +203,7 @@ class Nuisance:
         return np.concatenate([cause.products, self._among_accepted(cause)], axis=1)
 
     def and_cause(self, cause: Cause, size: float = 1.0) -> Nuisance:
-        """Add an accepted cause, with the prior standard deviation of its values over `unit`."""
+        """Add an accepted cause; `size` is its values' prior standard deviation over `unit`."""
         return replace(self, accepted=(*self.accepted, replace(cause, size=size)))
 
     def without_cause(self, index: int) -> Nuisance:
@@ -228,7 +228,7 @@ class Nuisance:
 
     @property
     def value_slices(self) -> list[slice]:
-        """Return the slice of all parameters that holds the values of each accepted cause."""
+        """Return the slice of each accepted cause's values among all parameters."""
         size = self.columns[0].shape[2]
         counts = [len(one.unit) for one in self.accepted]
         stops = size + np.cumsum(counts, dtype=int)
@@ -294,7 +294,7 @@ class Nuisance:
         among: Sequence[int] | None = None,
         less: tuple[int, FloatArray, FloatArray] | None = None,
     ) -> NuisancePosterior:
-        """Return the posterior of the parameters for one set of hyperparameters."""
+        """Return the posterior of all parameters for a set of hyperparameters."""
         return self.posteriors([hyperparameters], among, less)[0]
 
     def posteriors(
@@ -304,7 +304,7 @@ class Nuisance:
         less: tuple[int, FloatArray, FloatArray] | None = None,
     ) -> list[NuisancePosterior]:
         """
-        Return the posterior for each set of hyperparameters; all share `own` and `noise`.
+        Return the posterior for each set of hyperparameters; all sets share `own` and `noise`.
 
         The discrepancies d_k of single recordings are integrated out once, by their Schur
         complement.

@@ -40,7 +40,7 @@ _ROUNDING = 1e-7
 @dataclass(frozen=True)
 class CauseFit:
     """
-    Log Bayes factor of a cause, and the Gaussian posterior of its values.
+    Log Bayes factor of a cause against the model without it, and posterior of its values.
 
     Attributes
     ----------
@@ -165,7 +165,7 @@ class CauseInformation:
         return replace(self, matrix=matrix, vector=self.vector[..., kept])
 
     def difference_root(self, spread: float) -> list[FloatArray]:
-        """Return [R], where RR' is the prior covariance of all u_k; empty without spread."""
+        """Return [R], with RR' the prior covariance of differences u_k; [] without spread."""
         if not spread:
             return []
         p, groups = self.size, len(self.diagnosed)
@@ -176,7 +176,7 @@ class CauseInformation:
         return [_block_diagonal(np.stack([root] * groups, axis=-3))]
 
     def baseline_root(self) -> FloatArray:
-        """Return R, where RR' is the prior covariance of g0, which is equal in all groups."""
+        """Return R, with RR' the prior covariance of baseline values g0, equal in all groups."""
         return np.tile(THERE * np.eye(self.size), (len(self.diagnosed), 1))
 
 
@@ -282,7 +282,7 @@ def fit_causes(
 
 
 def log_probability_in_bounds(cause: Cause, fit: CauseFit, nuisance: Nuisance) -> float:
-    """Return the log of posterior over prior probability that all values are within bounds."""
+    """Return the log ratio of posterior to prior probability that all values are in bounds."""
     arm, kept = nuisance.arm, list(cause.kept)
     whole, std = np.zeros((2, len(cause.effect.parameters(arm.robot))))
     whole[kept], std[kept] = fit.values, fit.std

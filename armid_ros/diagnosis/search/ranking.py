@@ -71,7 +71,7 @@ class CauseResult:
 
     @property
     def key(self) -> Key:
-        """Name, joints and parameter indices, which identify the cause in any shape."""
+        """Key of the cause, equal for all shape values: name, joints, indices of fitted values."""
         return self.effect.name, self.effect.joints, self.kept
 
     @property
@@ -83,7 +83,7 @@ class CauseResult:
 @dataclass(frozen=True)
 class RankedCause:
     """
-    A candidate cause with its log Bayes factor.
+    A candidate cause with its log Bayes factor against the model without this cause.
 
     Attributes
     ----------

@@ -83,7 +83,7 @@ class _TimedCause:
 
     @cached_property
     def _sums(self) -> dict[int, list[FloatArray]]:
-        """Inner products with nuisance columns, columns and residual, summed up to each edge."""
+        """The sums `products`, `own` and `aim` of the cause, accumulated up to each edge."""
         nuisance, cause = self.ranking.nuisance, self.ranked.cause
         joints = list(cause.joints)
         found = dict[int, list[FloatArray]]()
@@ -122,7 +122,7 @@ class _TimedCause:
 
     @cached_property
     def throughout(self) -> RankedCause:
-        """The cause that acts throughout."""
+        """The cause, acting throughout all diagnosed recordings."""
         return self.within([self._whole])[0]
 
     @property

@@ -106,7 +106,7 @@ def headline(
 def held_out_gains(
     explanation: Explanation, order: Sequence[int], unseen: Evidence
 ) -> Attribution:
-    """Return the gains of causes on held-out recordings, if they are added in a given order."""
+    """Return the gap reduction in held-out data by each cause, added in the given order."""
     fewer = [explanation.only(order[:count]) for count in range(1, len(order))]
     every = [explanation.reference, *(one.fitted for one in fewer), explanation.fitted]
     arms = [one.arm for one in every[: len(order) + 1]]
@@ -117,7 +117,7 @@ def held_out_gains(
 
 
 def cross_validated(explanation: Explanation) -> Attribution:
-    """Return the cross-validated gains of all causes, which are added in order of gain."""
+    """Return the cross-validated gap reduction by each cause, added in order of reduction."""
     assert explanation.problem is not None
     problem, named = explanation.problem, explanation.fitted.named
     linear = problem.linear(named)
@@ -125,7 +125,7 @@ def cross_validated(explanation: Explanation) -> Attribution:
     remaining, order = list(range(len(named))), list[int]()
 
     def squared_residual(causes: Sequence[int]) -> FloatArray:
-        """Return the squared held-out residual of each block if other causes are zero, (B,)."""
+        """Return the squared held-out residual of each block with only these causes, (B,)."""
         others = [spans[n] for n in range(len(named)) if n not in causes]
         absent = [k for span in others for k in range(span.start, span.stop)]
         squares = []

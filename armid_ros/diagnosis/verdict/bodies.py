@@ -29,7 +29,7 @@ _MAX_LOSS_RATIO = 1.05
 
 def is_same_body(one: CauseResult, other: CauseResult, robot: Robot) -> bool:
     """
-    Return whether two causes are one load on either of the two links of a revolute joint.
+    Return whether two causes are the same load on either link of a revolute joint.
 
     Both have the same mass, and the centre of the load on the outer link is on the joint axis,
     within three standard deviations.
@@ -122,7 +122,7 @@ def as_bodies(explanation: Explanation) -> tuple[Explanation, tuple[str, ...]]:
 
 
 def _products(problem: JointFit, fitted: Fitted) -> tuple[FloatArray, float]:
-    """Return the inner products of base columns and their torque, (r + 1, r + 1), and the rows."""
+    """Return inner products of base columns and their torque, and the number of rows."""
     nuisance, base = problem.nuisance, problem.nuisance.base
     rank = nuisance.rank
     then, now = (base.values(x.theta[: len(base.standard)]) for x in (problem.arm, fitted.arm))

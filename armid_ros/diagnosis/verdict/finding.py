@@ -158,7 +158,7 @@ class Finding:
         return f'To separate {names}, record {best}.'
 
     def place_of(self, joint: str) -> str:
-        """Return the name of the tied segment of a joint, or the joint itself without a tie."""
+        """Return the segment name of the tie on a joint, or the joint itself if it has no tie."""
         return next((tie.name for tie in self.ties if tie.joint == joint), joint)
 
 
@@ -258,7 +258,7 @@ class Gap:
 
     @property
     def data(self) -> str:
-        """Name of the data whose residual it is: held-out, or fitted."""
+        """Kind of the recordings in which the residual was measured: held-out or fitted."""
         return 'held-out' if self.predicted else 'the data it was found in'
 
 

@@ -39,7 +39,7 @@ def findings(
     rng: np.random.Generator,
 ) -> tuple[Finding, ...]:
     """
-    Return one finding for each name of an effect, the largest share of the gap first.
+    Return a finding for each effect name, the finding with the largest share first.
 
     Findings that stand for the same cause have a common share.
 
@@ -144,7 +144,7 @@ def _in_catalogue(explanation: Explanation, arm: ArmModel) -> list[list[_Transla
 
 
 def _translated(own: NamedEffect, covariance: FloatArray, arm: ArmModel) -> list[_Translation]:
-    """Convert an effect to other effects of the catalogue, and propagate standard deviations."""
+    """Convert an effect to equivalent effects of the catalogue, with standard deviations."""
     effect, kept, values, parts = own.effect, list(own.kept), own.values, []
     inside = np.zeros((len(values), len(values)))
     inside[np.ix_(kept, kept)] = covariance[: len(kept), : len(kept)]

@@ -79,7 +79,7 @@ class RemainingMisfit:
 
     def residual_over_limit(self) -> list[Excess]:
         """
-        Return squared residual over limit of fitted and of held-out data, with the named causes.
+        Return the patched model's squared residual over its limit, in fitted and held-out data.
 
         If the misfit is known, fitted changes of body, friction and discrepancy are subtracted:
         in other motions the arm visits other states, where the misfit differs.
@@ -94,7 +94,7 @@ class RemainingMisfit:
         return list(self._over_limits(residuals))
 
     def given_body_over_limit(self) -> Excess | None:
-        """Return squared residual over limit with the given rigid body; None if not refitted."""
+        """Return the given body's squared residual over its limit; None if no body is refitted."""
         if not self.explanation.refitted:
             return None
         given, fitted = self.given.theta, self.explanation.fitted.arm
@@ -132,7 +132,7 @@ class RemainingMisfit:
         return [replace(part, sigma=part.noise) for part in self.data]
 
     def _over_limits(self, residuals: Sequence[Sequence[FloatArray]]) -> Iterator[Excess]:
-        """Yield squared residual over limit of the fitted data, then of the held-out data."""
+        """Yield the squared residual over its limit: of fitted data, then of held-out data."""
         usual = 1.0 if self.explanation.measured else self.settings.thresholds.predicted
         more = usual, self.settings.thresholds.predicted
         where = 'in the recordings', 'in held-out recordings'
@@ -141,7 +141,7 @@ class RemainingMisfit:
             yield Excess(part.chi2_per_row(own) / limits, words)
 
     def at_rest(self) -> list[Excess]:
-        """Return squared residual over friction of joints at rest, in fitted and held-out data."""
+        """Return squared ratios of residual to friction at rest, in fitted and held-out data."""
         if self.settings.partner is not None:
             return []
         thresholds, before = self.settings.thresholds, self.before
@@ -223,7 +223,7 @@ class UnlistedLaw(Effect):
 
 def unlisted_laws(explanation: Explanation, settings: DiagnosisSettings) -> list[Excess]:
     """
-    Return the squared torque of unlisted laws over its limit, for velocity and for position.
+    Return squared torque over its limit for unlisted laws of velocity and of position.
 
     The limit is the squared floor of the gap plus that of the largest immaterial torque. The ratio
     is zero in joints whose log odds of an unlisted law are below the alarm odds. If several causes
@@ -268,7 +268,7 @@ def unlisted_laws(explanation: Explanation, settings: DiagnosisSettings) -> list
 
 def _one_law_instead(problem: JointFit, linear: Nuisance, law: Cause, levels: Thresholds) -> float:
     """
-    Return how much more one unlisted law explains than the causes of its joint, over the limit.
+    Return the fit improvement by an unlisted law in place of its joint's causes, over its limit.
 
     The law is fitted in place of these causes. At the limit, it is as likely as the causes, apart
     from the relative error of the laws of the catalogue.

@@ -76,7 +76,7 @@ class Where:
 @dataclass(frozen=True)
 class Excess:
     """
-    Squared residual of each joint over the limit that noise and misfit explain.
+    Ratio of each joint's squared residual to the limit that noise and misfit explain.
 
     Attributes
     ----------
@@ -97,7 +97,7 @@ class Excess:
 def locate_explained(
     explanation: Explanation, evidence: Evidence, settings: DiagnosisSettings
 ) -> tuple[Where, ...]:
-    """Return the joints in which the named causes reduce the residual, with its quantities."""
+    """Describe the residual without named causes, in the joints in which these reduce it."""
     before, after = (
         evidence.residuals(one.arm) for one in (explanation.reference, explanation.fitted)
     )
@@ -113,7 +113,7 @@ def locate_remaining_gap(
     settings: DiagnosisSettings,
     new: npt.NDArray[np.bool_],
 ) -> tuple[Where, ...]:
-    """Return the joints in which the patched model exceeds its limit, or has an unlisted law."""
+    """Return joints in which the patched model's residual exceeds its limit or has a new law."""
     residual = evidence.residuals(explanation.fitted.arm)
     losses, limits = evidence.chi2_per_row(residual), evidence.limits(residual, settings)
     gap = np.where(new, losses, np.where(losses > limits, losses - 1.0, 0.0))
@@ -185,7 +185,7 @@ def _quantities(arm: ArmModel, part: Trajectory) -> dict[str, FloatArray]:
 
 
 def _axis(name: str, unit: str, x: FloatArray, residual: FloatArray) -> Axis:
-    """Return the mean residual in bins of a quantity x with equal numbers of rows."""
+    """Return the mean residual in bins of a quantity x, with equally many rows in each bin."""
     bins = 16
     edges = np.quantile(x, np.linspace(0.0, 1.0, bins + 1))
     index = np.clip(np.searchsorted(edges, x, side='right') - 1, 0, bins - 1)

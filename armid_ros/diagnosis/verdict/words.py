@@ -106,7 +106,7 @@ def decide(
 
 
 def _refit(given_body: Excess | None, robot: Robot, floor: str) -> str:
-    """Return a sentence on refitted body and friction, if the given ones have a gap."""
+    """Return a sentence on refitted body and friction, if their given values leave a gap."""
     if given_body is None or given_body.ratio.max() <= 1.0:
         return ''
     worst = int(np.argmax(given_body.ratio))
@@ -132,7 +132,7 @@ def sentence(finding: Finding, of: str = DIFFERENCE) -> str:
 
 
 def share_interval_in_words(finding: Finding) -> str:
-    """Return the 95 % interval of a share in brackets; empty if both ends have the same digits."""
+    """Return a share's 95 % interval in brackets; empty if both ends round to the same value."""
     low, high = (percent(end) for end in finding.share_interval)
     return f' ({low} to {high})' if low != high else ''
 
@@ -225,7 +225,7 @@ def _change(finding: Finding) -> str:
 
 
 def _rows(finding: Finding) -> list[tuple[ParameterName, float, float, float]]:
-    """Return the rows of a finding whose interval excludes zero; all rows if there are none."""
+    """Return the parameter rows whose interval excludes zero; all rows if no interval does."""
     every = [row for row in finding.rows if not vague(finding, *row[:3])]
     return [row for row in every if excludes_zero(row[1], row[2])] or every
 
@@ -240,7 +240,7 @@ def vague(finding: Finding, parameter: ParameterName, value: float, std: float) 
 
 
 def _with_degrees(parameter: ParameterName, value: float, std: float, had: float) -> str:
-    """Format a value with interval and unit, with its old value if any; angles also in degrees."""
+    """Format a value with interval, unit and any old value; angles also in degrees."""
     start = f'from {with_half_width(had, std).split(" ")[0]} to ' if had else ''
     text = f'{start}{with_half_width(had + value, std)} {parameter.unit}'.strip()
     degrees, *_ = with_half_width(np.rad2deg(had + value), np.rad2deg(std)).split(' ')
