@@ -175,7 +175,7 @@ def _of_spans(
     notes: Sequence[str],
     doubt: str,
 ) -> Diagnosis | None:
-    """Diagnose only the seconds in which a cause acts; None if no cause explains their gap."""
+    """Diagnose only the seconds in which a cause acts; None if no cause explains the gap there."""
     settings, arm, prepared = explainer.settings, explainer.arm, explainer.prepared
     ranking = explanation.ranking
     spans = () if ranking is None else acting_spans(ranking, settings.thresholds)

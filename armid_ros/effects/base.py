@@ -144,7 +144,7 @@ class Effect(ABC):
     @classmethod
     def places(cls, robot: Robot) -> tuple[tuple[str, ...], ...]:
         """
-        Return the sets of joints on which the effect can act: single joints, pairs, or the arm.
+        Return the sets of joints on which the effect can act: joints, pairs or the whole arm.
 
         Raises
         ------
@@ -161,7 +161,7 @@ class Effect(ABC):
         return cls
 
     def particulars(self) -> dict[str, Any]:
-        """Return entries for model.yaml beyond values and shapes, such as temperatures."""
+        """Return entries for model.yaml beyond values and shapes: reference temperatures, ties."""
         return {}
 
     def with_particulars(self, entry: Mapping[str, Any]) -> Self:

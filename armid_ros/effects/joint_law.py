@@ -65,7 +65,7 @@ class JointLaw(Effect):
         return _placed(self, motion, self.law(JointStates(motion.t[:, np.newaxis], *states)))
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
-        """Return the torque as an action; torque levels that hold a joint are dry friction."""
+        """Return the torque as an action; its two levels at rest become dry friction."""
         places, n = self.indices(arm.robot.joints), arm.robot.n_joints
         first, *others = values.reshape(len(places), -1).T
         # a slice takes less time than indices, and the plant calls the law in every step

@@ -50,7 +50,7 @@ class Hysteresis:
 
     def along(self, q: FloatArray, dq: FloatArray) -> FloatArray:
         """
-        Return the states of slipping springs along a path, shape (N, m).
+        Return the states of slipping springs in each sample of a joint motion, shape (N, m).
 
         Parameters
         ----------
@@ -71,7 +71,7 @@ class Hysteresis:
 
     def pullback(self, q: FloatArray, dq: FloatArray, weights: FloatArray) -> FloatArray:
         """
-        Return the derivative of a weighted sum of torques along a path by joint positions.
+        Return the derivative of a weighted sum of torques along a motion by joint positions.
 
         Parameters
         ----------

@@ -57,7 +57,7 @@ def described_precision(
     base: BaseParameters, arm: ArmModel, known: FloatArray | None = None
 ) -> FloatArray:
     """
-    Return the prior precision of base parameters that the description gives, shape (r, r).
+    Return the prior precision of base parameters, from the robot description, shape (r, r).
 
     The prior standard deviation of a parameter is about its described value; that of an effect
     with value zero is its largest expected value. Data change the parameters that they determine;

@@ -74,7 +74,7 @@ class Rows:
         return [k for k, part in enumerate(self.data) if self.diagnosed[part.fold]]
 
     def rms_of_diagnosed(self, columns: Sequence[FloatArray]) -> FloatArray:
-        """Return the rms of columns (M, n, p) over moving rows of diagnosed recordings."""
+        """Return the rms of columns (M, n, p) over diagnosed rows in which the joint moves."""
         squares, count = np.zeros(columns[0].shape[1:]), np.zeros((columns[0].shape[1], 1))
         for k in self.diagnosed_parts:
             moving = self.weight[k][:, :, np.newaxis] > 0.0

@@ -219,7 +219,7 @@ def _widest(used: Conditioning) -> int:
 
 
 def _thinned(motion: Motion, used: Conditioning) -> tuple[Motion, Conditioning]:
-    """Decimate a motion to the sample rate of columns; return it, and the filter to rows."""
+    """Decimate a motion to the rate of regressor columns; return also the filter to rows."""
     thin = max(d for d in range(1, _widest(used) + 1) if used.decimation % d == 0)
     if thin == 1:
         return motion, used

@@ -247,14 +247,14 @@ class CauseComparison:
         return max(self._all_posteriors(nuisance), key=lambda one: one.evidence)
 
     def _causes_of(self, nuisance: Nuisance) -> list[Cause]:
-        """Return the causes that are not accepted in a regression problem, computed once."""
+        """Return the causes that are not accepted in a regression problem; cache the result."""
         if id(nuisance) not in self._causes:
             likeliest = self._likeliest(nuisance)
             self._causes[id(nuisance)] = self.catalogue.causes(nuisance, likeliest)
         return self._causes[id(nuisance)]
 
     def rank_all(self, nuisance: Nuisance) -> Ranking:
-        """Rank the causes that are not accepted yet, and optimise the shapes of the best ones."""
+        """Rank the causes that are not accepted yet; optimise shape values of the best causes."""
         settings, likeliest = self._all_posteriors(nuisance), self._likeliest(nuisance)
         # for each size of link errors, the likeliest posterior and the one with noise only
         tried: list[NuisancePosterior] = []

@@ -394,7 +394,7 @@ class Nuisance:
         return float(sum(np.sum(self.residual_at(values, k) ** 2) for k in diagnosed))
 
     def noise_at(self, values: FloatArray, hyperparameters: Hyperparameters, k: int) -> FloatArray:
-        """Return the weighted residual of recording k for given parameters, d_k fitted, (n, M)."""
+        """Return weighted residual of recording k for given parameters and fitted d_k, (n, M)."""
         residual = self.residual_at(values, k)
         if not hyperparameters.own:
             return residual

@@ -101,7 +101,7 @@ class CauseInformation:
         pooled: bool = False,
     ) -> CauseInformation:
         """
-        Return the information on causes with equal numbers of values.
+        Return the Fisher information on causes that have equal numbers of values.
 
         Each recording is a group; with `pooled`, the baseline and the diagnosed recordings are.
 
@@ -151,7 +151,7 @@ class CauseInformation:
         return int(self.vector.shape[-1]) // len(self.diagnosed)
 
     def only(self, diagnosed: bool) -> CauseInformation:
-        """Return the information of the diagnosed groups only, or of the baseline groups only."""
+        """Return the information from diagnosed recordings only, or from the baseline only."""
         of_it = self.diagnosed == diagnosed
         found = self._at(np.flatnonzero(np.repeat(of_it, self.size)))
         return replace(found, diagnosed=self.diagnosed[of_it])

@@ -130,7 +130,7 @@ class _TimedCause:
         return {k: (0, len(edges) - 1) for k, edges in self.edges.items()}
 
     def coarse(self) -> tuple[RankedCause, Spans]:
-        """Return the cause with its likeliest spans on a coarse grid of edges."""
+        """Return the cause with its likeliest spans, on a coarse grid of change points."""
         found, spans = self.throughout, self._whole
         for k, edges in self.edges.items():
             coarse = np.unique(np.linspace(0, len(edges) - 1, _COARSE).astype(int)).tolist()
@@ -139,7 +139,7 @@ class _TimedCause:
         return found, spans
 
     def refined(self, found: RankedCause, spans: Spans) -> tuple[RankedCause, Spans]:
-        """Return the cause after two passes in which each edge moves to its likeliest place."""
+        """Move each end of each span to its likeliest place, in two passes; return the cause."""
         for _ in range(2):
             for k, edges in self.edges.items():
                 near = (len(edges) - 1) // (_COARSE - 1)

@@ -106,7 +106,7 @@ def headline(
 def held_out_gains(
     explanation: Explanation, order: Sequence[int], unseen: Evidence
 ) -> Attribution:
-    """Return the gap reduction in held-out data by each cause, added in the given order."""
+    """Add causes in the given order; return by how much each cause reduces the held-out gap."""
     fewer = [explanation.only(order[:count]) for count in range(1, len(order))]
     every = [explanation.reference, *(one.fitted for one in fewer), explanation.fitted]
     arms = [one.arm for one in every[: len(order) + 1]]
@@ -117,7 +117,7 @@ def held_out_gains(
 
 
 def cross_validated(explanation: Explanation) -> Attribution:
-    """Return the cross-validated gap reduction by each cause, added in order of reduction."""
+    """Add causes in order of gain; return the cross-validated gap reduction by each cause."""
     assert explanation.problem is not None
     problem, named = explanation.problem, explanation.fitted.named
     linear = problem.linear(named)

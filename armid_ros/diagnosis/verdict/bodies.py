@@ -80,7 +80,7 @@ def on_outer_link(explanation: Explanation) -> Explanation:
 
 def as_bodies(explanation: Explanation) -> tuple[Explanation, tuple[str, ...]]:
     """
-    Replace impossible inertias by physically consistent ones near the description.
+    Replace impossible inertias by physically consistent inertias near the description.
 
     The links have to fit the data as well as before. If this is impossible, the explanation is
     unchanged.

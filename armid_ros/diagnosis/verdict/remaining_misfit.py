@@ -79,7 +79,7 @@ class RemainingMisfit:
 
     def residual_over_limit(self) -> list[Excess]:
         """
-        Return the patched model's squared residual over its limit, in fitted and held-out data.
+        Return the ratio of the patched model's squared residual to its limit, per data set.
 
         If the misfit is known, fitted changes of body, friction and discrepancy are subtracted:
         in other motions the arm visits other states, where the misfit differs.
@@ -94,7 +94,7 @@ class RemainingMisfit:
         return list(self._over_limits(residuals))
 
     def given_body_over_limit(self) -> Excess | None:
-        """Return the given body's squared residual over its limit; None if no body is refitted."""
+        """Compare residual and limit with the given rigid body; None if it was not refitted."""
         if not self.explanation.refitted:
             return None
         given, fitted = self.given.theta, self.explanation.fitted.arm
@@ -103,7 +103,7 @@ class RemainingMisfit:
 
     def worse_joints(self) -> tuple[str, ...]:
         """
-        Return the joints in which the patched model is worse than the given one.
+        Return the joints in which the patched model has a larger error than the given model.
 
         A joint is worse if its residual, in fitted or held-out data, grows by more than blocks of
         the data differ, and is a gap.
@@ -132,7 +132,7 @@ class RemainingMisfit:
         return [replace(part, sigma=part.noise) for part in self.data]
 
     def _over_limits(self, residuals: Sequence[Sequence[FloatArray]]) -> Iterator[Excess]:
-        """Yield the squared residual over its limit: of fitted data, then of held-out data."""
+        """Yield the ratio of squared residual to limit: of fitted data, then of held-out data."""
         usual = 1.0 if self.explanation.measured else self.settings.thresholds.predicted
         more = usual, self.settings.thresholds.predicted
         where = 'in the recordings', 'in held-out recordings'
@@ -223,7 +223,7 @@ class UnlistedLaw(Effect):
 
 def unlisted_laws(explanation: Explanation, settings: DiagnosisSettings) -> list[Excess]:
     """
-    Return squared torque over its limit for unlisted laws of velocity and of position.
+    Return the ratio of squared torque to limit of unlisted laws of velocity and position.
 
     The limit is the squared floor of the gap plus that of the largest immaterial torque. The ratio
     is zero in joints whose log odds of an unlisted law are below the alarm odds. If several causes
@@ -268,7 +268,7 @@ def unlisted_laws(explanation: Explanation, settings: DiagnosisSettings) -> list
 
 def _one_law_instead(problem: JointFit, linear: Nuisance, law: Cause, levels: Thresholds) -> float:
     """
-    Return the fit improvement by an unlisted law in place of its joint's causes, over its limit.
+    Fit an unlisted law in place of its joint's causes; return the ratio of improvement to limit.
 
     The law is fitted in place of these causes. At the limit, it is as likely as the causes, apart
     from the relative error of the laws of the catalogue.

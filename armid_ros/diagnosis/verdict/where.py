@@ -113,7 +113,7 @@ def locate_remaining_gap(
     settings: DiagnosisSettings,
     new: npt.NDArray[np.bool_],
 ) -> tuple[Where, ...]:
-    """Return joints in which the patched model's residual exceeds its limit or has a new law."""
+    """Describe the patched model's residual in joints above the limit or with an unlisted law."""
     residual = evidence.residuals(explanation.fitted.arm)
     losses, limits = evidence.chi2_per_row(residual), evidence.limits(residual, settings)
     gap = np.where(new, losses, np.where(losses > limits, losses - 1.0, 0.0))

@@ -179,7 +179,7 @@ def names_and_places(group: Sequence[Finding | Rival]) -> str:
 
 
 def by_cause(findings: Sequence[Finding]) -> list[list[Finding]]:
-    """Group findings that stand for one cause, and have a common share of the gap."""
+    """Group findings that stand for the same cause, and have a common share of the gap."""
     groups: list[list[Finding]] = []
     done: set[str] = set()
     for one in findings:
