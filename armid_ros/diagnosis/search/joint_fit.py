@@ -206,7 +206,7 @@ class JointFit:
     def _weighted_residual(
         self, model: ArmModel, torque: Sequence[FloatArray]
     ) -> list[FloatArray]:
-        """Return weighted residuals: those of the model plus `torque` in diagnosed recordings."""
+        """Weight residuals; in diagnosed recordings, use `torque` plus residual of `model`."""
         rows, residual = self.nuisance.rows, list(self.nuisance.residual)
         rest = [
             own + part.residual(model) if rows.diagnosed[part.fold] else own
