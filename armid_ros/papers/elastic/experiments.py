@@ -55,7 +55,7 @@ def resonance_experiments(count: int, rng: np.random.Generator) -> list[Referenc
 
 
 def step_experiments() -> list[Reference]:
-    """Return references with a velocity step, in poses that make all parameters identifiable."""
+    """Return references with a velocity step, from poses that make all parameters identifiable."""
     angles = (0.0, np.pi / 2, np.pi / 4, 3 * np.pi / 4)  # of joint 2 [rad]
     velocities = ((1.0, 0.0), (0.0, 1.0), (1.0, -1.0), (1.0, 1.0))  # [rad/s]
     return [
@@ -65,7 +65,7 @@ def step_experiments() -> list[Reference]:
 
 
 def step_of_velocity(pose: FloatArray, velocity: FloatArray) -> Reference:
-    """Return a reference that rests in a pose, (2,), then moves at a velocity, (2,), for 0.5 s."""
+    """Return a two-joint reference that rests in a pose, then moves at a velocity for 0.5 s."""
     t = np.array([0.0, _DT, _DT + 0.5])
     return Reference(_JOINTS, t, np.array([pose, pose, pose + 0.5 * velocity]))
 

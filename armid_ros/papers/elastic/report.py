@@ -160,7 +160,7 @@ def _parameters_section(
 
 
 def rigid_section(fit: RigidFit) -> ContentSection:
-    """Return the section with the parameters of step 1, in which joints are rigid."""
+    """Return the section with the parameters of step 1, which models the joints as rigid."""
     estimate = fit.estimate
     rows = [
         (pretty(name.name), name.joint, *measured(value, HALF_WIDTH * std), pretty(name.unit))
@@ -211,7 +211,7 @@ def response_error(
 
 
 def _joint(result: TwoInertiaIdentification, k: int) -> list[Templated]:
-    """Return charts of magnitude and phase, and resonances and errors, of one joint."""
+    """Return charts of a joint's frequency response, and facts on resonances and model errors."""
     measured = result.measured[k]
     seen = (measured.frequency >= _SHOWN_BAND[0]) & (measured.frequency <= _SHOWN_BAND[1])
     own = measured.frequency[seen]
@@ -257,7 +257,7 @@ def _joint(result: TwoInertiaIdentification, k: int) -> list[Templated]:
 
 
 def steps_section(tuning: Tuning) -> ContentSection:
-    """Return the section with measured and simulated link velocities after reference steps."""
+    """Return the section with measured and simulated link velocities after velocity steps."""
     before, after = tuning.rms
     text = (
         'Velocities of the links after steps of the reference. The rms residual is '
@@ -333,7 +333,7 @@ def elastic_document(result: TwoInertiaIdentification, robot: str) -> dict[str, 
 
 
 def total_damping(result: TwoInertiaIdentification) -> list[dict[str, Any]]:
-    """Return the total viscous friction dl + dm gear^2 of both joints with its deviation."""
+    """Return total viscous friction dl + dm gear^2 of each joint and its standard deviation."""
     assert result.tuning is not None
     estimate, gear = result.tuning.estimate, result.parameters.gear
     rows = []

@@ -49,7 +49,7 @@ class Slack:
 
     @property
     def seen(self) -> bool:
-        """Whether the fit with slack is significantly better than the fit without."""
+        """Whether the fit with slack is significantly better than the fit without slack."""
         # significance limit of the decrease of the misfit, in units of its noise
         return self.gain > 25.0
 
@@ -100,7 +100,7 @@ class _Averages:
     _group: list[tuple[float, FloatArray]] = field(default_factory=list)
 
     def take(self, t: float, row: FloatArray) -> None:
-        """Add a sample; time that runs backwards clears the buffer."""
+        """Add a sample; if its time does not exceed the last one, clear the buffer first."""
         if self._group and not 0.0 < t - self._group[-1][0] < 1.0 / _AVERAGED_RATE:
             if t <= self._group[-1][0]:
                 self.clear()

@@ -38,7 +38,7 @@ def record(
     noise: tuple[float, float],
     rng: Generator,
 ) -> None:
-    """Write a bag of both machines with noise of angles [deg] and of torques [N m]."""
+    """Write a bag of both machines' joint states, with noise of angles [deg] and torques [N m]."""
     tau = pair_torques(pair, *motions).tau
     tau = tau + noise[1] * rng.normal(size=tau.shape)
     stamps = 10**9 + np.rint(motions.own.t * 1e9).astype(np.int64)
@@ -77,7 +77,7 @@ def identify_ties(
 
 
 def single_support(pair: TiedPair, gait: Gait) -> tuple[PairMotion, FloatArray, str]:
-    """Return the motion on one foot, its gait phase, and the label of the phase axis."""
+    """Return motions on one foot, their gait phases, and the label of the plots' phase axis."""
     known = read_assumptions()
     begin, end = known['single_support'].value
     cycle = known['cycle_time'].value
@@ -89,7 +89,7 @@ def single_support(pair: TiedPair, gait: Gait) -> tuple[PairMotion, FloatArray, 
 def recorded_motions(
     pair: TiedPair, machine: Recording, wearer: Recording
 ) -> tuple[PairMotion, FloatArray, str]:
-    """Return the recorded positions on one time base, the times, and the label of the axis."""
+    """Return recorded positions on one time base, times, and the label of the plots' time axis."""
     both = recorded_together(machine, wearer, pair.other)
     assert both.partner is not None
     motions = PairMotion(

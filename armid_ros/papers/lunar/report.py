@@ -56,7 +56,7 @@ def lunar_report(found: Reproduction, provenance: Provenance) -> str:
 
 
 def verdict(found: Reproduction) -> VerdictSection:
-    """Return the verdict box: torque errors beside those of the paper, and the load."""
+    """Return the verdict box: torque errors compared with the paper, and the identified load."""
     lines, held = [], True
     for one in found.repeated:
         gravity, dynamics = (one.ratio(method.held_out) for method in one.methods)
@@ -93,7 +93,7 @@ def _load(found: Reproduction) -> str:
 
 
 def tables_section(repeated: Sequence[Repeated]) -> ContentSection:
-    """Return the section with the tables of the paper beside those of the repetition."""
+    """Return the section with the tables of the paper and of the repetition."""
     text = (
         'Peak: torque of the paper, and largest gravity torque of the joint. Errors are those of '
         'held-out trajectories against the true torque. Noisy: error against the noisy torque of '
@@ -108,7 +108,7 @@ def tables_section(repeated: Sequence[Repeated]) -> ContentSection:
 
 
 def _table(one: Repeated) -> DataTable:
-    """Return one table of the paper, with the rows of the repetition."""
+    """Return a table of the paper, with additional rows for the results of the repetition."""
     gravity, dynamics = one.methods
     scale, error, share = 100.0, 'RMSE', 'RMSE over peak [%]'
     if one.table.uniform:
@@ -136,7 +136,7 @@ def _table(one: Repeated) -> DataTable:
 
 
 def _cells(values: FloatArray, count: int = 2) -> list[str]:
-    """Format numbers with significant digits."""
+    """Format numbers with a given count of significant digits."""
     return [digits(float(value), count) for value in values]
 
 

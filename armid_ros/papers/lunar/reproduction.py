@@ -77,12 +77,12 @@ class PaperTable:
 
     @property
     def uniform(self) -> bool:
-        """Whether the table gives mean absolute errors, and not rms errors."""
+        """Whether the table gives mean absolute torque errors instead of rms torque errors."""
         return self.number == 6
 
     @property
     def ratio(self) -> FloatArray:
-        """Published error relative to the peak, in Table 6 to the noise, shape (6,)."""
+        """Published torque error relative to peak torque, in Table 6 to torque noise, (6,)."""
         return self.error / (self.noise if self.uniform else self.peak)
 
 
@@ -173,7 +173,7 @@ class Repeated:
     test: Fit
 
     def ratio(self, errors: FloatArray) -> FloatArray:
-        """Return errors, (6,), relative to the peak or to the noise, as the table does."""
+        """Return torque errors, (6,), relative to peak torque or torque noise, as in the paper."""
         return errors / (self.table.noise if self.table.uniform else self.peak_run)
 
 
@@ -339,7 +339,7 @@ def _repeat(
 
 
 def _size(errors: FloatArray, table: PaperTable) -> FloatArray:
-    """Return the mean absolute or rms error of each joint, as the table defines it, (6,)."""
+    """Return the mean absolute or rms torque error of each joint, (6,), as in the paper."""
     if table.uniform:
         return np.asarray(np.mean(np.abs(errors), axis=0))
     return np.asarray(np.sqrt(np.mean(errors**2, axis=0)))
@@ -348,7 +348,7 @@ def _size(errors: FloatArray, table: PaperTable) -> FloatArray:
 def _compared(
     bare: Repeated, loaded: Repeated, rng: np.random.Generator
 ) -> tuple[tuple[Composite, ...], float, float]:
-    """Return gravity parameters of the runs without and with load, and the load with std."""
+    """Return gravity parameters of the runs without and with load, and the load's mass and std."""
     robots = [load_robot(r.table.robot, gravity='moon') for r in (bare, loaded)]
     theory = ArmModel(robots[0], quasi_static=True).base_parameters(rng)
     gravity = 1e3 * float(np.linalg.norm(robots[0].gravity))

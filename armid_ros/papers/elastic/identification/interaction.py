@@ -37,7 +37,7 @@ HOLD: tuple[Hold, Hold] = ('zero', 'first')
 
 def link_columns(q: FloatArray, dq: FloatArray, ddq: FloatArray) -> FloatArray:
     """
-    Return the regressor of the link torques for alpha, beta and gamma.
+    Return the regressor of the link torques with respect to the inertias alpha, beta and gamma.
 
     Parameters
     ----------
@@ -74,7 +74,7 @@ def interaction_torques(link: Motion, parameters: TwoLinkParameters) -> FloatArr
 
 def direction(velocity: FloatArray) -> FloatArray:
     """
-    Return the mean sign of each velocity between two samples, shape (N, n), for friction.
+    Return the mean sign of velocities between neighbouring samples, (N, n), for friction.
 
     Velocities are interpolated linearly; the last row is the sign of the last sample.
 
@@ -122,7 +122,7 @@ def measured_response(
     experiments: Sequence[Signals], dt: float, *, window: float = 1.0
 ) -> tuple[FloatArray, npt.NDArray[np.complex128]]:
     """
-    Estimate the frequency response by averaged spectra (H1 estimator).
+    Estimate the frequency response of outputs to inputs by averaged spectra (H1 estimator).
 
     The estimate needs neither model nor order. The first input is held between samples; its
     response is the response to the continuous held signal.
@@ -181,7 +181,7 @@ def ideal_response(
     parameters: TwoLinkParameters, joint: int, frequency: npt.ArrayLike
 ) -> ComplexArray:
     """
-    Return the frequency response of a joint that consists of motor, spring and link.
+    Return the modelled frequency response of a joint with motor, spring and link.
 
     Parameters
     ----------
@@ -272,7 +272,7 @@ def frequencies(parameters: TwoLinkParameters) -> tuple[FloatArray, FloatArray]:
 
 
 def _response(s: ComplexArray, values: FloatArray) -> ComplexArray:
-    """Return the frequency response of motor, spring and link at s = i w, shape (K, 2, 2)."""
+    """Return the modelled frequency response of a joint at s = i w, shape (K, 2, 2)."""
     rotor, inertia, stiffness, between, motor, link, gain = values
     spring = stiffness / s + between
     a, b = rotor * s + motor + spring, inertia * s + link + spring
@@ -282,7 +282,7 @@ def _response(s: ComplexArray, values: FloatArray) -> ComplexArray:
 
 
 def _first_guess(joint: str, frequency: FloatArray, found: ComplexArray) -> FloatArray:
-    """Return initial parameters of a joint from antiresonance and resonance of its response."""
+    """Return initial joint parameters from antiresonance and resonance of the motor velocity."""
     size = np.abs(found[:, 0, 0])
     lowest = int(np.argmin(size[frequency > 4.0 * frequency[0]]))
     lowest += int(np.count_nonzero(frequency <= 4.0 * frequency[0]))

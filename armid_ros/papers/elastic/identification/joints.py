@@ -132,7 +132,7 @@ def fit_transmission(sides: Sequence[Sides], used: Conditioning, joint: int) -> 
 
 
 def _columns(sides: Sides, used: Conditioning, joint: int) -> tuple[FloatArray, FloatArray]:
-    """Return the regressor columns and the twist of a stretch, where the joint moves."""
+    """Return regressor and twist (motor minus link angle) of the samples at which joints move."""
     motor, link, torque = sides[0].q[:, joint], sides[1].q[:, joint], sides[2][:, joint]
     velocity = sides[0].dq[:, joint]
     # torque range in which the tooth contact reverses, as a share of the median torque
@@ -176,7 +176,7 @@ class SpringEstimate:
 
     @property
     def informative(self) -> bool:
-        """Whether the load explains the twist, so that the stiffness is identifiable."""
+        """Whether load torque explains the joint's twist, so that stiffness is identifiable."""
         fit = self.transmission
         # smallest R^2 of the twist for an estimate of stiffness
         return fit.explained > 0.9 and bool(np.isfinite(fit.stiffness).all())
@@ -188,7 +188,7 @@ class SpringEstimate:
 
     @property
     def resonance(self) -> float:
-        """Natural frequency of the motor against the link [Hz]; NaN without a rotor inertia."""
+        """Natural frequency of motor against link [Hz]; NaN if the rotor inertia is unknown."""
         if self.motor is None or self.motor[0] <= 0.0:
             return float('nan')
         return float(self.antiresonance * np.sqrt(1.0 + self.inertia / self.motor[0]))
@@ -249,7 +249,7 @@ def _stretches(
 
 
 def _motor(sides: Sequence[Sides], used: Conditioning, joint: int) -> FloatArray:
-    """Return rotor inertia, viscous and Coulomb friction, fitted to motor torque minus load."""
+    """Fit rotor inertia, viscous and Coulomb friction of a motor to its torque minus the load."""
     rows = []
     for motor, _, load in sides:
         assert motor.tau is not None

@@ -37,13 +37,13 @@ SIZE = 3 + 2 * len(PER_JOINT)
 
 
 def unpack(parameters: TwoLinkParameters) -> FloatArray:
-    """Return the tuned parameters as a vector: alpha, beta, gamma, then `PER_JOINT`; (13,)."""
+    """Return the tuned parameters as a vector, (13,): alpha, beta, gamma, those of `PER_JOINT`."""
     joints = [getattr(parameters, field) for field, _, _ in PER_JOINT]
     return np.concatenate([[parameters.alpha, parameters.beta, parameters.gamma], *joints])
 
 
 def pack(values: npt.ArrayLike, like: TwoLinkParameters) -> TwoLinkParameters:
-    """Convert a vector of `unpack` to parameters, with friction and drives of `like`."""
+    """Convert a vector of `unpack` to parameters, with Coulomb friction and drives of `like`."""
     vector = np.asarray(values, dtype=float)
     pairs = vector[3:].reshape(len(PER_JOINT), 2)
     fields = {field: pair for (field, _, _), pair in zip(PER_JOINT, pairs, strict=True)}
@@ -52,7 +52,7 @@ def pack(values: npt.ArrayLike, like: TwoLinkParameters) -> TwoLinkParameters:
 
 
 def parameter_names(joints: tuple[str, ...]) -> tuple[ParameterName, ...]:
-    """Return the name and unit of each element of a vector of `unpack`."""
+    """Return the name and unit of each element of the vector that `unpack` returns."""
     rigid = [ParameterName(name, '', 'kg m^2') for name in ('alpha', 'beta', 'gamma')]
     own = [ParameterName(name, joint, unit) for _, name, unit in PER_JOINT for joint in joints]
     return (*rigid, *own)
@@ -114,7 +114,7 @@ def sensitivities(
     steps: Steps, parameters: TwoLinkParameters, directions: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """
-    Simulate velocities and their derivatives for given parameter changes.
+    Simulate velocities and their derivatives with respect to given changes of the parameters.
 
     Parameters
     ----------
@@ -144,7 +144,7 @@ def _point(parameters: TwoLinkParameters) -> FloatArray:
 
 
 def _simulate(steps: Steps, values: DualArray, gear: FloatArray) -> DualArray:
-    """Return velocities, (N, E, D, 4), of E experiments from rest with D parameter vectors."""
+    """Simulate velocities, (N, E, D, 4), of E experiments with each of D parameter vectors."""
     experiments, sets, substeps = len(steps.q), len(values), 2
     arm = _Arm(np.tile(values, (experiments, 1)), gear, steps.dt / substeps)
     size = experiments * sets
@@ -203,7 +203,7 @@ class _Arm:
         modes: npt.NDArray[np.int_],
         torque: DualArray,
     ) -> tuple[DualArray, DualArray, DualArray, npt.NDArray[np.int_]]:
-        """Return joint angle 2, state, accelerations and friction modes after a time step."""
+        """Return angle of joint 2, state, accelerations and slip or stick after a time step."""
         dt, a = self.dt, self.a
         middle = q2 + 0.5 * dt * (x[:, 5] + 0.25 * dt * dv[:, 3])
         v = x[:, 4:] + 0.5 * dt * dv[:, 2:]

@@ -83,7 +83,7 @@ class Tuning:
 
 def tune(runs: Sequence[ElasticRun], start: TwoLinkParameters, loop: VelocityLoop) -> Tuning:
     """
-    Fit the parameters to measured velocity responses in closed loop.
+    Fit the parameters of the arm to measured velocities after reference steps, in closed loop.
 
     Parameters
     ----------
@@ -227,7 +227,7 @@ class TwoInertiaIdentification:
 
     @property
     def parameters(self) -> TwoLinkParameters:
-        """Return the parameters after the last step: tuned, or those of step 3a."""
+        """Return the tuned parameters; without step responses, those of step 3a."""
         return self.untuned if self.tuning is None else self.tuning.parameters
 
 
@@ -270,9 +270,9 @@ def identify_two_inertia(
     first, beta, gamma, rotor = rigid.estimate.values[:4].tolist()
     if not (first > 0.0 and beta > 0.0 and first * beta > gamma**2):
         raise IdentificationError(
-            f'step 1 found alpha + mm gear^2 = {first:.3g}, beta = {beta:.3g} and gamma = '
-            f'{gamma:.3g} kg m^2, which is impossible. Is the slow motion strong enough? Do '
-            'torques and velocities of a joint have the same sign?'
+            f'step 1 found inertias that no arm has: alpha + mm gear^2 = {first:.3g} (link 1 and '
+            f'rotor 1), beta = {beta:.3g} (link 2), gamma = {gamma:.3g} kg m^2 (coupling). Is the '
+            'motion strong enough? Are torques and velocities positive in the same direction?'
         )
     alpha = max(first - max(rotor, 0.0), 1.01 * gamma**2 / beta)
     known = replace(

@@ -113,7 +113,7 @@ class InteractionIdentifierNode(ArmidNode):
             self.publish_diagnostics()
 
     def reset(self) -> str:
-        """Discard all samples and estimates, and return the answer of the service."""
+        """Discard all samples and estimates, and return the answer of the reset service."""
         self.identifier.reset()
         for machine, gate in enumerate(self._gates):
             gate.reset()
@@ -121,7 +121,7 @@ class InteractionIdentifierNode(ArmidNode):
         return 'samples and estimates are discarded'
 
     def condition(self) -> tuple[str, Mapping[str, object]]:
-        """Return a warning, and estimated stiffness and slack, for diagnostics."""
+        """Return a warning or '', and estimated stiffness and slack of straps, for diagnostics."""
         core = self.identifier
         values: dict[str, object] = {'received': self.received}
         for part in (core.together, core.separate):
@@ -145,7 +145,7 @@ class InteractionIdentifierNode(ArmidNode):
         return super().level(troubled)
 
     def _take(self, machine: int, message: JointState) -> None:
-        """Add a joint state of the exoskeleton (0) or wearer (1); publish a new estimate."""
+        """Add a joint state of exoskeleton (0) or wearer (1); publish the estimate if new."""
         self.received += 1
         self.freshness[machine].mark_received()
         topic, n = _TOPICS[machine], len(self._joints[machine])
@@ -165,7 +165,7 @@ class InteractionIdentifierNode(ArmidNode):
                 self._estimates.publish(estimate)
 
     def _signals(self, machine: int, message: JointState) -> list[StreamSample]:
-        """Return the valid samples of a joint state; RecordingError if it is damaged."""
+        """Return the valid samples of a joint state; raise RecordingError if it is damaged."""
         topic, gate, fields = _TOPICS[machine], self._gates[machine], _FIELDS[machine]
         order = joint_places(self._joints[machine], message.name)
         parts = [np.array(getattr(message, name)) for name in fields]

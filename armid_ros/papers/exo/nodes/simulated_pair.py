@@ -120,7 +120,7 @@ class SimulatedPairNode(ArmidNode):
         return 'exoskeleton and wearer are in the initial state'
 
     def condition(self) -> tuple[str, Mapping[str, object]]:
-        """Return a warning if the simulation is slower than real time, and the skipped time."""
+        """Return a warning if simulation is slower than real time (else ''), and skipped time."""
         values = {
             'simulated_time': self.pair.t,
             'skipped_real_time': self.real_time.given_up,

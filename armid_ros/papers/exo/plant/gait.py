@@ -65,7 +65,7 @@ def leg_pair_file(name: str) -> Path:
 @dataclass(frozen=True)
 class Gait:
     """
-    Angles of one leg as a Fourier series of the phase.
+    Joint angles of a leg as a Fourier series of the gait phase.
 
     Attributes
     ----------
@@ -83,7 +83,7 @@ class Gait:
 
     @classmethod
     def fit(cls, phase: FloatArray, angles: FloatArray, harmonics: int = _HARMONICS) -> Gait:
-        """Fit a Fourier series to angles, (N, 3) [rad], at phases, (N,), between 0 and 1."""
+        """Fit a Fourier series to joint angles, (N, 3) [rad], at gait phases from 0 to 1, (N,)."""
         turn = 2.0 * np.pi * np.outer(phase, np.arange(harmonics + 1))
         basis = np.hstack([np.cos(turn), np.sin(turn[:, 1:])])
         solution = np.linalg.lstsq(basis, angles, rcond=None)[0]
@@ -91,7 +91,7 @@ class Gait:
         return cls(cosine, np.vstack([np.zeros((1, 3)), solution[harmonics + 1 :]]))
 
     def __call__(self, phase: FloatArray, derivative: int = 0) -> FloatArray:
-        """Return joint angles, or a derivative by the phase, (N, 3) [rad], at phases, (N,)."""
+        """Return joint angles, (N, 3) [rad], or a derivative by the phase, at N gait phases."""
         w = 2.0 * np.pi * np.arange(len(self.cosine))
         turn = np.outer(phase, w) + derivative * np.pi / 2.0
         return np.asarray(

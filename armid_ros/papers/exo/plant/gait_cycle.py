@@ -159,7 +159,7 @@ class GaitCycle:
     def torques(
         self, pair: TiedPair | None = None, ground: FloatArray | None = None
     ) -> FloatArray:
-        """Return exoskeleton torques, (N, n), with other straps or other foot forces."""
+        """Return exoskeleton torques, (N, n), optionally for other straps or other foot forces."""
         feet = self.own.ground if ground is None else ground
         forces = (feet, self.other.ground)
         return walking_torques(pair or self.pair, self.motions, forces).tau
@@ -232,7 +232,7 @@ def walking_torques(
     pair: TiedPair, motions: PairMotion, ground: Sequence[FloatArray]
 ) -> PairTorques:
     """
-    Return joint torques of both machines under strap and ground forces, equation (27).
+    Return joint torques of both machines with strap and ground forces, by (27) of the paper.
 
     Parameters
     ----------
@@ -270,7 +270,7 @@ def _walk(
     pair: TiedPair, legs: PairMotion, start: FloatArray, cycle: float
 ) -> tuple[FloatArray, FloatArray]:
     """
-    Integrate the hip motion of both machines over three gait cycles, with prescribed legs.
+    Integrate the hip motion of both machines over three gait cycles, with prescribed leg angles.
 
     States and rates of the last cycle have the shape (N, 2, 2, 2): position and velocity, of the
     machine and its wearer, forward and up.
@@ -341,7 +341,7 @@ def check_cycle(
 def driving_torque(
     cycle: GaitCycle, joint: str, rate: float, tau: FloatArray | None = None
 ) -> DrivingTorque:
-    """Return a function of time: zero force on the hips, and the torque of a joint; (3,)."""
+    """Return a function of time for two hip forces, which are zero, and a joint's torque, (3,)."""
     column = [cycle.pair.robot.index(joint)]
     own = (cycle.own.tau if tau is None else tau)[:, column]
     curve = splined(cycle.own.motion.t, own, rate)
@@ -350,7 +350,7 @@ def driving_torque(
 
 def ground_by_shares(cycle: GaitCycle) -> FloatArray:
     """
-    Return forces by equations (20) to (22) on heels and toes, shape (N, 4, 2) [N].
+    Return ground forces on heels and toes by equations (20) to (22) of the paper, (N, 4, 2) [N].
 
     The equations do not give the centre of pressure, so that of the simulated ground is used.
 

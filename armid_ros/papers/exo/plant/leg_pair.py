@@ -47,7 +47,7 @@ class TiedPair(TiedMachines):
     slack: FloatArray | None = None
 
     def __post_init__(self) -> None:
-        """Expand single numbers to all straps, and check the values."""
+        """Expand a single stiffness or slack to all straps, and check the values."""
         size = (len(self.ties),)
         for name in ('stiffness', 'slack'):
             values = getattr(self, name)
@@ -136,7 +136,7 @@ class PairTorques:
 
 def pair_torques(pair: TiedPair, motion: Motion, other_motion: Motion) -> PairTorques:
     """
-    Return the joint torques of both machines and the strap forces along a motion.
+    Return the joint torques of both machines and the strap forces along given motions.
 
     Parameters
     ----------
@@ -213,7 +213,7 @@ def walking(pair: TiedPair, gait: Gait, t: FloatArray) -> PairMotion:
 
 def stepping(pair: TiedPair, gait: Gait, t: FloatArray, period: float | None = None) -> PairMotion:
     """
-    Return a periodic motion of exoskeleton and wearer through single support and back.
+    Return a periodic motion of exoskeleton and wearer: a step forward and back, on one foot.
 
     Parameters
     ----------
@@ -244,7 +244,7 @@ def following(
     pair: TiedPair, t: FloatArray, moving: Callable[[tuple[str, ...], FloatArray], Motion]
 ) -> PairMotion:
     """
-    Return the motions of wearer and exoskeleton, which follows with delay and errors.
+    Return motions of the wearer, and of the exoskeleton that follows with delay and errors.
 
     Parameters
     ----------

@@ -29,7 +29,7 @@ Rate = Callable[[int, FloatArray], FloatArray]
 
 def splined(t: FloatArray, tau: FloatArray, rate: float) -> DrivingTorque:
     """
-    Return torques as a function of time: sampled at a rate, joined by cubic splines.
+    Return torques as a function of time: resampled at a rate, joined by cubic splines.
 
     Parameters
     ----------
@@ -85,7 +85,7 @@ def drive_by_torque(
     on_ground: bool = False,
 ) -> Motion:
     """
-    Integrate the torque-driven joints of the exoskeleton along a prescribed motion.
+    Integrate torque-driven joints of the exoskeleton while all other joints move as prescribed.
 
     Parameters
     ----------
@@ -141,7 +141,7 @@ def _forward_dynamics(
     torque: DrivingTorque,
     on_ground: bool,
 ) -> Rate:
-    """Return the time derivative of the driven joints as a function of sample and state."""
+    """Return a function for the time derivative of the state of the torque-driven joints."""
     robot, own, tied = pair.robot, motions.own, len(pair.ties)
     ends = [(tie.joint, np.array(tie.point)) for tie in pair.ties]
     if on_ground:
@@ -202,15 +202,15 @@ class GaitCheck:
 
     @property
     def followed(self) -> FloatArray:
-        """Position of the joint, shape (N,) [rad]."""
+        """Position of the torque-driven joint, shape (N,) [rad]."""
         return np.asarray(self.motion.q[:, self.motion.joints.index(self.joint)])
 
     @property
     def error(self) -> FloatArray:
-        """Error of the joint position, shape (N,) [rad]."""
+        """Position error of the torque-driven joint, shape (N,) [rad]."""
         return self.followed - self.prescribed
 
     @property
     def most(self) -> float:
-        """Largest error of the joint position [deg]."""
+        """Largest position error of the torque-driven joint [deg]."""
         return float(np.degrees(np.abs(self.error).max()))

@@ -43,7 +43,7 @@ HEEL_DOWN, TOE_DOWN = (0.0, 0.42), (0.12, 0.62)
 @dataclass(frozen=True)
 class LegLength:
     """
-    Lengths of the segments of a leg [m].
+    Segment lengths of a leg [m].
 
     Attributes
     ----------
@@ -141,7 +141,7 @@ def walkable(
     swing, foot_std = _inside(phase, (0.68, 0.93)), 0.3e-3  # of a foot that stands [m]
 
     def curves(x: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, float, float]:
-        """Return angles, path of the hips and its acceleration [m/s^2], lean and stride."""
+        """Return leg angles, hip path, hip acceleration [m/s^2], trunk lean and stride."""
         # coefficients of hip, knee, ankle and path, lean, stride, position of the fixed foot
         joints, path = x[: 3 * count].reshape(3, count).T, x[3 * count : -3].reshape(2, paths).T
         own_lean = float(x[-3]) if lean is None else lean
@@ -305,7 +305,7 @@ def floating(robot: Robot) -> list[int]:
 
 
 def contacts(robot: Robot) -> tuple[list[str], FloatArray]:
-    """Return joints and contact points, (4, 3) [m], of right and left heel and toe."""
+    """Return ankle names and contact points in their frames, (4, 3) [m], of heels and toes."""
     prefix = robot.joints[0].split('_')[0]
     ankles = [f'{prefix}_{side}_ankle' for side in SIDES for _ in range(2)]
     return ankles, np.tile([[0.0, 0.0, 0.0], [leg_length(robot).foot, 0.0, 0.0]], (2, 1))
@@ -314,7 +314,7 @@ def contacts(robot: Robot) -> tuple[list[str], FloatArray]:
 def _joint_urdf(
     joint: str, parent: str, child: str, axis: str, body: pin.Inertia | None, up: float = 0.0
 ) -> str:
-    """Return the URDF text of a joint and its link; prismatic if the link has no body."""
+    """Return the URDF text of a joint and its link; the joint of a massless link is prismatic."""
     kind, far, inside = 'prismatic', '1000', ''
     if body is not None:
         kind, far = 'revolute', '3.2'

@@ -188,7 +188,7 @@ def feet_section(cycle: GaitCycle) -> ContentSection:
 
 
 def by_torque_section(walked: SimulatedWalk) -> ContentSection:
-    """Return the section with errors of torque-driven joints, beside those of the paper."""
+    """Return the section with errors of torque-driven joints, here and in the paper."""
     rate = read_assumptions()['torque_rate'].value
     text = (
         f'One joint follows its torque ({rate:g} samples per second, cubic splines). The hips are '
@@ -221,7 +221,7 @@ def by_torque_section(walked: SimulatedWalk) -> ContentSection:
 
 
 def _bodies(robot: Robot, motion: Motion, ahead: FloatArray) -> list[Any]:
-    """Return the lines of trunk, right leg and left leg in each frame [px]."""
+    """Return the drawn lines of trunk and legs in each frame of the animation [px]."""
     leg = leg_length(robot)
     lean = robot.joints[floating(robot)[2]]
     joints, points = [lean, lean], [[0.0, 0.0, 0.55], [0.0, 0.0, 0.0]]
@@ -235,7 +235,7 @@ def _bodies(robot: Robot, motion: Motion, ahead: FloatArray) -> list[Any]:
 
 
 def _placed(points: FloatArray, ahead: FloatArray) -> FloatArray:
-    """Convert points, forward and up [m], to the drawing [px], which follows the wearer."""
+    """Convert points, forward and up [m], to pixels of a drawing that follows the wearer."""
     shape = (-1,) + (1,) * (points.ndim - 2)
     x = 300.0 + _SCALE * (points[..., 0] - ahead.reshape(shape))
     return np.stack([x, _GROUND - _SCALE * points[..., 1]], axis=-1)
