@@ -85,7 +85,7 @@ def draw_poses(
     collision: CollisionModel, poses: FloatArray, captions: Sequence[str], path: FloatArray
 ) -> ArmDrawing:
     """
-    Draw an arm and its obstacles in several poses, with the path of the last body.
+    Draw an arm and its obstacles in several poses, with the path of the arm's last body.
 
     Parameters
     ----------
@@ -203,7 +203,7 @@ class _Solid:
 
 
 def _solids(collision: CollisionModel) -> list[_Solid]:
-    """Return the bodies of an arm and its surroundings, and bars for links without a body."""
+    """Return collision bodies of an arm and its obstacles, and bars for links without a body."""
     solids = []
     for body in collision.geometry.geometryObjects:
         shape = body.geometry
@@ -258,7 +258,7 @@ class _Strip:
         room: tuple[float, float],
         *others: FloatArray,
     ) -> _Strip:
-        """Return picture frames of at most a given size [px] around bodies and `others`."""
+        """Return picture frames of at most a given size [px] around bodies and points `others`."""
         hulls = [solid.seen(frame[solid.joint])[0] for frame in frames for solid in solids]
         points, margin = np.concatenate([*others, *hulls]), 0.03  # around a drawing [m]
         left, low = (points.min(axis=0) - margin).tolist()
@@ -268,13 +268,13 @@ class _Strip:
         return cls(solids, frames, left, high, width * scale, height * scale, scale)
 
     def place(self, points: FloatArray, pose: int) -> FloatArray:
-        """Convert points of the drawing plane, (..., 2) [m], to pixels of a pose."""
+        """Convert points of the drawing plane, (..., 2) [m], to pixels in the frame of a pose."""
         right = pose * self.pitch + self.scale * (points[..., 0] - self.left)
         down = self.scale * (self.top - points[..., 1])
         return np.asarray(np.round(np.stack([right, down], axis=-1), 1))
 
     def bodies(self, colour: Callable[[_Solid], str]) -> tuple[tuple[str, str], ...]:
-        """Return the outline and colour of each body, in each pose the farthest body first."""
+        """Return outline and colour of each body, in each pose farthest from the viewer first."""
         found = []
         for pose, frame in enumerate(self.frames):
             seen = [(solid, *solid.seen(frame[solid.joint])) for solid in self.solids]

@@ -172,7 +172,7 @@ class BulletList(Templated):
 @dataclass(frozen=True)
 class Fold(Templated):
     """
-    Line of text with blocks below it that the reader opens and closes.
+    Line of text that opens and closes the blocks below it.
 
     Attributes
     ----------
@@ -232,7 +232,7 @@ class Legend(Templated):
 @dataclass(frozen=True)
 class SmallMultiples(Templated):
     """
-    Grid of small pictures, as many in a row as the page is wide.
+    Grid of small pictures, as many in a row as the width of the page allows.
 
     Attributes
     ----------
@@ -249,7 +249,7 @@ class SmallMultiples(Templated):
 @dataclass(frozen=True)
 class Bar:
     """
-    One bar of a bar chart, with its text.
+    Bar of a bar chart, with the text next to it.
 
     Attributes
     ----------
@@ -332,7 +332,7 @@ class VerdictSection(Section):
 
 
 def next_steps(steps: Sequence[str]) -> list[ContentSection]:
-    """Return a section with all next steps; [] if there is only that of the verdict box."""
+    """Return a section with all next steps; [] if the verdict box already shows the only step."""
     bullets = BulletList([(step, '') for step in steps], True)
     return [ContentSection('What to do next', [bullets])] if steps[1:] else []
 

@@ -177,7 +177,7 @@ def thinned(*series: npt.ArrayLike, most: int = 3000) -> npt.NDArray[np.intp]:
 
 
 def joined(parts: Sequence[FloatArray]) -> FloatArray:
-    """Concatenate stretches with a NaN between them, at which a curve breaks."""
+    """Concatenate values of stretches; a NaN between two stretches breaks the curve."""
     pieces = [part for stretch in parts for part in (stretch, [np.nan])]
     return read_only(np.concatenate(pieces[:-1]))
 
@@ -189,7 +189,7 @@ def joined_time(parts: Sequence[FloatArray]) -> FloatArray:
 
 
 def rounded(values: npt.ArrayLike) -> list[float | None]:
-    """Return values rounded to a tenth of a pixel, None for NaN."""
+    """Return a chart's values, rounded to a tenth of a pixel; None in place of NaN."""
     array = np.asarray(values, dtype=float)
     finite = array[np.isfinite(array)]
     span = float(np.ptp(finite)) if len(finite) else 0.0

@@ -178,7 +178,7 @@ def _count_sentence(comparison: Comparison) -> str:
 
 
 def _residuals(comparison: Comparison) -> Iterator[str]:
-    """Yield a sentence for each joint whose residual differs, then the possible reason."""
+    """Yield a sentence on each joint whose residual changed, then the possible reason."""
     for change in comparison.changed_residuals:
         errors = change.before_error, change.after_error
         ranks = ('second', 'first') if change.ratio > 1.0 else ('first', 'second')
@@ -198,7 +198,7 @@ def _residuals(comparison: Comparison) -> Iterator[str]:
 
 
 def _load(comparison: Comparison, load: LoadChange) -> tuple[str, str]:
-    """Return sentences on mass and place of a load that explains all inertial changes."""
+    """Return sentences on a load that explains all inertial changes: mass, link and centre."""
     joints = {
         (
             int(c.parameter.name.split(' ')[0].lstrip('Imxyz')) if c.parameter.rigid else 0

@@ -44,13 +44,13 @@ _TONES = {'consistent': 'good', 'named': 'fair', 'ambiguous': 'fair', 'partial':
 
 
 def tone_of(diagnosis: Diagnosis) -> str:
-    """Return the colour of a verdict: good only if certain and if all joints were checked."""
+    """Return the colour of a verdict: 'good' only without doubt and if all joints were checked."""
     tone = _TONES.get(diagnosis.verdict, 'bad')
     return 'fair' if tone == 'good' and (diagnosis.not_checked or diagnosis.doubt) else tone
 
 
 def cause_sentences(diagnosis: Diagnosis) -> list[str]:
-    """Return sentences on the share that each cause explains, and on minor effects."""
+    """Return sentences on the share of the gap that each cause explains, and on minor effects."""
     shares = [
         f'{names_and_places(group)}: {percent(group[0].share)} of the difference'
         f'{share_interval_in_words(group[0])}{", together" * (len(group) > 1)}'
@@ -144,7 +144,7 @@ def diagnosis_report(
 
 
 def _at_fault(diagnosis: Diagnosis, read: Mapping[str, Sequence[Recording]]) -> list[str]:
-    """Return the recordings that a BAD DATA verdict blames, or all; [] for other verdicts."""
+    """Return the recordings that a bad_data verdict names, or else all; [] for other verdicts."""
     if diagnosis.verdict != 'bad_data':
         return []
     sources = [one.source for several in read.values() for one in several if one.source]
@@ -154,7 +154,7 @@ def _at_fault(diagnosis: Diagnosis, read: Mapping[str, Sequence[Recording]]) -> 
 
 
 def _verdict(diagnosis: Diagnosis, worse: Sequence[str], step: str) -> VerdictSection:
-    """Return the verdict box: causes, next step, and bars of shares or errors."""
+    """Return the verdict box: causes, next step, and bars of explained shares or torque errors."""
     notes = [sentence(note) for note in diagnosis.notes]
     if worse:
         notes.append(
@@ -308,7 +308,7 @@ def overlay_section(diagnosis: Diagnosis, gap: Gap) -> ContentSection:
 
 
 def _of_recording(gap: Gap, shown: Overlay, joint: int) -> tuple[FloatArray, ...]:
-    """Return time, measured torque and torques of both models of a recording."""
+    """Return times of a recording, and a joint's torque as measured and from both models."""
     here = shown.source, shown.trajectory.fold
     own = [one for one in gap.overlays if (one.source, one.trajectory.fold) == here]
     curves = zip(*((one.measured, one.before, one.after) for one in own), strict=True)
@@ -318,7 +318,7 @@ def _of_recording(gap: Gap, shown: Overlay, joint: int) -> tuple[FloatArray, ...
 
 def whole_overlays(diagnosis: Diagnosis, recordings: Sequence[Recording]) -> Gap | None:
     """
-    Return the gap, with curves of complete recordings if a cause acts only for some time.
+    Return the gap, with torque curves of whole recordings if a cause acts only for some time.
 
     Parameters
     ----------

@@ -259,7 +259,7 @@ def _input_section(
 def _motion_section(
     limits: Limits, motion: Motion, shares: Mapping[str, FloatArray]
 ) -> ContentSection:
-    """Return the section with position, velocity, acceleration and torque beside limits."""
+    """Return the section with position, velocity, acceleration and torque, and their limits."""
     assert motion.tau is not None
     quantities = (
         ('position', motion.q, limits.lower, limits.upper),

@@ -131,7 +131,7 @@ def parameter_sections(
     name: str = 'description',
 ) -> list[Section]:
     """
-    Return the section with all parameters, and with physically consistent links if fitted.
+    Return sections with all parameters and, if fitted, with physically consistent links.
 
     Parameters
     ----------
@@ -153,7 +153,7 @@ def parameter_sections(
 
 
 def _contradictions(result: Identification, description: ArmModel) -> list[str]:
-    """Return a sentence on how many rigid-body parameters differ from the URDF, or []."""
+    """Return a sentence on how many rigid-body parameters differ from the URDF; [] if none do."""
     counts = not_as_described(result, description)
     joints = [joint for joint, (differ, _) in counts.items() if differ]
     differ, count = (sum(numbers) for numbers in zip(*counts.values(), strict=True))
@@ -265,7 +265,7 @@ def convergence_section(
     history: Sequence[tuple[float, Estimate]], truth: FloatArray
 ) -> ContentSection:
     """
-    Return the section with online estimates over time beside the true values.
+    Return the section with online estimates over time, compared with the true values.
 
     Parameters
     ----------

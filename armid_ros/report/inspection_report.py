@@ -106,7 +106,7 @@ def inspection_word(found: Inspection) -> str:
 
 
 def check_word(remarks: Sequence[Remark], found: LinkCheck | None) -> str:
-    """Return the verdict on a description: 'clean', 'look' or 'wrong'."""
+    """Return the verdict on a robot description (URDF): 'clean', 'look' or 'wrong'."""
     weights = {remark.weight for remark in remarks}
     # with a smaller share explained, an effect may be missing instead
     if 'bad' in weights or (found is not None and found.wrong and found.explained >= 0.9):
@@ -115,7 +115,7 @@ def check_word(remarks: Sequence[Remark], found: LinkCheck | None) -> str:
 
 
 def headline(remarks: Sequence[Remark], found: LinkCheck | None) -> tuple[str, ...]:
-    """Return sentences on a description: main finding, torque error, suspicious values."""
+    """Return sentences on a checked URDF: main finding, torque error, suspicious values."""
     suspicious = [pretty(sentence(one.text)) for one in remarks if one.weight != 'note']
     impossible = [one for one in remarks if one.weight == 'bad']
     values = suspicious or ['No impossible or suspicious value in the description.']
@@ -181,7 +181,7 @@ def _interval(values: FloatArray, std: FloatArray) -> str:
 def description_check_report(
     remarks: Sequence[Remark], links: LinkCheck | None, origin: ResultOrigin
 ) -> str:
-    """Return the HTML page of a checked description."""
+    """Return the HTML page of a checked robot description (URDF)."""
     first, *others = headline(remarks, links)
     grade, bars = check_word(remarks, links), None
     notes = [sentence(one.text) for one in remarks if one.weight == 'note']
@@ -209,7 +209,7 @@ def description_check_report(
 
 
 def recording_facts(found: Inspection) -> list[tuple[str, str]]:
-    """Return name and value of facts: sampling, gaps, period and repairs of a recording."""
+    """Return name and value of facts on a recording: sampling, gaps, period and repairs."""
     sampling, recording, trial = found.sampling, found.recording, found.trial
     motion = 'does not repeat'
     if sampling.period is not None:
@@ -299,7 +299,7 @@ def _curves_section(found: Inspection) -> ContentSection:
 
 
 def joint_heads(found: Inspection) -> tuple[str, ...]:
-    """Return the column heads of the table of joints, with the units if all are equal."""
+    """Return the column heads of the table of joints, with units if all joints have the same."""
     alike, unit = len(set(found.units)) == 1, found.units[0]
     length, speed, torque = (
         f' [{one}]' if alike else '' for one in (unit, f'{unit}/s', 'N' if unit == 'm' else 'N m')

@@ -139,7 +139,7 @@ def _of_errors(
 
 
 def residual_trends(joints: Sequence[str], fits: Sequence[Fit]) -> tuple[str, ...]:
-    """Return a sentence on joints whose residual depends on speed, position or load; or ()."""
+    """Return a sentence on joints whose residual depends on speed, position or load, else ()."""
     depends: dict[str, list[str]] = {}
     errors = Score.of(fits).joint_relative_error_percent
     least = 100.0 * DiagnosisSettings.material

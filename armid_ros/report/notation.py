@@ -33,7 +33,7 @@ def pretty(unit: str) -> str:
 
 
 def digits(value: float, count: int = 2) -> str:
-    """Format a number with significant digits: '2.0' and '0.031', but '178'."""
+    """Format a number with `count` significant digits, or all integer digits: '2.0', '178'."""
     if not abs(value) < _MAX_NUMBER:
         return DASH
     if 10.0**count <= abs(value) < 1e7:
@@ -65,7 +65,7 @@ def with_interval(value: float, std: float, unit: str) -> str:
 def value_of(
     finding: Finding, parameter: ParameterName, value: float, std: float, had: float = 0.0
 ) -> str:
-    """Format a parameter with 95 % interval, after its earlier value; or 'not determined'."""
+    """Format a parameter with interval, such as '1.0 to 2.0 ± 0.1 N m'; or 'not determined'."""
     if words.vague(finding, parameter, value, std):
         return 'not determined'
     start = f'{measured(had, HALF_WIDTH * std)[0]} to ' if had else ''
@@ -84,7 +84,7 @@ def _plus_minus(value: float, std: float, unit: str) -> str:
 
 
 def percent(share: float) -> str:
-    """Format a share of the gap as a percentage: '96 %', '0.4 %'."""
+    """Format a share as a percentage: '96 %', '0.4 %'."""
     if not math.isfinite(share):
         return DASH
     return words.percent(share)
@@ -112,7 +112,7 @@ def robot_label(source: str) -> str:
 
 def common_prefix(names: Sequence[str]) -> str:
     """
-    Return the common prefix of all joint and link names if it is long, such as 'panda_'.
+    Return the common prefix of all joint and link names, such as 'panda_'; '' if it is short.
 
     Parameters
     ----------

@@ -166,7 +166,7 @@ def parameter_section(
     reference: str = 'description',
 ) -> ContentSection:
     """
-    Return the section with the estimates of all parameters beside the reference values.
+    Return the section with the estimates of all parameters and their reference values.
 
     Parameters
     ----------

@@ -67,7 +67,7 @@ class ResultOrigin:
     step: str = ''
 
     def of(self, known: str) -> ResultOrigin:
-        """Return the origin with a given robot name if it has none."""
+        """Return the origin, with a given robot name where its own is missing."""
         return replace(self, robot=self.robot or known, source=self.source or known)
 
 

@@ -79,7 +79,7 @@ class Whiteness:
 
     @property
     def outside(self) -> float:
-        """Share of the lags outside the band; 0.01 for white noise."""
+        """Share of lags with autocorrelation outside the 99 % band; 0.01 for white noise."""
         return float(np.mean(np.abs(self.correlation) > self.band))
 
     @staticmethod
@@ -103,7 +103,7 @@ class Whiteness:
 
 def torque_reach(result: Identification, fits: Sequence[Fit]) -> FloatArray:
     """
-    Return the 95 % half-width of the predicted torque due to the parameters, shape (n,).
+    Return the 95 % half-width of each joint's predicted torque due to parameter errors, (n,).
 
     The half-widths are root mean squares over a motion [N m].
 
@@ -171,7 +171,7 @@ def residual_section(robot: Robot, fits: Sequence[Fit], role: str) -> ContentSec
 
 
 def _cloud(x: FloatArray, residual: FloatArray, xlabel: str, ylabel: str) -> Chart:
-    """Return a chart of a residual against a variable, with its mean in bins."""
+    """Return a chart of a residual against a variable, with the mean residual in bins."""
     trend = Trend.of(x, residual)
     # largest number of points of a cloud
     chosen = np.unique(np.linspace(0, max(len(x) - 1, 0), min(500, len(x))).astype(np.intp))
@@ -219,7 +219,7 @@ def whiteness_section(robot: Robot, fits: Sequence[Fit], role: str) -> ContentSe
 def residual_by_variable(
     fits: Sequence[Fit], joint: int
 ) -> tuple[FloatArray, dict[str, FloatArray]]:
-    """Return residual, and speed, position and load by name, of a joint; each (N,)."""
+    """Return a joint's residual, (N,), and its speed, position and predicted torque by name."""
     used = np.concatenate([fit.informative[:, joint] for fit in fits])
     parts = {
         'speed': [fit.motion.dq for fit in fits],
@@ -231,7 +231,7 @@ def residual_by_variable(
 
 
 def explained_shares(fits: Sequence[Fit], joint: int) -> dict[str, float]:
-    """Return the share of a joint's residual that speed, position and load explain."""
+    """Return the share of a joint's residual that speed, position and load each explain alone."""
     residual, axes = residual_by_variable(fits, joint)
     # smallest number of samples for a trend
     if len(residual) < 20:

@@ -77,7 +77,7 @@ def data_quality_section(
 def _repeatability(
     read: Sequence[tuple[Recording, str, Sequence[Fit]]], robot: Robot
 ) -> list[Templated]:
-    """Return a foldable table of each periodic recording: noise and residual of each joint."""
+    """Return a foldable table of torque noise and joint residuals for each periodic recording."""
     folds: list[Templated] = []
     for recording, _, fits in read:
         found = repeatability(fits) if fits else None
@@ -121,7 +121,7 @@ def _repeatability(
 
 def repeatability(fits: Sequence[Fit]) -> tuple[float, FloatArray, FloatArray] | None:
     """
-    Return the period of a motion, and noise and residual of each joint.
+    Return the period of a recorded motion, and torque noise and residual of each joint.
 
     Two periods are compared in the longest stretch of a recording; None if no motion repeats. The
     residuals are compared, each at the positions of its own period. Torque that depends only on
