@@ -26,7 +26,7 @@ RESULTS = Path(__file__).parent / 'results' / 'speed.json'
 
 
 def run(name: str) -> int:
-    """Run a benchmark in a separate process, record its output, and return its exit code."""
+    """Run a benchmark in a separate process, record its printed lines; return its exit code."""
     command, lines = [sys.executable, '-m', f'benchmarks.{name}'], []
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
         assert process.stdout is not None

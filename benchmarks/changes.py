@@ -37,7 +37,7 @@ from benchmarks.multisine import multisine
 
 
 def ball(mass: float) -> str:
-    """Return the payload parameters of a ball of 3 cm, 5 cm from the wrist."""
+    """Return the payload parameters of a ball with radius 3 cm, 5 cm from the wrist."""
     own = 0.4 * mass * 0.03**2
     inertia = own + mass * 0.05**2
     return (
@@ -128,13 +128,13 @@ def sampled(simulated: SimulatedArm, noise: FloatArray) -> Iterator[Sample]:
 
 
 def changed(change: str) -> ArmModel:
-    """Return the true model of the humanoid arm with a change."""
+    """Return the true model of the humanoid arm after a change of its effects."""
     arm = arm_with(*IDENTIFIED, *LACKING)
     return arm.with_effect(*parse_effect(change, arm.robot))
 
 
 def size(change: str) -> dict[ParameterName, float]:
-    """Return the true change of each parameter by name."""
+    """Return the true change of each effect parameter by name."""
     effect, values = parse_effect(change, load_robot('humanoid_arm'))
     names = effect.parameters(load_robot('humanoid_arm'))
     return dict(zip(names, values, strict=True))
@@ -168,7 +168,7 @@ def unchanging(minutes: int, seed: int, rate: float = RATE) -> Iterator[Sample]:
 
 
 def identifier() -> OnlineIdentifier:
-    """Return an online identifier of the arm that does not know the values of the effects."""
+    """Return an online identifier that does not know the values of the arm's effects."""
     nothing = replace(arm_with(*IDENTIFIED, 'torque_offset'), values=())
     return OnlineIdentifier(nothing, rng=np.random.default_rng(0))
 
@@ -178,7 +178,7 @@ def watch(
     tell: Callable[[float, Change], None] | None = None,
     online: OnlineIdentifier | None = None,
 ) -> OnlineIdentifier:
-    """Identify online, and call `tell` with time and cause of each detected change."""
+    """Identify online, and call `tell` with time and cause of each detected parameter change."""
     online = online or identifier()
     seen = len(online.changes)
     for t, q, tau in samples:
@@ -191,7 +191,7 @@ def watch(
 
 
 def outcome(truth: Mapping[ParameterName, float], found: Change) -> str:
-    """Return 'named', 'named second' or 'WRONG': where the true cause is in a change."""
+    """Return 'named', 'named second' (as a rival) or 'WRONG': the rank of the true cause."""
     if {p for p, value in truth.items() if value} & set(found.size.parameters):
         return 'named'
     among = any(set(rival.parameters) & set(truth) for rival in found.rivals)
@@ -206,7 +206,7 @@ def held(truth: Mapping[ParameterName, float], found: Change) -> list[bool]:
 
 
 def main() -> None:
-    """Print detection delay and named cause of each change."""
+    """Print detection delay and named cause of each simulated change of the arm."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[1])
     parser.add_argument('--draws', type=int, default=4, help='runs with every change')
     outcomes: Counter[str] = Counter()

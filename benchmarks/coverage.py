@@ -47,14 +47,14 @@ def recorded(motion, tau, rng, encoder, pole):
 
 
 def from_recording(arm, recording):
-    """Identify from a recording, and return base parameters and estimate."""
+    """Identify from a recording, and return base parameters and their estimate."""
     settings = IdentificationSettings(signals=SignalSettings(10.0, 4))
     result = identify(arm, [recording], settings, rng=np.random.default_rng(0))
     return result.base, result.estimate
 
 
 def online(arm, recording):
-    """Identify online, sample by sample, and return base parameters and estimate."""
+    """Identify online, sample by sample, and return base parameters and their estimate."""
     identifier = OnlineIdentifier(arm, rng=np.random.default_rng(0))
     for t, q, tau in zip(recording.t, recording.q, recording.tau, strict=True):
         identifier.update(float(t), q, None, tau)
@@ -62,7 +62,7 @@ def online(arm, recording):
 
 
 def coverage(method, repeats, encoder, pole):
-    """Identify repeatedly, and print the share of 95 % intervals that contain the truth."""
+    """Identify repeatedly, and print the share of 95 % intervals that contain the true value."""
     rng = np.random.default_rng(0)
     arm = ArmModel.of('humanoid_arm', effects=FRICTION)
     structure = ArmModel(arm.robot, arm.effects)

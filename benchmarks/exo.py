@@ -102,7 +102,7 @@ def stiffness(sets: dict[str, PairMotion], draws: int) -> None:
 
 
 def motions_of_four_springs() -> None:
-    """Print the 95 % intervals of four straps for 10 s at 1 kHz of each motion."""
+    """Print 95 % intervals of the stiffness of four straps, from 10 s of each motion at 1 kHz."""
     print('four springs, inertias free, 0.05 deg, 10 s: 95 % interval [%] of', ', '.join(SEGMENTS))
     for name in EXERCISES:
         motions = with_torques(PAIR, exercise(PAIR, name, np.arange(0.0, 10.0, 1e-3)))
@@ -124,7 +124,7 @@ def find_springs(
     inertias: Inertias = 'known',
     separate: bool = False,
 ) -> Interaction:
-    """Add noise, and identify the straps from poses or, from 1000 samples on, a recording."""
+    """Add noise, and identify straps from poses, or from a recording if it has 1000 samples."""
     own, other = measured(motions, degrees, np.random.default_rng(seed))
     if len(own) < 1000:
         problem = interaction_problem(

@@ -45,7 +45,7 @@ STIFFNESSES = (1e3, 3e3, 1e4, 5e4)
 
 
 def diagnosed(sets: int, first: int = 0) -> None:
-    """Diagnose MuJoCo bags with hidden straps, and print the rates of right names."""
+    """Diagnose MuJoCo bags with hidden straps, and print the rates of right and false names."""
     ties = leg_pair()
     partner = Partner(ties.other, ties.ties, 'human_legs')
     right = alarms = 0
@@ -83,7 +83,7 @@ def diagnosed(sets: int, first: int = 0) -> None:
 
 
 def expected_z(recordings: list[Recording], stiffness: float) -> dict[str, float]:
-    """Return the expected z-score of the stiffness of each segment, if all may have a strap."""
+    """Return the expected z-score of each segment's strap stiffness, if all may have a strap."""
     exo = load_robot('exoskeleton_legs')
     settings = SignalSettings()
     used = band_of_motion(recordings, conditioning(recordings, settings), settings)
@@ -98,7 +98,7 @@ def expected_z(recordings: list[Recording], stiffness: float) -> dict[str, float
 
 
 def recorded_pair(partner: Partner, straps: Straps, seed: int) -> list[Recording]:
-    """Record exoskeleton and wearer three times; odd seeds have mass errors of up to 10 %."""
+    """Record exoskeleton and wearer three times, with mass errors up to 10 % for odd seeds."""
     exo = load_robot('exoskeleton_legs')
     recordings = []
     for walk in walks(straps, seed, seconds=SECONDS, wrong_masses=0.1 * (seed % 2)):

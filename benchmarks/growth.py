@@ -69,14 +69,14 @@ def chain(joints: int) -> str:
 
 
 def recording(arm: ar.ArmModel, samples: int, seed: int) -> ar.Recording:
-    """Return a noisy recording along three sines per joint."""
+    """Return a noisy recording of a motion with three sines per joint."""
     made = motion(arm, samples / (60.0 * RATE), np.random.default_rng(seed))
     q, dq, tau = made.q, made.dq, made.tau
     return ar.Recording(joints=made.joints, t=made.t, q=q, dq=dq, tau=tau, source=f'bag{seed}')
 
 
 def prepared(job: str, sizes: dict[str, int], folder: Path) -> Callable[[], object]:
-    """Create the data of a job, and return the job as a function without arguments."""
+    """Create the data of a timed job, and return the job as a function without arguments."""
     truth = ar.ArmModel.of(chain(sizes['joints']), effects=list(FRICTION))
     arm = ar.ArmModel.of(truth.robot, effects=EFFECTS[: sizes['effects']])
     size = sizes['samples'] if sizes['bags'] == 1 else BAG
@@ -97,7 +97,7 @@ def prepared(job: str, sizes: dict[str, int], folder: Path) -> Callable[[], obje
 
 
 def measure(run: Callable[[], object]) -> tuple[float, float]:
-    """Return processor time [s] and additional memory [MB] of a job."""
+    """Return processor time [s] and additional memory [MB] of a call."""
     before, begun = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss, time.process_time()
     run()
     used = time.process_time() - begun
@@ -105,7 +105,7 @@ def measure(run: Callable[[], object]) -> tuple[float, float]:
 
 
 def slope(x: tuple[int, ...], y: list[float]) -> float:
-    """Return the exponent of a power law, fitted to the larger half of the sizes."""
+    """Return the exponent of a power law that is fitted to the larger half of the sizes."""
     last = max(2, len(x) // 2)
     return float(np.polyfit(np.log(x[-last:]), np.log(np.maximum(y[-last:], 1e-3)), 1)[0])
 

@@ -92,7 +92,7 @@ def change_of(arm, bags, rng):
 
 
 def tally(arms, bags, sick, rng, alpha=0.05):
-    """Return how many changed arms and how many healthy arms are reported."""
+    """Return how many changed arms and how many healthy arms of a fleet are reported."""
     series = draw(arms, bags, sick, rng)
     compared = without_days(series)
     judged = judge([(compared, spreads(compared))])

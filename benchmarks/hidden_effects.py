@@ -81,7 +81,7 @@ class Judged:
 
     @property
     def false_alarm(self) -> bool:
-        """Whether the verdict is not `consistent`, link errors of the nominal model aside."""
+        """Whether the verdict differs from `consistent` for more than wrong links of the URDF."""
         only_bodies = bool(self.answer.headline) and not self.findings
         return self.answer.verdict != 'consistent' and not only_bodies
 
@@ -92,12 +92,12 @@ class Judged:
 
     @property
     def found(self) -> Named | None:
-        """Named effect that is the first hidden effect, or has it as a rival; None without one."""
+        """Named effect that is the first hidden effect or has it as a rival; None if none does."""
         return next((f for f in self.findings if self.spec.effects[0] in f.names), None)
 
     @property
     def localised(self) -> bool:
-        """Whether the hidden effect is found in its joints, named first or as a rival."""
+        """Whether the hidden effect is found in its true joints, as a named effect or a rival."""
         found, truth = self.found, self.effects[0]
         return found is not None and set(found.joints_of(truth.name)) == set(truth.joints)
 
@@ -122,7 +122,7 @@ class Judged:
 
 
 def true_arm(case: Case) -> ArmModel:
-    """Return the model of the true arm, with the hidden effects that the catalogue has."""
+    """Return the model of the true arm, with its hidden effects as effects of the catalogue."""
     arm = ArmModel(case.true_robot)
     for name, values in case.true_known.items():
         joints = tuple(j for j, value in zip(arm.robot.joints, values, strict=True) if value)
@@ -151,7 +151,7 @@ def with_true_effect(
 
 
 def judge(spec: CaseSpec) -> Judged:
-    """Create a case, diagnose it, and return truth and answer; an exception is an answer."""
+    """Create a case, diagnose it, and return truth and answer; exceptions count as answers."""
     case = make_case(spec)
     try:
         library = tuple(name for name in CATALOGUE if name not in case.removed)

@@ -99,18 +99,18 @@ class Unhurried:
         self._due = self.now + time.process_time() - begun
 
     def poll(self) -> Result | None:
-        """Return the answer from its time on; None before."""
+        """Return the answer once it is available, and None before that time."""
         if self.now < self._due:
             return None
         result, self._result = self._result, None
         return result
 
     def close(self) -> None:
-        """Do nothing, as there is no process."""
+        """Do nothing, because this executor has no process to end."""
 
 
 def drawn(along: Motion, kind: tuple[str, str], rng: np.random.Generator) -> str:
-    """Return an effect as text, with the share `SHARE` of the torque of a random joint."""
+    """Return an effect as text, with the share `SHARE` of the rms torque of a random joint."""
     name, quantity = kind
     largest = next(own.typical[1] for own in CATALOGUE[name].quantities if own.name == quantity)
     torque, unit = ARM.torque(along), 1e-3
@@ -207,7 +207,7 @@ def quiet(minutes: float, seed: int) -> tuple[int, int, list[list[list[str]]]]:
 
 
 def main() -> None:
-    """Print the result of each draw, and the false names without a change."""
+    """Print the result of each drawn effect, and the false names without a change."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument('--draws', type=int, default=40)
     parser.add_argument('--seed', type=int, default=0, help='other draws of the same kinds')

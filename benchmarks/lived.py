@@ -32,7 +32,7 @@ def judge(
     kind: str, index: int, *, again: bool = True, model_alone: bool = False
 ) -> LivedJudged | None:
     """
-    Create a case, diagnose it, and return truth and answer; None if it cannot be created.
+    Create a case, diagnose it, and return truth and answer; None if no case can be created.
 
     An exception is an answer. With `model_alone`, the diagnosis gets no recordings of day 1.
 

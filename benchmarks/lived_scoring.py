@@ -69,7 +69,7 @@ class LivedJudged:
 
     @classmethod
     def of(cls, case: LivedCase, answer: Answer, again: Answer | None = None) -> LivedJudged:
-        """Return a case with its answers, without the recordings."""
+        """Return a judged case with the answers of the diagnosis, without its recordings."""
         (cause,) = case.truth or (None,)
         felt = felt_directions(Chain.of(case.robot))
         return cls(
@@ -77,7 +77,7 @@ class LivedJudged:
         )
 
     def among(self, named: Named) -> int | None:
-        """Return the rank of the right name: 0 if named, then its rivals; None if absent."""
+        """Return the rank of the true cause: 0 if named, from 1 on as a rival; None if absent."""
         if self.cause is None:
             return None
         for k, (name, joints) in enumerate(((named.name, named.joints), *named.rivals)):
@@ -88,7 +88,7 @@ class LivedJudged:
 
     @property
     def nameable(self) -> bool:
-        """Whether the cause is an effect of the catalogue."""
+        """Whether the true cause is an effect of the catalogue or a change of gravity."""
         return self.cause is not None and (self.cause.in_catalogue or self.cause.name == 'gravity')
 
     @property
@@ -112,13 +112,13 @@ class LivedJudged:
 
     @property
     def first(self) -> bool:
-        """Whether the cause is named first, before its rivals."""
+        """Whether the first name of the headline is the true cause, and not only a rival."""
         headline = self.answer.headline
         return bool(headline) and self.among(headline[0]) == 0
 
     @property
     def tied(self) -> bool:
-        """Whether the cause is named first, or among the few rivals of the first name."""
+        """Whether the true cause is the first name, or among the few rivals of the first name."""
         if not self.answer.headline:
             return False
         leading = self.answer.headline[0]
@@ -137,14 +137,14 @@ class LivedJudged:
 
     @property
     def placed(self) -> bool:
-        """Whether the first named effect has the joints of the cause."""
+        """Whether the first named effect has the joints of the true cause."""
         first = self.answer.headline[0]
         names = (first.joints, *(joints for _, joints in first.rivals))
         return set(names[self.among(first) or 0]) == set(self.cause.joints)
 
     @property
     def share_error(self) -> float:
-        """Stated share of the gap minus the true share; NaN if one of them is unknown."""
+        """Stated minus true share of the gap; NaN if one of the two shares is unknown."""
         return self.answer.headline[0].share - self.answer.true_share
 
     @property
@@ -158,13 +158,13 @@ class LivedJudged:
         return self.answer.verdict in (*UNEXPLAINED, 'not_repeatable') or pushed
 
     def parameter_errors(self) -> list[tuple[float, bool]]:
-        """Return relative errors of large parameters, and whether intervals contain the truth."""
+        """Return relative errors of large parameters, and whether intervals hold true values."""
         if not self.first:
             return []
         return self.answer.headline[0].parameter_errors(self.cause.parameters)
 
     def gravity_error(self) -> tuple[float, float]:
-        """Return the errors of gravity: direction [deg], and relative magnitude."""
+        """Return the errors of the stated gravity: direction [deg], and relative magnitude."""
         stated = self.felt @ gravity_of(self.answer.headline, self.described)
         truth = self.felt @ self.gravity
         size, true = np.linalg.norm(stated), np.linalg.norm(truth)
@@ -185,7 +185,7 @@ def gravity_of(headline: Iterable[Named], described: FloatArray) -> FloatArray:
 
 
 def felt_directions(chain: Chain) -> FloatArray:
-    """Return the projection onto directions of gravity that load any joint, shape (3, 3)."""
+    """Return the projection onto those gravity directions that load a joint, shape (3, 3)."""
     q = np.random.default_rng(0).uniform(-1.5, 1.5, (20, chain.n_joints))
     still = np.zeros_like(q)
     pulls = [chain.with_gravity(unit).torque(q, still, still).ravel() for unit in np.eye(3)]
@@ -195,7 +195,7 @@ def felt_directions(chain: Chain) -> FloatArray:
 
 
 def probabilities(judged: Sequence[LivedJudged]) -> list[tuple[float, bool]]:
-    """Return probability and correctness of each first name, lowest probability first."""
+    """Return probability and correctness of each first named cause, lowest probability first."""
     first = [(j.answer.headline[0].probability, j.first) for j in judged if j.answer.headline]
     known = [pair for pair in first if np.isfinite(pair[0])]
     return sorted(known, key=lambda pair: pair[0])
@@ -204,13 +204,13 @@ def probabilities(judged: Sequence[LivedJudged]) -> list[tuple[float, bool]]:
 def reliability(
     pairs: Sequence[tuple[float, bool]], least: int = 20
 ) -> list[tuple[float, float, int]]:
-    """Return mean probability, share of right names and count of bins of at least `least`."""
+    """Return mean probability, share of right names and number of names of each bin of answers."""
     bins = np.array_split(np.array(pairs, dtype=float).reshape(-1, 2), max(len(pairs) // least, 1))
     return [(*own.mean(axis=0).tolist(), len(own)) for own in bins if len(own)]
 
 
 def score(judged: Sequence[LivedJudged], kind: str = '') -> tuple[Metric, ...]:
-    """Return all rates of judged cases, including those of their kind."""
+    """Return all rates of judged cases, including rates that only their kind of case has."""
     free = [j for j in judged if j.cause is None]
     changed = [j for j in judged if j.cause is not None and j.gap >= VISIBLE]
     seen = [j for j in changed if j.nameable]
@@ -264,7 +264,7 @@ def pairs(judged: Sequence[LivedJudged]) -> tuple[Metric, ...]:
 
 
 def exact(judged: Sequence[LivedJudged]) -> tuple[Metric, ...]:
-    """Return the rates of named payloads and of false alarms for exact descriptions."""
+    """Return rates of named payloads, and of consistency without a change, for exact URDFs."""
     rows: list[Metric] = []
     for known in ('values', 'names'):
         own = [one for one in judged if one.spec.friction == known]

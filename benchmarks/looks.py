@@ -41,7 +41,7 @@ def judge_all(
     out: Path | None = None,
 ) -> list[Any]:
     """
-    Judge cases in several processes, print a line for each and the table of rates.
+    Judge cases in several processes, print a line for each case and the table of rates.
 
     Parameters
     ----------
@@ -113,7 +113,7 @@ def look(what: str, log: Path = LOG) -> Iterator[dict[str, Any]]:
 
 def results_of(metrics: Iterable[Metric]) -> dict[str, dict[str, Any]]:
     """
-    Return rates as JSON for the record; a subordinate rate has the names of both rates.
+    Return rates as JSON for the record; an indented rate has its parent's name as a prefix.
 
     Parameters
     ----------

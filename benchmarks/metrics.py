@@ -59,7 +59,7 @@ def rate(
     least: float | None = None,
     most: float | None = None,
 ) -> Metric:
-    """Return the rate of cases that pass a test, with its interval and required value."""
+    """Return the rate of cases that pass a test, with its 95 % interval and required value."""
     hits, total = sum(map(bool, map(test, cases))), len(cases)
     value = hits / total if total else np.nan
     wanted = [f'at least {least:g}'] if least is not None else []

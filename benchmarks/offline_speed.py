@@ -130,7 +130,7 @@ def _since(start):
 
 
 def main():
-    """Print the times of both and their ratio."""
+    """Print the times of both packages and their ratio."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument('--minutes', type=float, default=10.0)
     parser.add_argument('--run', choices=['ours', 'theirs'], help=argparse.SUPPRESS)

@@ -50,7 +50,7 @@ def update_times(arm: ArmModel, measured: Motion, settings: OnlineSettings) -> s
 
 
 def main() -> None:
-    """Print update times with default rows, with a row per sample, and with forgetting."""
+    """Print update times with the default row rate, a row per sample, and forgetting."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[1])
     parser.add_argument('--seconds', type=float, default=30.0, help='of motion at 1 kHz')
     seconds = parser.parse_args().seconds

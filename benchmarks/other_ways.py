@@ -45,7 +45,7 @@ RANK = 1e-6
 
 
 def figaroh_estimates(robot: Robot, recordings: list[Recording]) -> Estimates:
-    """Identify each recording with figaroh, and return mean parameters and deviations."""
+    """Identify recordings with figaroh, and return parameter means and standard deviations."""
     found = defaultdict(list)
     for recording in recordings:
         every = max(round(1.0 / (SAMPLES * recording.period)), 1)
@@ -76,7 +76,7 @@ def _place(robot: Robot, name: str) -> tuple[str, str]:
 
 
 def sysid_days(robot: Robot, *days: list[Recording]) -> list[Estimates]:
-    """Fit the description to each day with mujoco.sysid, starting at the previous fit."""
+    """Fit the URDF to each day with mujoco.sysid, starting from the fit of the day before."""
     from mujoco import sysid
 
     logging.getLogger('absl').setLevel(logging.ERROR)

@@ -56,7 +56,7 @@ class CountedModel(LoopModel):
     count = 0
 
     def simulated(self, x, windows):
-        """Simulate the closed loop, and count the simulation."""
+        """Simulate the closed loop of arm and controller, and count the simulation."""
         CountedModel.count += 1
         return super().simulated(x, windows)
 
@@ -170,7 +170,7 @@ def own_way(robot, apart, start, size, gains):
 
 
 def shown(model, values, std, truth, determined):
-    """Format the errors of delay [ms] and friction [%], and the coverage of intervals."""
+    """Format the errors of delay [ms] and friction [%], and the coverage of their intervals."""
     names = [one.name for one in model.parameters]
     wanted = np.array([truth[one.name, one.joint] for one in model.parameters])
     of = {name: np.array([one == name for one in names]) for name in set(names)}

@@ -136,7 +136,7 @@ def public_page(public: str) -> str:
 
 
 def _added(looks: Iterable[dict[str, Any]]) -> dict[str, Any]:
-    """Return the pooled rates of several recorded runs."""
+    """Return the pooled rates of several recorded runs of a benchmark."""
     total: dict[str, list[int]] = {}
     for look in looks:
         for name, found in look.items():

@@ -136,7 +136,7 @@ def measure(
 
 
 def compare(path: Path, count: int, wanted: float, title: str) -> bool:
-    """Print the times of all readers for a file, and return whether the ratio is reached."""
+    """Print the times of all readers for a file; return whether the wanted ratio is reached."""
     seconds, used, arrays = {}, {}, {}
     for name, read in READERS.items():
         # other programs may disturb a short run; a long one averages over them

@@ -69,7 +69,7 @@ class RealDays:
 
 
 def builds(data: Path, out: Path) -> RealDays:
-    """Return builds C.0 and C.1 of the double pendulum as the two days, with equal commands."""
+    """Return builds C.0 and C.1 of the double pendulum as days 1 and 2, with equal commands."""
     before, after = ([_pendulum(data, name, 'tau_meas') for name in names] for names in (_C0, _C1))
     return RealDays(
         'double pendulum, builds C.0 and C.1',
@@ -83,7 +83,7 @@ def builds(data: Path, out: Path) -> RealDays:
 
 
 def pushes(data: Path, out: Path, task: str = 'acrobot') -> RealDays:
-    """Return the double pendulum without and with pushes that are not commanded."""
+    """Return the double pendulum without (day 1) and with pushes from outside (day 2)."""
     before, after = {
         'acrobot': (('experiment01', 'experiment02'), ('experiment01', 'experiment04')),
         'pendubot': (('experiment02',), ('experiment02',)),
@@ -99,7 +99,7 @@ def pushes(data: Path, out: Path, task: str = 'acrobot') -> RealDays:
 
 
 def payload(data: Path, out: Path) -> RealDays:
-    """Return the simple pendulum with its plain bob and with one of 1 kg."""
+    """Return the simple pendulum with its plain bob (day 1) and with a bob of 1 kg (day 2)."""
     return _swings(
         data,
         'plain bob and 1 kg',
@@ -110,7 +110,7 @@ def payload(data: Path, out: Path) -> RealDays:
 
 
 def hand_guided(data: Path, out: Path) -> RealDays:
-    """Return the simple pendulum moving freely, and guided by a hand."""
+    """Return the simple pendulum, moving freely (day 1) and guided by a hand (day 2)."""
     return _swings(
         data,
         'guided by a hand',
@@ -132,7 +132,7 @@ def _swings(data: Path, what: str, after: Recording, wanted: str) -> RealDays:
 
 
 def fr3(data: Path, out: Path, first: Sequence[int] = (0, 1)) -> RealDays:
-    """Return an unchanged Franka FR3; day 1 consists of the motions with given indices."""
+    """Return an unchanged Franka FR3; day 1 has the motions `first`, day 2 all other motions."""
     files = sorted((data / 'franka_fr3_teleop' / 'data').glob('*.npy.gz'))
     robot = load_robot(str(example_robot('panda_description/urdf/panda.urdf')), gravity='earth')
     runs = [_franka(path, robot.joints) for path in files]
@@ -226,7 +226,7 @@ def _franka(path: Path, joints: tuple[str, ...]) -> Recording:
 def _recording(
     joints: tuple[str, ...], t: np.ndarray, q: np.ndarray, dq: np.ndarray, tau: np.ndarray
 ) -> Recording:
-    """Return a recording that begins at zero, without repeated time stamps."""
+    """Return a recording that begins at time zero, without repeated time stamps."""
     later = np.concatenate([[True], np.diff(np.maximum.accumulate(t)) > 0.0])
     t, q, dq, tau = (x[later] for x in (t, q, dq, tau))
     return Recording(joints=joints, t=t - t[0], q=q, dq=dq, tau=tau)

@@ -152,7 +152,7 @@ class Machines:
         return replace(recording, tau=recording.tau + size * self._added(question))
 
     def visible(self, question: Question) -> float:
-        """Return the rms share of an added torque that a refitted model does not absorb."""
+        """Return the rms share of an added torque that stays in the residual of a refit."""
         bare, recording = self.bare(question.machine)
         known = known_arm(bare, question.machine, None)
         with_it = replace(recording, tau=recording.tau + self._added(question))
@@ -193,7 +193,7 @@ class Machines:
 
 
 def known_arm(bare: ArmModel, machine: str, without: str | None) -> ArmModel:
-    """Return the model of a machine with all known effects but one."""
+    """Return the model of a machine with all known effects, except a given effect."""
     arm = bare
     for name, joints in KNOWN[machine]:
         if name != without:
@@ -202,7 +202,7 @@ def known_arm(bare: ArmModel, machine: str, without: str | None) -> ArmModel:
 
 
 def answered(question: Question, found: Diagnosis) -> str:
-    """Return 'first', 'named', 'among' or 'NOT': where the right effect is in the answer."""
+    """Return 'first', 'named', 'among' (rivals) or 'NOT': the rank of the right effect."""
     if not question.name:
         return ''
     wanted = {question.joint} if question.joint else set()
@@ -215,7 +215,7 @@ def answered(question: Question, found: Diagnosis) -> str:
 
 
 def error_percent(found: Diagnosis) -> float:
-    """Return the relative torque error with the named effects, over informative rows [%]."""
+    """Return the relative torque error with the named effects, over informative samples [%]."""
     assert found.gap is not None
     squares = np.zeros(2)
     for one in found.gap.overlays:

@@ -80,7 +80,7 @@ def report(name: str, robot: Robot) -> None:
 
 
 def with_friction(robot: Robot) -> ArmModel:
-    """Return the arm with rotor inertias, and friction of a few per cent of the torque limits."""
+    """Return the arm with rotor inertias, and with friction of a few % of the torque limits."""
     drive = np.minimum(robot.torque_limit, 100.0)
     arm = ArmModel(robot).with_effect(make_effect('viscous_friction', robot), 0.02 * drive)
     arm = arm.with_effect(make_effect('coulomb_friction', robot), 0.03 * drive)
@@ -88,7 +88,7 @@ def with_friction(robot: Robot) -> ArmModel:
 
 
 def swinging(robot: Robot) -> Reference:
-    """Return a sinusoidal motion of all joints over a quarter of their ranges."""
+    """Return a sinusoidal motion of all joints over a quarter of their position ranges."""
     t = np.linspace(0.0, SECONDS, 26)[:, np.newaxis]
     w = np.linspace(4.0, 8.0, robot.n_joints)
     middle, reach = (robot.upper + robot.lower) / 2, (robot.upper - robot.lower) / 8

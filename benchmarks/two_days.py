@@ -64,7 +64,7 @@ class Named:
 
     @property
     def names(self) -> set[str]:
-        """Name of the cause, then of its rivals."""
+        """Names of the cause and of its rivals."""
         return {self.name, *(name for name, _ in self.rivals)}
 
     def joints_of(self, name: str) -> tuple[str, ...]:
@@ -73,7 +73,7 @@ class Named:
 
     def parameter_errors(self, truth: Sequence[Parameter]) -> list[tuple[float, bool]]:
         """
-        Return the relative error of each parameter, and whether its interval is right.
+        Return the relative error of each parameter, and whether its interval has the true value.
 
         Returns
         -------
@@ -102,7 +102,7 @@ class Named:
 @dataclass(frozen=True)
 class Answer:
     """
-    Verdict and headline of a diagnosis, or its error.
+    Verdict and headline of a diagnosis, or the error that ended it.
 
     Attributes
     ----------
@@ -193,7 +193,7 @@ def ask(
 
 def true_share(gap: Gap, made: Sequence[tuple[FloatArray, FloatArray]]) -> float:
     """
-    Return the share of a gap that disappears when a torque is subtracted.
+    Return the share of a gap that disappears when the torque of the true cause is subtracted.
 
     Parameters
     ----------
