@@ -41,7 +41,7 @@ their arguments (`require_...`) are left out.
 
 @dataclass(frozen=True)
 class Step:
-    """A function call of a diagram: depth, room, function name, and the docstring's first line."""
+    """A function call of a diagram: depth, room, function name, first line of the docstring."""
 
     depth: int
     room: str
@@ -86,7 +86,7 @@ def found(package: Path, dotted: str, name: str) -> tuple[str, str] | None:
 
 
 def calls(body: ast.AST) -> Iterator[str]:
-    """Yield the names of called functions; calls within arguments come before the outer call."""
+    """Yield the names of called functions; a call within an argument precedes the outer call."""
     for child in ast.iter_child_nodes(body):
         yield from calls(child)
     if isinstance(body, ast.Call):
@@ -96,7 +96,7 @@ def calls(body: ast.AST) -> Iterator[str]:
 
 
 def steps(package: Path, dotted: str, name: str) -> list[Step]:
-    """Return the calls from room to room that a function leads to, each once, in order."""
+    """Return the calls between rooms to which a function leads, each call once, in order."""
     seen: set[tuple[str, str]] = set()
 
     def follow(dotted: str, own: str, depth: int) -> Iterator[Step]:
@@ -154,7 +154,7 @@ def diagram(job: str, calls_of_job: list[Step]) -> Iterator[str]:
 
 
 def architecture_page(package: Path) -> str:
-    """Return a Markdown page with a diagram of calls for each job."""
+    """Return a Markdown page with a diagram of function calls for each command."""
     lines = [_BEGINNING]
     for job, (dotted, name) in JOBS.items():
         lines += [f'## {job}', '', *diagram(job, steps(package, dotted, name))]

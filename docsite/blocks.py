@@ -70,7 +70,7 @@ def blocks(path: Path) -> tuple[Block, ...]:
 
 
 def starts_with(path: Path) -> tuple[str, ...] | None:
-    """Return the files that the first line of a page lists; None for all files of the desk."""
+    """Return the files that a page needs, from its first line; None for all example files."""
     listed = _START.search(path.read_text(encoding='utf-8'))
     return None if listed is None else tuple(listed[1].split())
 

@@ -24,7 +24,7 @@ NOTEBOOKS = ROOT / 'examples' / 'notebooks'
 
 
 def on_files(files: Files, config: MkDocsConfig) -> Files:
-    """Add the generated pages to the files of the site."""
+    """Add the generated pages to the files of the documentation site."""
     reference = Path(config.docs_dir) / 'reference'
     pages = {
         'explanation/architecture.md': architecture_page(ROOT / 'armid_ros'),
@@ -48,7 +48,7 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
 
 
 def _removed(files: Files, path: Path) -> str:
-    """Return the hand-written text of a page, and remove the page from the files of the site."""
+    """Return the hand-written text of a page, and remove the page from the site's files."""
     for file in list(files):
         if file.abs_src_path and Path(file.abs_src_path) == path:
             files.remove(file)

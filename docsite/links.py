@@ -38,7 +38,7 @@ def _read(path: Path) -> _Page:
 
 def broken_links(site: Path) -> Iterator[str]:
     """
-    Yield the links of all pages without a target, and files that a page loads from a network.
+    Yield links without a target from all pages, and files that a page loads from a network.
 
     Links to other sites are not checked.
 

@@ -63,7 +63,7 @@ _LASTING = 0.05
 
 
 def candidates() -> Figure:
-    """Draw the share of the gap that each effect explains alone, for a spring at the elbow."""
+    """Draw the share of the gap that each effect explains alone, if the elbow has a spring."""
     arm = ar.load_model('monday_result/model.yaml')
     found = ar.diagnose(arm, 'today_1', validate='today_2', baseline='monday')
     rows = found.document()['candidates'][:10][::-1]
@@ -77,7 +77,7 @@ def candidates() -> Figure:
 
 
 def deviations() -> Figure:
-    """Draw the errors of repeated identifications, divided by the stated standard deviations."""
+    """Draw errors of repeated identifications, divided by their stated standard deviations."""
     truth = ar.ArmModel.of('my_arm.urdf', effects=FRICTION)
     clean = ar.simulate(truth, 'plan/excitation.yaml')
     true = {'viscous_coefficient': 0.3, 'coulomb_torque': 0.2, 'torque_offset': 0.0}
@@ -112,7 +112,7 @@ def _noise(run: ar.Recording, seed: int) -> np.ndarray:
 
 
 def exo_cycle() -> Figure:
-    """Draw hip, knee and feet of the leg pair over a gait cycle, and the errors of the paper."""
+    """Draw angles and errors of hip and knee, and foot forces, over a gait cycle."""
     cycle = gait_cycle(walking_pair(), read_gait())
     soft = cycle.pair.with_stiffness(0.8 * cycle.pair.stiffness)
     figure, panels = _figure(6.2, 3, 2, height_ratios=(2, 1.2, 2))
@@ -148,7 +148,7 @@ def exo_cycle() -> Figure:
 
 
 def growth() -> Figure:
-    """Draw processor time and memory over the size of the input, from benchmarks.growth."""
+    """Draw processor time and memory over the size of the input, as benchmarks.growth measures."""
     document = json.loads(GROWTH.read_text())
     axes_names = list(dict.fromkeys(row['over'] for row in document['jobs']))
     jobs = list(dict.fromkeys(row['job'] for row in document['jobs']))
@@ -303,7 +303,7 @@ def temperature() -> Figure:
 
 
 def limits() -> Figure:
-    """Draw the share of its limits that each joint uses in a plan."""
+    """Draw the share of its limits that each joint uses in a planned excitation."""
     plan = ar.design_excitation('my_arm.urdf', duration=20.0)
     used = plan.core.limits_used(plan.arm)
     joints = plan.arm.robot.joints
@@ -379,7 +379,7 @@ def fleet() -> Figure:
 
 
 def live() -> Figure:
-    """Draw the torque error of the elbow over time; a spring is added on the way."""
+    """Draw the torque error of the elbow over time, before and after a spring is added."""
     arm = ar.load_model('monday_result/model.yaml')
     parts = [ar.read_recording(name, 'my_arm.urdf') for name in ('tuesday', 'today_1')]
     stream, answers = LiveDiagnosis(arm, LiveSettings(learning=12.0)), []
@@ -491,7 +491,7 @@ def _boxes(texts: list[str]) -> Figure:
 
 
 def _answer(*command: str) -> list[str]:
-    """Return the lines that an armid command prints, without its progress."""
+    """Return the lines that an armid command prints, without its lines of progress."""
     run = [sys.executable, '-m', 'armid_ros.cli', *command]
     done = subprocess.run(run, capture_output=True, text=True, check=False)
     lines = (done.stdout + done.stderr).rstrip().splitlines()
@@ -500,7 +500,7 @@ def _answer(*command: str) -> list[str]:
 
 
 def _terminal(lines: list[str]) -> Figure:
-    """Return a figure of lines as a terminal shows them."""
+    """Return a figure of text lines as a terminal shows them."""
     figure = Figure(figsize=(WIDTH, 0.135 * len(lines) + 0.25), facecolor='#1f2326')
     top = {'family': 'monospace', 'fontsize': 7.5, 'color': '#e6e6e6', 'va': 'top'}
     figure.text(
@@ -540,7 +540,7 @@ PICTURES = {
 
 
 def main() -> None:
-    """Draw the pictures that the command line names, or all."""
+    """Draw the pictures that the command line names, or all pictures."""
     with TemporaryDirectory() as folder:
         os.chdir(lay_out(Path(folder)))
         for name in sys.argv[1:] or PICTURES:

@@ -109,7 +109,7 @@ def _undescribed(
 
 
 def resolved(whole: dict[str, Any], schema: dict[str, Any]) -> dict[str, Any]:
-    """Return the part of a JSON schema that a `$ref` refers to; a schema without one as it is."""
+    """Return the part of a JSON schema that a `$ref` names; a schema without `$ref` as it is."""
     reference = schema.get('$ref')
     if reference is None:
         return schema
