@@ -192,7 +192,7 @@ class _Solid:
     radius: float
 
     def seen(self, frame: pin.SE3) -> tuple[FloatArray, float]:
-        """Return the outline of the body in the drawing plane, (K, 2) [m], and its depth [m]."""
+        """Return the body's outline in the drawing plane and its nearness to the viewer [m]."""
         points = self.points @ frame.rotation.T + frame.translation
         turn = np.linspace(0.0, 2.0 * np.pi, _CIRCLE_CORNERS, endpoint=False)
         ring = max(self.radius, 1e-4) * np.column_stack([np.cos(turn), np.sin(turn)])

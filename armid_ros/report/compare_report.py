@@ -38,7 +38,7 @@ _WHY = {
 
 def compare_report(comparison: Comparison, origin: ResultOrigin) -> str:
     """
-    Return the HTML page of a comparison.
+    Return the HTML page of a comparison of two identifications.
 
     Parameters
     ----------
@@ -86,7 +86,7 @@ def verdict(comparison: Comparison) -> tuple[str, str]:
 
 
 def next_step(comparison: Comparison) -> str:
-    """Return the next step after a comparison."""
+    """Return the next step after a comparison of two identifications."""
     if comparison.anything or comparison.unusable:
         return 'If you expected this, use the later model. If not, diagnose the later recordings.'
     return 'Identify from all recordings together, for smaller intervals.'
@@ -107,7 +107,7 @@ def change_rows(comparison: Comparison) -> list[tuple[str, ...]]:
 
 
 def change_sentences(comparison: Comparison) -> tuple[str, ...]:
-    """Return sentences on what changed, the most important finding first."""
+    """Return sentences on the changes between two identifications, most important first."""
     lines = []
     for side in comparison.unusable:
         assert side.fit is not None
@@ -242,7 +242,7 @@ def _not_compared(comparison: Comparison) -> tuple[str, ...]:
 
 
 def _beware(comparison: Comparison) -> tuple[str, ...]:
-    """Return the limitations of a comparison."""
+    """Return the limitations of a comparison of two identifications."""
     lines = []
     for given in (comparison.before, comparison.after):
         if given.fit is None:

@@ -141,5 +141,5 @@ def _environment(package: str) -> Environment:
 
 
 def asset(name: str) -> Markup:
-    """Return the text of a file in assets/, to insert without escaping."""
+    """Return the text of a file in assets/, to insert into a page without escaping."""
     return Markup((files('armid_ros.report') / 'assets' / name).read_text(encoding='utf-8'))

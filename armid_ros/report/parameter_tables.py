@@ -78,7 +78,7 @@ def grouping(name: ParameterName, links: Sequence[str] = ()) -> str:
 
 
 def arm_facts(arm: ArmModel, robot: str) -> list[tuple[str, str]]:
-    """Return name and value of facts on an arm: description, joints, gravity and effects."""
+    """Return name and value of facts on an arm: robot, joints, gravity and effects."""
     gravity = ', '.join(f'{g:.4g}' for g in arm.robot.gravity)
     return [
         ('Robot', robot_label(robot) if robot == '-' else robot),

@@ -45,7 +45,7 @@ LOAD = 0.3
 @dataclass(frozen=True, eq=False)
 class PaperTable:
     """
-    Published values of one table of the paper.
+    Published values of a table of the paper that is repeated here.
 
     Attributes
     ----------
@@ -146,7 +146,7 @@ class MethodErrors:
 @dataclass(frozen=True, eq=False)
 class Repeated:
     """
-    Repetition of one table of the paper.
+    Repetition of a table of the paper in simulation.
 
     Attributes
     ----------
@@ -208,7 +208,7 @@ class Composite:
 @dataclass(frozen=True)
 class Reproduction:
     """
-    Repetition of all experiments of the paper.
+    Repetition of all experiments of the paper in simulation.
 
     Attributes
     ----------

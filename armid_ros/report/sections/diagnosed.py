@@ -302,7 +302,7 @@ def candidates_section(diagnosis: Diagnosis) -> ContentSection:
 
 
 def _candidate_value(diagnosis: Diagnosis, trial: CauseResult) -> str:
-    """Format the first value of a candidate with its interval; or 'includes 0', 'not possible'."""
+    """Format a candidate's first value with interval; or 'includes 0' or 'not possible'."""
     arm, effect, kept = diagnosis.arm, trial.effect, list(trial.kept)
     if diagnosis.explanation is not None:
         arm = diagnosis.explanation.given

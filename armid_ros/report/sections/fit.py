@@ -31,7 +31,7 @@ ZOOM = 'Drag across a plot, or pinch it, to zoom; double-click or double-tap to 
 
 
 def by_recording(fits: Sequence[Fit]) -> dict[str, list[Fit]]:
-    """Return the fits of each recording by its name."""
+    """Group fits by the name of their recording."""
     found: dict[str, list[Fit]] = {}
     for fit in fits:
         found.setdefault(fit.source, []).append(fit)

@@ -184,7 +184,7 @@ def _outputs(modal: ComplexArray, states: ComplexArray) -> ComplexArray:
 
 
 def _driven(u: FloatArray, dt: float, poles: ComplexArray, hold: Hold) -> ComplexArray:
-    """Return mode states, shape (N, r), under an input with unit gain."""
+    """Return mode states, shape (N, r), that an input drives with unit gain in each mode."""
     states = np.empty((len(u), len(poles)), complex)
     for k, pole in enumerate(poles):
         factor = np.exp(pole * dt)

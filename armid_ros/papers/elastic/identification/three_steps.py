@@ -227,7 +227,7 @@ class TwoInertiaIdentification:
 
     @property
     def parameters(self) -> TwoLinkParameters:
-        """Return the tuned parameters; without step responses, those of step 3a."""
+        """Return the tuned parameters; without tuning, those fitted to the frequency responses."""
         return self.untuned if self.tuning is None else self.tuning.parameters
 
 

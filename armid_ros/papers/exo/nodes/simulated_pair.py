@@ -106,7 +106,7 @@ class SimulatedPairNode(ArmidNode):
         return self.stamp_ns
 
     def catch_up(self) -> None:
-        """Simulate until the scaled real time is reached; skip time if the computer is slow."""
+        """Simulate up to the scaled real time; skip time if the computer is too slow for it."""
         factor = self.value('real_time_factor')
         skipped = self.real_time.catch_up(factor, 1.0 / self.value('rate'))
         if factor == 1.0:  # stamps stay those of the computer  # noqa: RUF069 - as it is written

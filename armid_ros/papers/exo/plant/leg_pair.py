@@ -68,11 +68,11 @@ class TiedPair(TiedMachines):
         return tuple(tie.name for tie in self.ties)
 
     def with_stiffness(self, stiffness: npt.ArrayLike) -> TiedPair:
-        """Return the pair with another stiffness, for all straps or for each [N/m]."""
+        """Return the pair with another strap stiffness [N/m], common or for each strap."""
         return replace(self, stiffness=np.asarray(stiffness, dtype=float))
 
     def with_slack(self, slack: npt.ArrayLike) -> TiedPair:
-        """Return the pair with another slack, for all straps or for each [m]."""
+        """Return the pair with another slack of straps [m], common or for each strap."""
         return replace(self, slack=np.asarray(slack, dtype=float))
 
     def geometry(self, motion: Motion, other_motion: Motion) -> TieGeometry:
