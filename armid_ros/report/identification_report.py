@@ -185,7 +185,7 @@ def _input_section(result: Identification, robot: str) -> ContentSection:
 
 
 def _noise_section(robot: Robot, check: NoiseCheck) -> ContentSection:
-    """Return the section on encoder noise: its size, a test, and the parameter bias."""
+    """Return the section on encoder noise: its size, a test for it, and the parameter bias."""
     noise = ', '.join(
         f'{joint} {digits(1e3 * value)} m{unit}'
         for joint, value, unit in zip(
