@@ -74,7 +74,7 @@ def arm_of(arm: RobotLike, effects: str = USUAL) -> ArmModel:
 
 
 def drivable(arm: RobotLike) -> ArmModel:
-    """Return an arm model; TrajectoryError if a robot given by name drives joints of no arm."""
+    """Return an arm model; TrajectoryError if driven joints of a named robot belong to no arm."""
     model = arm_of(arm)
     others = joints_beside_arms(model.robot) if isinstance(arm, str | Path) else ()
     if others:
@@ -126,7 +126,7 @@ def with_unique_sources(*groups: list[Recording]) -> tuple[list[Recording], ...]
 
 
 def motion_of(recording: Recording, cutoff: float | None = None) -> Motion:
-    """Return the filtered motion of the longest stretch without a gap; see `Recording.motion`."""
+    """Return the filtered motion of the longest stretch without lost samples of a recording."""
     measured = recording.tau is not None
     taken = recording if measured else replace(recording, tau=np.zeros_like(recording.q))
     used = conditioning([taken], SignalSettings(cutoff))

@@ -63,7 +63,7 @@ class ComparisonResult(Shown):
         return None if self.core.load is None else float(self.core.load.mass)
 
     def to_dataframe(self) -> pandas.DataFrame:
-        """Return all parameters as a pandas table, before and after."""
+        """Return every parameter as a pandas table, with its values in both identifications."""
         return data_frame(self.document()['parameters'])
 
     def document(self, origin: ResultOrigin = DEFAULT_ORIGIN) -> dict[str, Any]:

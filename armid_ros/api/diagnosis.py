@@ -124,12 +124,12 @@ class DiagnosisResult(ShownModel):
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names of the accepted effects, the largest first."""
+        """Names of the effects that the diagnosis accepted, the largest first."""
         return tuple(finding.name for finding in self.core.findings)
 
     @property
     def arm(self) -> ArmModel:
-        """Return the model with the named effects, and with the learned residual if any."""
+        """Return the model with the named effects, and with the residual map if it was learned."""
         return self.core.arm if self.residual is None else self.residual.arm
 
     def plot(self) -> npt.NDArray[np.object_]:
@@ -193,7 +193,7 @@ class DiagnosisResult(ShownModel):
         )
 
     def fill(self, folder: Path, origin: ResultOrigin = DEFAULT_ORIGIN) -> dict[str, Any]:
-        """Write diagnosis.json, model.yaml and report.html into a folder, the page last."""
+        """Write diagnosis.json and model.yaml, and at the end report.html, into a folder."""
         source, document = origin.of(source_of(self.description.robot)).source, self.document()
         save_model(folder / 'model.yaml', self.arm, source, self.core.estimate, self.misfit)
         write_file(folder / 'diagnosis.json', json_text(document, indent=1))
@@ -206,7 +206,7 @@ class DiagnosisResult(ShownModel):
 
     @property
     def files(self) -> list[str]:
-        """Return the file names of the result."""
+        """Return the names of the files that `fill` writes."""
         return [
             *('diagnosis.json', 'report.html', 'model.yaml'),
             *([] if self.residual is None else [self.residual.table_file]),
@@ -214,7 +214,7 @@ class DiagnosisResult(ShownModel):
         ]
 
     def with_residual(self, seed: int) -> DiagnosisResult:
-        """Learn the unexplained residual as a map, or add a note that states why none exists."""
+        """Learn the unexplained residual torque as a map, or add a note on why there is no map."""
         if self.verdict not in OPEN:
             note = f'nothing is learned for the verdict {self.verdict.replace("_", " ")}'
             return replace(self, notes=(*self.notes, note))

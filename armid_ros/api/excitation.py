@@ -105,11 +105,11 @@ class ExcitationResult(Shown):
         return self.trajectory.duration
 
     def motion(self, rate: float = WAYPOINT_RATE) -> Motion:
-        """Return positions, velocities and accelerations at a rate [Hz]."""
+        """Return position, velocity and acceleration along the trajectory at a rate [Hz]."""
         return self.trajectory.motion(rate)
 
     def plot(self) -> npt.NDArray[np.object_]:
-        """Draw the position of each joint; return its axes (matplotlib), shape (n,)."""
+        """Draw the position of each joint over time; return an array (n,) of matplotlib axes."""
         motion = self.motion()
         curves = {'position': (motion.t, motion.q)}
         return draw_joints(motion.joints, curves, 'position [rad or m]')
@@ -134,7 +134,7 @@ class ExcitationResult(Shown):
 
     @cached_property
     def start_reason(self) -> str:
-        """Return why the default start is not zero; empty for zero and for a given start."""
+        """Return why the start pose is not zero; empty if it is zero or the user gave a start."""
         if self.given_start is not None:
             return ''
         robot, nearest = self.arm.robot, self.planner.zero_pose
@@ -150,7 +150,7 @@ class ExcitationResult(Shown):
 
     @cached_property
     def run(self) -> Run:
-        """Return approach, trajectory and way back as one run; TrajectoryError without a path."""
+        """Return the run: approach, trajectory, way back; TrajectoryError if no path is found."""
         excitation = self.core.excitation
         return plan_run(excitation, self.planner, self.start, WAYPOINT_RATE, seed=self.seed)
 
@@ -163,7 +163,7 @@ class ExcitationResult(Shown):
 
     @cached_property
     def fitness(self) -> Fitness:
-        """Return the results of the checks of limits, clearance and floor along the run."""
+        """Return the summary of the safety checks: limits, clearance and floor along the run."""
         return fitness(self.run.motion(), self.scene)
 
     def document(self, origin: ResultOrigin = DEFAULT_ORIGIN) -> dict[str, Any]:

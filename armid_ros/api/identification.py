@@ -109,7 +109,7 @@ class IdentificationResult(ShownModel):
 
     @property
     def files(self) -> list[str]:
-        """Return the file names of the result."""
+        """Return the names of the files that `fill` writes."""
         return ['identification.json', 'report.html', 'model.yaml', *self.exports]
 
     @property
@@ -119,22 +119,22 @@ class IdentificationResult(ShownModel):
 
     @property
     def estimate(self) -> Estimate:
-        """Return the base and effect parameters with covariance."""
+        """Return the estimated base parameters and parameters of effects, with covariance."""
         return self.core.estimate
 
     @property
     def training(self) -> Score:
-        """Errors on the training data."""
+        """Torque errors of the model on the recordings that it is fitted to."""
         return Score.of(self.core.training)
 
     @property
     def error_percent(self) -> float:
-        """Torque error of the worst joint in the grade, 100 |tau - tau_hat| / |tau| [%]."""
+        """Largest torque error of a joint, used in the grade: 100 |tau - tau_hat| / |tau| [%]."""
         return self.graded.error_percent
 
     @property
     def misfit(self) -> Misfit:
-        """Return the misfit of the model on its recordings, and the information matrix."""
+        """Return the misfit of the model on its recordings, with the information matrix."""
         known = parameters_of(self.arm.robot.name, self.document())
         information = known.information(self.arm.parameters)
         unusable = self.grade == 'unusable'
@@ -176,7 +176,7 @@ class IdentificationResult(ShownModel):
         return draw_joints(self.arm.robot.joints, curves, 'torque [N m or N]')
 
     def __getitem__(self, key: tuple[str, str]) -> float:
-        """Return a value by effect or parameter and joint: ['viscous_friction', 'elbow']."""
+        """Return the value of an effect or parameter of a joint: ['viscous_friction', 'elbow']."""
         return self.estimate[key]
 
     def to_dataframe(self) -> pandas.DataFrame:
@@ -284,7 +284,7 @@ class IdentificationResult(ShownModel):
         )
 
     def _parameters(self) -> list[str]:
-        """Return the lines of a table with value and described value of each parameter."""
+        """Return a text table with the estimated and the described value of each parameter."""
         estimate, links = self.estimate, self.arm.robot.links
         described = self.core.base.values(self.description.theta)
         rows = []

@@ -89,7 +89,7 @@ class InspectionResult(Shown):
 
     @property
     def recording(self) -> Recording:
-        """Return the recording."""
+        """Return the inspected recording."""
         return self.core.recording
 
     def to_dataframe(self) -> pandas.DataFrame:
@@ -101,7 +101,7 @@ class InspectionResult(Shown):
         return inspection_document(self.core)
 
     def page(self, origin: ResultOrigin = DEFAULT_ORIGIN) -> str:
-        """Return inspection.html with all curves."""
+        """Return inspection.html with the recorded curves of all joints."""
         return inspection_report(self.core, self.with_step(origin))
 
     def summary(self) -> Summary:
@@ -190,7 +190,7 @@ def inspect(
 
 
 def _trial_fit(robot: Robot, recording: Recording, rng: Rng) -> TrialFit:
-    """Identify a robot from one recording; return the quality of the fit, or the refusal."""
+    """Identify a robot from a recording; return the quality of the fit, or why it was refused."""
     try:
         found = identify(robot, recording, physical=False, rng=rng)
         motions = [fit.motion for fit in found.core.training]
@@ -254,7 +254,7 @@ class CheckResult(Shown):
         )
 
     def summary(self) -> Summary:
-        """Return a summary: the finding and the links, with any measured values."""
+        """Return a summary: the finding, and masses and centres of mass of the links."""
         links = self.links
         wrong = links is not None and not np.isnan(links.measured_mass).all()
         columns = slice(None) if wrong else slice(0, 4, 2)

@@ -100,7 +100,7 @@ def reference_of(
     settings: ReadSettings = DEFAULT,
 ) -> Reference:
     """
-    Return the reference that a simulated arm follows.
+    Return the reference motion that a simulated arm follows.
 
     Parameters
     ----------

@@ -80,7 +80,7 @@ def data_frame(rows: Any) -> pandas.DataFrame:
 
 class Shown(ABC):
     """
-    Result that prints its summary, and that is saved in the format of the commands.
+    Result that shows its summary when printed, and is saved as the files that its command writes.
 
     Attributes
     ----------
@@ -94,7 +94,7 @@ class Shown(ABC):
     @property
     @abstractmethod
     def files(self) -> Sequence[str]:
-        """Return the names of the written files: the document first, then the page."""
+        """Return the names of the files of the result: the JSON document first, then the page."""
 
     @abstractmethod
     def summary(self) -> Summary:
@@ -108,7 +108,7 @@ class Shown(ABC):
 
     @abstractmethod
     def document(self, origin: ResultOrigin = DEFAULT_ORIGIN) -> dict[str, Any]:
-        """Return the content of the JSON file of the result, which includes a given provenance."""
+        """Return the content of the JSON file of the result, with the given provenance."""
 
     def to_dict(self) -> dict[str, Any]:
         """Return the content of the JSON file."""
@@ -119,7 +119,7 @@ class Shown(ABC):
         """Return the report as the text of one HTML file."""
 
     def report(self, path: str | Path = 'report.html') -> Path:
-        """Write the report and return its path."""
+        """Write the report as an HTML file and return the path of the file."""
         write_file(Path(path), self.page())
         return Path(path)
 
@@ -131,7 +131,7 @@ class Shown(ABC):
         return document
 
     def save(self, folder: str | Path) -> Path:
-        """Write the files of the result into a folder; OutputError if it has other files."""
+        """Write the files of the result; OutputError if the folder already has other files."""
         with staged(Path(folder)) as result:
             self.fill(result.folder)
             with result_folder(Path(folder), self.schema):
@@ -156,7 +156,7 @@ class ShownModel(Shown):
 
     @abstractmethod
     def _residuals(self) -> Sequence[ResidualPart]:
-        """Return source, times [s] and residual torques [N m or N] of each stretch."""
+        """Return source, times [s] and residual torques [N m or N] of each recorded stretch."""
 
     def residual_table(self) -> pandas.DataFrame:
         """
@@ -178,7 +178,7 @@ class ShownModel(Shown):
     @property
     @abstractmethod
     def arm(self) -> ArmModel:
-        """Return the model."""
+        """Return the model of the arm."""
 
     def urdf(self, path: str | Path | None = None) -> str:
         """Return a URDF with the identified values; write it to a file if a path is given."""
