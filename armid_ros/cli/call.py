@@ -26,7 +26,7 @@ import click
 )
 def call(action: str, share: float | None, node: str, timeout: float) -> None:
     """
-    Start, rehearse or stop the run of an excitation_publisher, or set its speed.
+    Start, rehearse or stop the run of an excitation_publisher, or set the speed of the run.
 
     SHARE, 0.1 to 1, is for the action speed: share of the planned speed at the next start.
 

@@ -22,7 +22,7 @@ META = 'armid.columns'
 
 
 def _kept(ctx: click.Context, parameter: click.Parameter, value: Any) -> Any:
-    """Store the value of an option in the context, for `settings`."""
+    """Store the value of an option in click's context, from which `settings` reads it."""
     ctx.meta.setdefault(META, {})[parameter.name] = value
     return value
 
@@ -48,7 +48,7 @@ def _rules(ctx: click.Context, parameter: click.Parameter, value: Any) -> Any:
 
 
 def _couplings(ctx: click.Context, parameter: click.Parameter, value: Any) -> Any:
-    """Store motor, joint and ratio of each --coupling; RecordingError if one is malformed."""
+    """Store motor, joint and ratio of each --coupling; RecordingError for a malformed text."""
     couplings = []
     for text in value:
         pair, equals, ratio = text.rpartition('=')
@@ -62,7 +62,7 @@ def _couplings(ctx: click.Context, parameter: click.Parameter, value: Any) -> An
 
 
 def _numbers(ctx: click.Context, parameter: click.Parameter, value: str | None) -> Any:
-    """Store an option with one number, or with one number per joint, in the context."""
+    """Store the number of an option, or its numbers per joint, in click's context."""
     if value is not None:
         from armid_ros.recording.columns import numbers
 
@@ -157,7 +157,7 @@ recordings = together(options, parameters.topic, parameters.setting, parameters.
 
 
 def settings() -> ColumnSettings:
-    """Return the column settings that the options of the running command give."""
+    """Return the settings for columns of tables that the options of the running command give."""
     from armid_ros.recording.columns import ColumnSettings
 
     return ColumnSettings(**click.get_current_context().meta.get(META, {}))

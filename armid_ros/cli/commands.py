@@ -53,10 +53,10 @@ TYPED = 'armid.typed'
 
 
 class Commands(click.Group):
-    """Command group: imports a command when used, reports bad input on stderr with exit code 2."""
+    """Command group that imports a command on its use, and exits with code 2 on bad input."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
-        """List the commands in the order of the work, commands of plug-ins last."""
+        """List the commands in the order of their use, then the commands of plug-ins by name."""
         return [*COMMANDS, *sorted(plug_ins('commands').keys() - COMMANDS)]
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
@@ -69,7 +69,7 @@ class Commands(click.Group):
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
         """
-        Find the command and apply the options of armid.toml.
+        Find the command that the arguments name, and set its defaults from armid.toml.
 
         The error message for an unknown command suggests the most similar command.
 
@@ -87,7 +87,7 @@ class Commands(click.Group):
         return name, command, rest
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        """List the commands with the first sentence of their help, or the error of the import."""
+        """List each command with the first sentence of its help, or the error of its import."""
         rows = []
         for name in self.list_commands(ctx):
             try:
@@ -98,7 +98,7 @@ class Commands(click.Group):
             formatter.write_dl(rows)
 
     def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem]:
-        """Complete a command without importing all of them, or an option."""
+        """Return completions of a command or an option, without an import of all commands."""
         names = [
             CompletionItem(name) for name in self.list_commands(ctx) if name.startswith(incomplete)
         ]

@@ -70,7 +70,7 @@ def convert(
 def _convert_tables(
     files: tuple[Path, ...], robot: Robot | None, joints: str | None, out: Path | None
 ) -> None:
-    """Join tables and write them as a bag; without an output path, only print the columns."""
+    """Join tables into a bag; without an output path, only print how their columns are read."""
     from armid_ros.files.cells import listed
     from armid_ros.recording import write_recording
     from armid_ros.recording.reader import read_tables

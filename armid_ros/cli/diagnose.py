@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 def share_of_percent(
     ctx: click.Context | None, param: click.Parameter | None, value: str
 ) -> float:
-    """Return the share, 0 to 1, of a percentage with or without the sign."""
+    """Convert a percentage, with or without a percent sign, to a share from 0 to 1."""
     try:
         share = float(value.removesuffix('%')) / 100.0
     except ValueError:
@@ -211,7 +211,7 @@ def diagnose(
 
 
 def _identified_from(model: Path, diagnosed: list[Path]) -> tuple[Path, ...]:
-    """Return the recordings that a model was identified from, unless one of them is diagnosed."""
+    """Return the recordings that a model was identified from; empty if any is diagnosed."""
     from armid_ros.identification.output import identified_from, require_as_identified
 
     found = identified_from(model)
@@ -224,7 +224,7 @@ def _identified_from(model: Path, diagnosed: list[Path]) -> tuple[Path, ...]:
 
 
 def _model_of(path: Path, robot: Robot) -> ArmModel:
-    """Read a model.yaml; raise an ArmidError if the kinematics of its description differ."""
+    """Read a model.yaml; ArmidError if its description has other kinematics than a given robot."""
     from armid_ros.arm import load_model
     from armid_ros.cli import options
     from armid_ros.identification.output import kinematics_digest

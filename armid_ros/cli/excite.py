@@ -308,7 +308,7 @@ def _driven(source: str, gravity: str, joints: str | None, bags: tuple[Path, ...
 
 
 def require_free(folder: Path) -> None:
-    """Raise a RecordingError if the output folder is or contains a recording to keep."""
+    """Raise a RecordingError if results in the output folder would overwrite a recording."""
     from armid_ros.api.excitation import BAG
     from armid_ros.files.output import is_plan
 

@@ -90,7 +90,7 @@ def deliver(
     summary: Summary | None = None,
 ) -> None:
     """
-    Write a result to its folder, if there is one, and print it.
+    Print the summary or document of a result, and write its files if a folder is given.
 
     Parameters
     ----------
@@ -142,7 +142,7 @@ def deliver_page(
 def deliver_document(
     staged: Staged, name: str, document: Mapping[str, Any], summary: Summary | None, *files: str
 ) -> None:
-    """Write NAME.json and keep the folder; print a summary with all files, or the document."""
+    """Write NAME.json and keep the folder; print the document, or the summary if it is given."""
     write_document(staged.folder / f'{name}.json', document)
     staged.keep()
     if summary is None:
@@ -191,12 +191,12 @@ def origin(
     *,
     source: str = '',
 ) -> ResultOrigin:
-    """Return the origin of a result: --robot, its name in model.yaml, and its provenance."""
+    """Return the origin of a result: --robot, the robot's name in model.yaml, and provenance."""
     return ResultOrigin(robot, source, provenance(paths, seed=seed))
 
 
 def read_settings() -> ReadSettings:
-    """Return the settings of this command for reading bags."""
+    """Return the settings with which the running command reads bags."""
     meta = click.get_current_context().meta
     limit = meta.get(MEMORY)
     size = default_memory_limit() if limit is None else int(limit * 1e6)
@@ -218,7 +218,7 @@ def open_robot(
     bags: Sequence[Path] = (),
     tell: bool = True,
 ) -> Robot:
-    """Load the robot that the options name; keep notes on doubtful values for the end."""
+    """Load the robot that the options name; store notes on doubtful values to print at the end."""
     named = listed(joints) if isinstance(joints, str) else joints
     if source != '-':
         robot = load_robot(source, gravity=gravity, joints=named or None)
@@ -278,7 +278,7 @@ def with_effects(arm: ArmModel, names: str) -> ArmModel:
 
 
 def box(text: str, robot: Robot) -> tuple[str, Corners]:
-    """Read --box: a joint of the robot, and two corners [m]."""
+    """Parse the text of --box: a joint of the robot, and two corners of a box [m]."""
     *parts, corners = listed(text, '=')
     joint = '='.join(parts)
     robot.index(joint)
@@ -292,7 +292,7 @@ def box(text: str, robot: Robot) -> tuple[str, Corners]:
 
 
 def per_joint(text: str | None, robot: Robot, option: str) -> FloatArray | None:
-    """Parse one number for all joints, or one number per joint; None without text."""
+    """Parse a number for all joints, or a number per joint; None if no text is given."""
     with reading(option, RobotError):
         return None if text is None else values_per_joint(numbers(text), robot.joints, repr(text))
 
@@ -325,7 +325,7 @@ def read(
 
 
 def kept_source(source: str, robot: Robot, out: Path) -> str:
-    """Return the text by which result files refer to a robot; save a description from a bag."""
+    """Return the text by which result files refer to a robot; save a URDF that a bag contains."""
     if source == '-':
         write_file(out / 'robot.urdf', robot.urdf)
         return 'robot.urdf'

@@ -42,16 +42,16 @@ class OutPath(click.Path):
 
 
 class ModelPath(click.Path):
-    """Path of a model.yaml, or of the folder with it that identify or diagnose wrote."""
+    """Path of a model.yaml, or of a folder in which identify or diagnose wrote a model.yaml."""
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        """Return the path of the model file; for a folder, of the model.yaml in it."""
+        """Return the given path; for a folder, return the path of the model.yaml in it."""
         path = Path(str(super().convert(value, param, ctx)))
         return path / 'model.yaml' if path.is_dir() else path
 
 
 def completed(_: click.Context, parameter: click.Parameter, incomplete: str) -> list[str]:
-    """Return shell completions for the last name in a list: robots, effects or option words."""
+    """Return shell completions for the last name in a list: robot, effect or fixed choice."""
     before, sign, last = incomplete.rpartition('=' if parameter.name == 'priors' else ',')
     words = {'gravity': ('earth', 'moon'), 'speed': SPEED_CLASSES, 'priors': HOW_OFTEN}
     names: Iterable[str] = words.get(str(parameter.name), ())
@@ -180,7 +180,7 @@ def robot_described(**values: Any) -> Callable[[_Command], _Command]:
 
 
 def with_packages(context: click.Context, source: str | None) -> str | None:
-    """Return --robot with the folders of --package as further arguments of the description."""
+    """Return the text of --robot, with the folders of --package appended as arguments."""
     written = []
     for text in context.meta.get(PACKAGES, []):
         name, _, folder = text.partition('=')

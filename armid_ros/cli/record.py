@@ -155,7 +155,7 @@ def _parse_effect(text: str, robot: Robot) -> tuple[Effect, FloatArray]:
 @parameters.bag
 @parameters.reading
 def recover(file: Path, out: Path) -> None:
-    """Repair a recording whose writer was killed; the file itself does not change."""
+    """Write a repaired copy of a recording whose writer was killed."""
     from armid_ros.cli import options
     from armid_ros.recording import copy_bag
 

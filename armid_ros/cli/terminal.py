@@ -23,7 +23,7 @@ def say(text: str, colour: str | None = None) -> None:
 @contextmanager
 def progress(what: str) -> Iterator[Tick]:
     """
-    Show a progress bar during a block; yield a function of the completed share and step name.
+    Show a progress bar in a `with` block; yield a function that sets its share and step name.
 
     Without a terminal there is a line on stderr at most every ten seconds.
 

@@ -44,7 +44,7 @@ OUTPUTS = ('bag', 'excitation.yaml', 'model.yaml', 'identification.json', 'repor
 @parameters.seed
 @parameters.as_json
 def demo(gravity: str, rate: float, hide: str, out: Path, seed: int, as_json: bool) -> None:
-    """Excite, move, identify online and offline; then find a hidden change of the arm."""
+    """Excite and identify a simulated arm online and offline; find a hidden change of the arm."""
     from armid_ros.api.identification import IdentificationResult, identify
     from armid_ros.arm import ArmModel
     from armid_ros.cli import options
@@ -131,7 +131,7 @@ def _page(
     target: FloatArray,
     origin: ResultOrigin,
 ) -> str:
-    """Return report.html with true values and the convergence of the online estimate."""
+    """Return report.html of the demo, with true values and convergence of the online estimate."""
     from armid_ros.report import identification_report as page
 
     parameters = page.parameter_sections(found.core, truth, name='truth')

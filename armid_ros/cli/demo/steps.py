@@ -50,7 +50,7 @@ def true_arm(robot: Robot) -> ArmModel:
 
 def hidden_change(arm: ArmModel, rng: np.random.Generator, hide: str = '') -> ArmModel:
     """
-    Return an arm with a hidden effect added as the last one, for a diagnosis to find.
+    Add a hidden effect, which a diagnosis has to find, as the last effect of an arm.
 
     Parameters
     ----------
@@ -91,7 +91,7 @@ def diagnose_hidden(
     origin: ResultOrigin,
 ) -> DiagnosisResult:
     """
-    Record an arm with a hidden effect over ROS topics, and diagnose it with the earlier model.
+    Record an arm with a hidden effect over ROS topics; diagnose the arm with its earlier model.
 
     Parameters
     ----------
@@ -158,7 +158,7 @@ def outcome(changed: ArmModel, diagnosed: DiagnosisResult) -> str:
 
 
 def story(changed: ArmModel, diagnosed: DiagnosisResult) -> dict[str, Any]:
-    """Return a JSON document with the hidden effect, the verdict, and whether it is right."""
+    """Return a JSON document with hidden effect and verdict, and whether the verdict is right."""
     effect = changed.effects[-1]
     return {
         'hidden': {
@@ -174,6 +174,6 @@ def story(changed: ArmModel, diagnosed: DiagnosisResult) -> dict[str, Any]:
 
 
 def _found(effect: Effect, diagnosed: DiagnosisResult) -> bool:
-    """Return whether the diagnosis names a given effect first, and on the same joints."""
+    """Return whether the first effect that the diagnosis names is a given effect on its joints."""
     first = diagnosed.core.findings[:1]
     return any((one.name, one.joints) == (effect.name, effect.joints) for one in first)

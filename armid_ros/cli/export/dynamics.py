@@ -26,7 +26,7 @@ DEAD_BAND = 1e-3
 
 def torque_tables(arm: ArmModel) -> tuple[dict[str, npt.NDArray[Any]], tuple[str, ...]]:
     """
-    Return the constants of the joint torque function of an arm, as tables of n joints.
+    Return the constants of an arm's joint torque function, as tables with a row per joint.
 
     Returns
     -------
@@ -94,7 +94,7 @@ def torque_code(arm: ArmModel, language: str, source: str) -> tuple[str, tuple[s
 
 
 def _nested(values: Any, brackets: str, apart: str = ' ') -> str:
-    """Write nested lists with the brackets of a language; `apart` is between outer elements."""
+    """Write nested lists in the brackets of a language; `apart` separates the outer elements."""
     if not isinstance(values, list):
         return repr(values)
     apart = apart if isinstance(values[0], list) else ' '

@@ -36,7 +36,7 @@ class CarriedLoad:
     body: pin.Inertia
 
     def principal(self) -> tuple[FloatArray, FloatArray]:
-        """Return principal moments (3,) [kg m^2] and axes (3, 3), columns, close to the frame."""
+        """Return principal moments (3,) [kg m^2] and axes, as columns in the order near x, y, z."""
         moments, axes = np.linalg.eigh(self.body.inertia)
         order = max(
             map(list, permutations(range(3))),
@@ -122,7 +122,7 @@ def _flange(joint: str, links: Collection[str]) -> str:
 
 def universal_robots(load: CarriedLoad) -> str:
     """
-    Return a call of URScript; the frame has to be that of the tool flange.
+    Return the URScript call for a payload that is given in the frame of the tool flange.
 
     Mass [kg], centre of gravity from the tool mount [m], and the inertia matrix [kg m^2] as Ixx,
     Iyy, Izz, Ixy, Ixz, Iyz about the centre of gravity in the axes of the tool flange.
@@ -136,7 +136,7 @@ def universal_robots(load: CarriedLoad) -> str:
 
 def franka(load: CarriedLoad) -> str:
     """
-    Return a call of libfranka; the frame has to be that of the flange.
+    Return the libfranka call for a payload that is given in the frame of the flange.
 
     Mass [kg], translation from the flange to the centre of mass [m], and the inertia matrix
     [kg m^2] about the centre of mass, column-major.
@@ -151,7 +151,7 @@ def franka(load: CarriedLoad) -> str:
 
 def kuka(load: CarriedLoad) -> str:
     """
-    Return a line of $config.dat; the frame has to be that of the flange.
+    Return the line of $config.dat for a payload that is given in the frame of the flange.
 
     Mass M [kg], centre X, Y, Z [mm] and orientation A, B, C [deg] of the principal axes, which are
     rotations about z, the new y and the new x; principal moments J [kg m^2].
@@ -168,7 +168,7 @@ def kuka(load: CarriedLoad) -> str:
 
 def abb(load: CarriedLoad) -> str:
     """
-    Return a declaration of RAPID; the frame has to be that of the tool.
+    Return the RAPID declaration of a payload that is given in the frame of the tool.
 
     Mass [kg], centre of gravity [mm], orientation of the axes of moment as a quaternion, scalar
     first, and moments of inertia about these axes [kg m^2]. A tload of tooldata is in the wrist
@@ -195,7 +195,7 @@ MAKERS: dict[str, tuple[Callable[[CarriedLoad], str], str]] = {
 
 def load_text(load: CarriedLoad, maker: str, source: str) -> tuple[str, tuple[str, ...]]:
     """
-    Return the load data file of a manufacturer, a key of `MAKERS`, and its notes.
+    Return the load data file of a manufacturer (a key of `MAKERS`), and the notes in the file.
 
     A physically impossible inertia is written as zero, as of a point mass. The source of the load
     is named in the comment.

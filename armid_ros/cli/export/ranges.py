@@ -70,7 +70,7 @@ def ranges_text(arm: ArmModel, known: ParameterFile, spread: float, source: str)
 def _masses_and_centres(
     arm: ArmModel,
 ) -> tuple[tuple[ParameterName, ...], FloatArray, FloatArray, FloatArray]:
-    """Return name, value, gradient by all parameters and lower bound of the D exported values."""
+    """Return names, values, gradients by all parameters and lower bounds of D exported values."""
     names, found = list(arm.parameters), arm.theta.copy()
     slopes, kept = np.eye(len(found)), np.ones(len(found), dtype=bool)
     rigid = np.tile(np.where(np.arange(PER_LINK) == 0, 0.0, -np.inf), len(arm.robot.links))
