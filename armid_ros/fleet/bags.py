@@ -31,7 +31,7 @@ _VERSIONS = ('ETag', 'etag', 'md5Hash', 'mtime', 'LastModified', 'updated', 'cre
 @dataclass(frozen=True, order=True)
 class BagFile:
     """
-    Bag of a fleet, with its arm, day and version.
+    Bag of a fleet: URL, name of the arm, date in the path, size and version of the content.
 
     Attributes
     ----------
@@ -165,7 +165,7 @@ def _bags(
 
 
 def _arm(pattern: str, path: str) -> str:
-    """Return the arm of a bag: the path part of the first wildcard, or the folder of the bag."""
+    """Return the name of a bag's arm: the path part at the first wildcard, or the bag's folder."""
     wild = [k for k, part in enumerate(pattern.split('/')) if _WILDCARD.search(part)]
     parts = path.rstrip('/').split('/')
     last = len(parts) - 1

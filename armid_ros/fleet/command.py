@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 def _out(command: Callable[..., None]) -> Callable[..., None]:
-    """Add the options --out, the folder of results, and --force, to overwrite other files."""
+    """Add the options --out (folder of results) and --force (overwrite files) to a command."""
     where = click.option(
         '--out', required=True, metavar='URL', help='Folder of the results: a path, or s3://...'
     )
@@ -49,7 +49,7 @@ _alpha = click.option(
 
 
 class _Fleet(click.Group):
-    """Command group that first checks for missing packages."""
+    """Group of the fleet commands, which raises an error if a package is missing."""
 
     def invoke(self, ctx: click.Context) -> Any:
         """Raise a FleetError for missing packages; otherwise run a command of the group."""
@@ -72,7 +72,7 @@ def fleet() -> None:
 
 @contextmanager
 def _results(out: str, doing: str) -> Iterator[tuple[Store, Callable[..., None]]]:
-    """Lock the folder of results during a command; yield the store and a progress function."""
+    """Lock the folder of results during a command; yield its store and a function for progress."""
     from armid_ros.files import result_folder
     from armid_ros.fleet.plan import SCHEMA
     from armid_ros.fleet.store import Store, StoreError
@@ -90,7 +90,7 @@ def _results(out: str, doing: str) -> Iterator[tuple[Store, Callable[..., None]]
 
 
 def _print_shown(lines: Sequence[str], rest: str) -> None:
-    """Print the first eight lines, and the name of the file that contains all of them."""
+    """Print up to eight lines; if there are more, print the name of the file with all lines."""
     most = 8
     for line in lines[:most]:
         say(line)
@@ -267,7 +267,7 @@ def diagnose(
     alpha: float,
     as_json: bool,
 ) -> None:
-    """Diagnose arms of a fleet, each with its own past as baseline."""
+    """Diagnose arms of a fleet; the baseline of each arm is its earlier bags."""
     from armid_ros.fleet.cluster import connected
     from armid_ros.fleet.diagnose import cases, diagnose_fleet
     from armid_ros.fleet.pages import write_pages

@@ -139,7 +139,7 @@ def diagnose_fleet(
 def one_arm(
     case: Case, model: ArmModel, filters: Conditioning, topic: str | None, out: str
 ) -> dict[str, Any]:
-    """Task: identify an arm from its baseline, diagnose its later bags; return the table row."""
+    """Task: identify an arm from baseline bags and diagnose later bags; return the diagnosis."""
     store = Store(out)
     try:
         with ExitStack() as stack:

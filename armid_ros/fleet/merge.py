@@ -89,7 +89,7 @@ class FleetEstimate:
 @dataclass(frozen=True, eq=False)
 class FleetFit:
     """
-    Least-squares fit of the parameters, before its standard deviations are known.
+    Least-squares fit of parameters, without their standard deviations.
 
     Attributes
     ----------
@@ -108,7 +108,7 @@ class FleetFit:
 
     @classmethod
     def of(cls, normal: NormalEquations, job: Job) -> FleetFit | None:
-        """Fit normal equations; return None if there are too few rows."""
+        """Fit parameters to normal equations; return None if the equations are of too few rows."""
         base, kept = identifiable_base(job.theory, normal)
         if normal.counts.sum() < 2 * base.rank:
             return None
@@ -117,7 +117,7 @@ class FleetFit:
         return cls(base, tuple(kept), replace(fit, values=values))
 
     def noise(self, rows: Iterable[Regression]) -> FloatArray:
-        """Return the noise covariance of the normal equations of given rows, shape (r, r)."""
+        """Return the covariance (r, r) of the noise in the normal equations of given rows."""
         products = np.zeros((len(self.kept), len(self.kept)))
         for part in rows:
             some = part.restrict(self.kept)
@@ -127,7 +127,7 @@ class FleetFit:
         return products
 
     def estimate(self, normal: NormalEquations, noise: FloatArray) -> FleetEstimate:
-        """Return the estimate, with standard deviations from the noise covariance of its rows."""
+        """Return the estimate, with standard deviations computed from a noise covariance."""
         some, inverse = normal.restrict(self.kept), self.fit.inverse
         return FleetEstimate(
             self.base.parameters,
@@ -167,7 +167,7 @@ class MergedBags:
 
     @classmethod
     def of(cls, bags: Sequence[BagSummary | Refused]) -> MergedBags:
-        """Return the sum over summaries of bags, and list the bags that are left out."""
+        """Return the sum of the normal equations of bags, with a list of the refused bags."""
         used = [one for one in bags if isinstance(one, BagSummary)]
         parts = [
             cls(one.normal, one.seconds, ((one.bag.url, one.bag.version),), not one.computed)
@@ -178,7 +178,7 @@ class MergedBags:
 
     @classmethod
     def together(cls, parts: Sequence[MergedBags]) -> MergedBags:
-        """Return the sum over several groups of bags."""
+        """Return the sum of the normal equations of several groups of bags."""
         known = [part.normal for part in parts if part.normal is not None]
         return cls(
             sum(known[1:], known[0]) if known else None,
@@ -192,7 +192,7 @@ class MergedBags:
 @dataclass(frozen=True, eq=False)
 class BagSummary:
     """
-    A bag compressed to normal equations, with its own estimate.
+    Normal equations of a bag, and the parameter estimate from this bag alone.
 
     Attributes
     ----------

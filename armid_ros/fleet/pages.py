@@ -198,14 +198,14 @@ def _verdict(found: Watch, diagnoses: Diagnoses) -> VerdictSection:
 
 
 def _diagnosed(arm: WatchedArm, diagnosis: Mapping[str, Any] | None) -> str:
-    """Return the verdict of a diagnosis that found a fault in an arm without change, else ''."""
+    """Return the verdict if a diagnosis found a fault in an arm without change; else empty."""
     if arm.named or diagnosis is None or diagnosis['verdict'] in ('consistent', 'failed'):
         return ''
     return str(diagnosis['verdict']).replace('_', ' ')
 
 
 def _arm_row(arm: WatchedArm, diagnosis: Mapping[str, Any] | None) -> list[str]:
-    """Return the table cells of an arm on the overview page."""
+    """Return the cells of an arm's row in the table of the overview page."""
     page = f'pages/{quote(file_name(arm.arm))}.html'
     what = Markup('')
     if diagnosis is not None and diagnosis['verdict'] != 'failed':

@@ -130,7 +130,7 @@ class Job:
 
     @cached_property
     def facts(self) -> dict[str, Any]:
-        """Return the settings on which the results of a bag depend, an entry of fleet.json."""
+        """Return the settings that determine a bag's results, as fleet.json contains them."""
         robot, effects = self.arm.robot, self.arm.effects
         return {
             'robot': robot.name,

@@ -93,7 +93,7 @@ def _part(data_set: str, bag: BagFile, day: str) -> str:
 
 
 def write_summary(store: Store, summary: BagSummary, job: Job) -> None:
-    """Write the summary of a bag and its estimate to the tables `bags` and `parameters`."""
+    """Write a bag's summary to the table `bags`, and its estimate to the table `parameters`."""
     bag, own = summary.bag, summary.own
     start = datetime.datetime.fromtimestamp(summary.start_ns * 1e-9, datetime.UTC)
     robot = job.arm.robot
@@ -155,7 +155,7 @@ def find_summary(store: Store, bag: BagFile, job: Job) -> BagSummary | Refused |
 
 
 def write_refused(store: Store, refused: Refused, job: Job) -> None:
-    """Write the reason why a bag is left out to the table `refused`."""
+    """Write to the table `refused` why a bag is left out of the identification."""
     row = {
         'bag': refused.bag.url,
         'version': refused.bag.version,
@@ -234,6 +234,6 @@ def _estimate(arm: str) -> str:
 
 
 def _days(store: Store, bag: BagFile, data_set: str = 'bags') -> list[str]:
-    """Return the days for which the results contain a bag."""
+    """Return the days under which the results contain a file of a given bag."""
     pattern = f'{data_set}/{folder_of(bag.arm)}/day=*/{bag.name}.parquet'
     return [name.split('/')[2].removeprefix('day=') for name in store.names(pattern)]

@@ -77,17 +77,17 @@ class FleetOutcome:
 
     @property
     def done(self) -> int:
-        """Number of bags in the estimates."""
+        """Number of bags from which the arms are estimated."""
         return sum(arm.done for arm in self.arms)
 
     @property
     def found(self) -> int:
-        """Number of bags in the estimates that an earlier run had read."""
+        """Number of bags in the estimates of the arms that an earlier run had read already."""
         return sum(arm.found for arm in self.arms)
 
     @property
     def refused(self) -> tuple[Refused, ...]:
-        """Bags that are left out, in the order of arms and URLs."""
+        """Bags that are left out of the identification, sorted by arm and URL."""
         return tuple(sorted((one for a in self.arms for one in a.refused), key=lambda r: r.bag))
 
 
@@ -98,7 +98,7 @@ Fitted = tuple[MergedBags, FleetFit | None]
 
 
 def take(bags: Group, job: Job, bags_of_arm: int) -> tuple[BagSummary | Refused, ...]:
-    """Task: return summaries of bags from the results, or read the bags and write summaries."""
+    """Task: return the summary of each bag; read a bag if the results have no summary of it."""
     store, taken = Store(job.out), []
     for bag in bags:
         one = find_summary(store, bag, job)
@@ -113,7 +113,7 @@ def take(bags: Group, job: Job, bags_of_arm: int) -> tuple[BagSummary | Refused,
 
 
 def same(job: Job) -> Job:
-    """Task: keep a job on a worker; unlike scattered data, a lost job can be created again."""
+    """Task: return a job, so that Dask keeps it on a worker and can create a lost job again."""
     return job
 
 
@@ -124,7 +124,7 @@ def fit(groups: Sequence[MergedBags], job: Job) -> Fitted:
 
 
 def noise(taken: Sequence[BagSummary | Refused], fitted: Fitted, job: Job) -> FloatArray | None:
-    """Task: compute the noise covariance of the normal equations of a group of bags."""
+    """Task: compute the covariance of the noise in the normal equations of a group's bags."""
     known, found = fitted[1], None
     for one in taken:
         if known is not None and isinstance(one, BagSummary):
@@ -136,7 +136,7 @@ def noise(taken: Sequence[BagSummary | Refused], fitted: Fitted, job: Job) -> Fl
 def finish(
     arm: str, fitted: Fitted, products: Sequence[FloatArray | None], job: Job
 ) -> ArmOutcome:
-    """Task: write the estimate of an arm."""
+    """Task: write the estimate of an arm to the results; return the outcome of the arm."""
     merged, known = fitted
     problem = ''
     if known is None or merged.normal is None:
@@ -204,7 +204,7 @@ def identify_fleet(
 
 @dataclass(frozen=True)
 class _Waiting:
-    """Arm whose tasks are not submitted yet: its bags, and the bags that failed."""
+    """Arm whose tasks are not submitted yet, with the bags to read and the bags that failed."""
 
     arm: str
     groups: tuple[Group, ...]
@@ -294,7 +294,7 @@ class _Run:
         return self._jobs[job.digest]
 
     def _submitted(self, arm: _Waiting) -> _UnderWay:
-        """Submit the tasks of an arm: reading groups of bags, fit, noise products, and writing."""
+        """Submit the tasks of an arm: read its bags, fit, compute noise covariances, and write."""
         job, count = self._job(arm.arm), sum(len(group) for group in arm.groups)
         prepared = []
         for group in arm.groups:

@@ -92,7 +92,7 @@ class Store:
 
     @property
     def local(self) -> Path | None:
-        """Return the path of a local folder; None for other stores."""
+        """Return the path of the folder if it is on this machine; None if it is remote."""
         filesystem, path = self._place
         return Path(path) if isinstance(filesystem, LocalFileSystem) else None
 
@@ -150,7 +150,7 @@ class Store:
         return None if data is None else parquet.read_table(io.BytesIO(data))
 
     def data_set(self, name: str) -> pyarrow.Table | None:
-        """Return all parts of a partitioned data set as one table; None if there are none."""
+        """Return all parts of a partitioned data set in a single table; None if there are none."""
         filesystem, root = self._place
         if not filesystem.isdir(f'{root}/{name}'):
             return None

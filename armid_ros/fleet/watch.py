@@ -127,12 +127,12 @@ class WatchedArm:
 
     @property
     def error(self) -> float | None:
-        """Median of the relative errors of the bags [%]; None if no bag was fitted."""
+        """Median relative torque error of the arm's bags [%]; None if no bag was fitted."""
         errors = [e for row in self.bags if (e := row['relative_error_percent']) is not None]
         return float(np.median(errors)) if errors else None
 
     def bag_at(self, change: HistoryChange) -> dict[str, Any]:
-        """Return the table row of the first bag after a step, or of the last bag of a trend."""
+        """Return the table row of the bag after a sudden change, or of the last bag of a drift."""
         day = change.series.days[change.index if change.kind == 'step' else -1]
         return min(self.bags, key=lambda row: abs(row['start_ns'] / DAY_NS - day))
 
@@ -140,7 +140,7 @@ class WatchedArm:
 @dataclass(frozen=True, eq=False)
 class Watch:
     """
-    For each arm of a fleet, the estimates from its bags over time and the changes found in them.
+    Estimates of each arm of a fleet over time, and the significant changes of each arm.
 
     Attributes
     ----------
@@ -296,7 +296,7 @@ def day_text(days: float) -> str:
 
 
 def parameter_label(name: str, joint: str) -> str:
-    """Return the label of a parameter's history, such as 'viscous coefficient of elbow'."""
+    """Return a readable name of a watched parameter, such as 'viscous coefficient of elbow'."""
     if name == RESIDUAL:
         return f'residual torque of {joint}'
     if name.isidentifier() and '_' in name:
@@ -322,7 +322,7 @@ def _by_arm(table: pa.Table | None) -> dict[str, list[dict[str, Any]]]:
 def _series(
     parameters: pa.Table, bags: Mapping[str, list[dict[str, Any]]]
 ) -> list[ParameterHistory]:
-    """Return the histories of all parameters and of the log residuals of all arms."""
+    """Return the history of each parameter and of each joint's log residual, for every arm."""
     found = []
     for arm, own in sorted(bags.items()):
         fitted = [row for row in own if row['residual_std']]
