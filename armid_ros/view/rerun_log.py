@@ -52,7 +52,7 @@ def rerun() -> ModuleType:
 
 def open_stream(name: str, out: Path | None = None) -> Any:
     """
-    Open a window of rerun or a file for the data of a recording.
+    Open a rerun window or a file, to which the data of a recording can be sent.
 
     Parameters
     ----------
@@ -108,7 +108,7 @@ def log_recording(
     stream: Any, arm: ArmModel, recording: Recording, marked: Sequence[str] = ()
 ) -> list[str]:
     """
-    Send moving arm, curves and window layout to rerun; return notes on links without shapes.
+    Send moving arm, curves and window layout to rerun; return notes on links that are not drawn.
 
     Parameters
     ----------
@@ -161,7 +161,7 @@ def log_recording(
 
 
 def interpolated_poses(recording: Recording) -> tuple[FloatArray, FloatArray]:
-    """Interpolate a recording at about 30 Hz; return times, (K,) [s], and positions, (K, n)."""
+    """Return times [s] and positions of a recording, interpolated at about 30 Hz: (K,), (K, n)."""
     t = recording.t
     count = max(2, int((t[-1] - t[0]) * 30.0) + 1)  # poses per second
     at = np.linspace(t[0], t[-1], min(count, len(t)))
@@ -173,7 +173,7 @@ def interpolated_poses(recording: Recording) -> tuple[FloatArray, FloatArray]:
 
 
 def _log_bodies(stream: Any, robot: Robot, marked: Sequence[str]) -> list[str]:
-    """Send the visual shapes of all links, or else collision shapes or bars; return notes."""
+    """Send link shapes to rerun, or bars if there are none; return notes on undrawn links."""
     rr, drawn = rerun(), 0
     notes: list[str] = []
     absent: list[str] = []
@@ -232,7 +232,7 @@ def _entity(shape: LinkShape, colour: tuple[int, int, int]) -> Any:
 
 
 def _layout(joints: Sequence[str], marked: Sequence[str]) -> Any:
-    """Return the layout of the window: the arm, and tabs with the curves of each joint."""
+    """Return the layout of the rerun window: the arm, and tabs with the curves of each joint."""
     import rerun.blueprint as layout
 
     def plots(kind: str, names: Sequence[str]) -> list[Any]:

@@ -136,7 +136,7 @@ class ResidualMarkersNode(ListeningNode):
         return np.asarray(np.sqrt(self._residual / np.maximum(self._torque, 1e-12)))
 
     def take_description(self, urdf: str) -> None:
-        """Draw on the robot that the topic robot_description describes."""
+        """Draw the markers on the robot that the topic robot_description describes."""
         self._draw_on(robot_from_urdf(urdf, joints=self.value('joints') or None))
 
     def _draw_on(self, robot: Robot) -> None:
@@ -171,7 +171,7 @@ class ResidualMarkersNode(ListeningNode):
     def _mean_square(
         self, signal: str, t: float, before: FloatArray, values: FloatArray
     ) -> FloatArray:
-        """Return the running mean square over about 2 s, updated with the values at time t [s]."""
+        """Return the mean square of a signal over about 2 s, updated with values at time t [s]."""
         step, self._seen[signal] = t - self._seen[signal], t
         share = 1.0 if not before.any() else float(np.clip(step / 2.0, 0.0, 1.0))
         return np.asarray(before + share * (values**2 - before))
