@@ -26,7 +26,7 @@ _LENGTHS = (0.02, 10.0)
 
 
 class _Cells(NamedTuple):
-    """Cell number of each row, (N,), and mean state (M, 3) and torque (M,) of each cell."""
+    """Cells that group N samples: cell of each sample (N,), mean state (M, 3) and torque (M,)."""
 
     labels: npt.NDArray[np.intp]
     points: FloatArray
@@ -80,7 +80,7 @@ def learn_map(rows: JointRows, rng: np.random.Generator) -> tuple[TorqueMap, Flo
 
 
 class _Scales(NamedTuple):
-    """Hyperparameters of the process: noise, length scales, amplitude and knee velocity."""
+    """Hyperparameters of the Gaussian process: noise, length scales, amplitude, knee velocity."""
 
     noise: float
     lengths: FloatArray

@@ -106,7 +106,7 @@ def _library(
 
 def suggest_law(rows: JointRows, prismatic: bool) -> Law | None:
     """
-    Return a formula of few terms that approximates a residual; None if the library has none.
+    Return a formula of few terms for a joint's residual torque; None if no formula fits well.
 
     Parameters
     ----------
@@ -148,7 +148,7 @@ def share_of(residual: FloatArray, torque: FloatArray) -> float:
 
 
 def _fit(x: FloatArray, residual: FloatArray, count: int) -> FloatArray:
-    """Fit a residual by at most ``count`` of the L terms; return the factors of all, (L,)."""
+    """Fit a residual by at most ``count`` of L terms; return L factors, zero for unused terms."""
     from sklearn.linear_model import orthogonal_mp
 
     size = np.sqrt(np.mean(x**2, axis=0))

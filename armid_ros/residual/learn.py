@@ -74,14 +74,14 @@ class JointResidual:
     law: Law | None
 
     def axis(self, number: int, count: int) -> FloatArray:
-        """Return evenly spaced values over the recorded range of an input, 0 to 2, (count,)."""
+        """Return evenly spaced values in the recorded range of position, velocity or load."""
         return np.linspace(float(self.ranges[number, 0]), float(self.ranges[number, 1]), count)
 
 
 @dataclass(frozen=True)
 class Residual:
     """
-    The residual of a diagnosis, learned as a map for each joint.
+    Residual torque that a diagnosis leaves unexplained, learned as a map for each joint.
 
     Attributes
     ----------
@@ -121,7 +121,7 @@ class Residual:
         return tuple(lines)
 
     def steps(self) -> list[str]:
-        """Return a next step for the user for each joint."""
+        """Return the next step for the user, for each joint with a learned map."""
         return [
             f'Inspect gear, cables and stops of {one.joint} where its map is strong.'
             if one.law is None
@@ -131,7 +131,7 @@ class Residual:
         ]
 
     def section(self) -> ContentSection:
-        """Return the section of the report on the learned maps, drawn at the mean load."""
+        """Return the report section on the learned maps, drawn at the middle of the load range."""
         robot = self.base.robot
         rows, pictures = [], []
         for one in self.joints:
@@ -183,7 +183,7 @@ class Residual:
 
     def table(self) -> list[tuple[str, ...]]:
         """
-        Return the maps as a table on a grid over the range of the data, in SI units.
+        Return the learned maps as a table: torques in SI units on a grid over the recorded range.
 
         Returns
         -------
@@ -249,7 +249,7 @@ def require_libraries() -> None:
 
 def learn_residual(diagnosis: Diagnosis, rng: np.random.Generator) -> Residual | None:
     """
-    Learn a map of the residual that a diagnosis does not explain.
+    Learn maps of the residual torque that a diagnosis leaves unexplained.
 
     The residual is that of the patched model. If the diagnosis has no findings, it is that of the
     diagnosed model, whose rigid body is refitted if the diagnosis did so.
@@ -357,7 +357,7 @@ def near_data(learned: TorqueMap, rows: JointRows) -> npt.NDArray[np.bool_]:
 
 
 def _pictures(one: JointResidual, unit: str, length: str) -> list[tuple[str, str, Markup, str]]:
-    """Return pictures of torque and standard deviation at the mean load of the range."""
+    """Return pictures of a map's torque and its standard deviation, at the mid-range load."""
     # cells along position and velocity
     q, dq = (one.axis(number, count) for number, count in enumerate((80, 60)))
     load = np.full((len(dq), len(q)), one.ranges[2].mean())

@@ -47,7 +47,7 @@ class JointRows:
         return JointRows(self.inputs[chosen], self.residual[chosen], self.block[chosen])
 
     def folds(self) -> Iterator[npt.NDArray[np.bool_]]:
-        """Yield a mask of the rows in all other blocks, shape (N,), for each block with rows."""
+        """For each block that has rows, yield a mask (N,) of the rows in all other blocks."""
         for block in range(BLOCKS):
             others = self.block != block
             if others.any() and not others.all():
@@ -56,7 +56,7 @@ class JointRows:
 
 def joint_rows(arm: ArmModel, data: Sequence[Trajectory]) -> list[JointRows]:
     """
-    Return the residual torques of a model on recordings, with the state, for each joint.
+    Return, for each joint, a model's residual torques on recordings with the joint's state.
 
     Parameters
     ----------
