@@ -36,7 +36,7 @@ class CarriedLoad:
     body: pin.Inertia
 
     def principal(self) -> tuple[FloatArray, FloatArray]:
-        """Return principal moments (3,) [kg m^2] and axes, as columns in the order near x, y, z."""
+        """Return principal moments (3,) [kg m^2] and axes (columns), each near its frame axis."""
         moments, axes = np.linalg.eigh(self.body.inertia)
         order = max(
             map(list, permutations(range(3))),
