@@ -48,10 +48,7 @@ _ASSUMED = (
     'neighbouring samples'
 )
 #: Note on a model without the covariance of its identification.
-_AS_EXACT = (
-    'intervals do not include errors of the given values: their covariance is unknown, because '
-    'identification.json of the model is missing'
-)
+_AS_EXACT = 'intervals do not include errors of given values, as identification.json is missing'
 #: Note if a cause acts temporarily and its time span in held-out recordings is unknown.
 _NOT_TIMED = (
     'held-out recordings are not used: without a baseline, the seconds in which the cause acts in '

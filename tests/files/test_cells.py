@@ -3,7 +3,6 @@
 """Names of joints hold any character, in options and effects as in tables."""
 
 from armid_ros.arm import ArmModel
-from armid_ros.cli.columns import _coupling
 from armid_ros.cli.diagnose import _tie
 from armid_ros.cli.options import box
 from armid_ros.effects import make_effect, parse_effect
@@ -56,5 +55,4 @@ def test_options_take_such_names_in_quotes(robot, joint):
     assert payload.lever.tolist() == [0.0, 0.0, 0.1]
     tie = _tie(f'{quoted}@0,0,1={quoted}', robot, robot)
     assert (tie.joint, tie.other_joint, tie.point) == (joint, joint, (0.0, 0.0, 1.0))
-    assert _coupling(f'{quoted},x=3/2') == (joint, 'x', 1.5)
     assert Argument('joints', list, '').read(f'{quoted},x') == [joint, 'x']

@@ -76,7 +76,7 @@ def test_unknown_and_missing_joints_are_named(humanoid) -> None:
         ([0.0, 2.0, 1.0], np.zeros((3, 1)), r'point 2'),
         ([-1.0, 1.0], np.zeros((2, 1)), r'-1\.0 s'),
         ([0.0, np.nan], np.zeros((2, 1)), r'point 1 .* nan s'),
-        ([], np.zeros((0, 1)), r'no points'),
+        ([], np.zeros((0, 1)), r'no waypoints'),
         ([0.0, 1.0], np.zeros((3, 1)), r'\(3, 1\)'),
         ([0.0, 1.0], np.array([[0.0], [np.nan]]), r"'a' at point 1"),
     ],

@@ -221,8 +221,7 @@ def _unset(
         square = float(sum(np.sum(x**2) for x in columns))
         count = max(sum(np.count_nonzero(x) for x in columns), 1)
         joint = joints.index(parameter.joint)
-        sigma = float(nuisance.rows.sigma[-1][joint])
-        rms = sigma * np.sqrt(square / count)
+        rms = float(nuisance.rows.sigma[-1][joint]) * np.sqrt(square / count)
         variance = max(float(covariance[k, k]), float(scatter[k]))
         unit = nuisance.rows.torque[joint] / max(rms, 1e-12 * nuisance.rows.torque[joint])
         prior = SIZES * unit
@@ -230,8 +229,7 @@ def _unset(
         explained = 0.5 * means[k] ** 2 / variance * (1.0 - 1.0 / wide)
         odds = float(np.logaddexp.reduce(explained - 0.5 * np.log(wide)) - np.log(len(SIZES)))
         odds += HOW_OFTEN[settings.prior.get(effect.name, 'often')]
-        precision = float(nuisance.prior_precision[k, k])
-        resolution = float(np.clip(1.0 - variance * precision, 0.0, 1.0))
+        resolution = float(np.clip(1.0 - variance * nuisance.prior_precision[k, k], 0.0, 1.0))
         yield CauseResult(
             effect,
             (0,),

@@ -265,7 +265,7 @@ def written(tmp_path, **changes):
         ({'covariance': [[float('nan')]]}, 'not finite'),
         ({'covariance': [[1.0], [0.0, 1.0]]}, 'triangle'),
         ({'error': 'x'}, 'relative_error_percent'),
-        ({'scatter': [[0.1, 0.2]]}, 'scatter has to have'),
+        ({'scatter': [[0.1, 0.2]]}, "'scatter' has to have"),
         ({'scatter': [[float('inf')]]}, 'scatter .*finite'),
     ],
 )

@@ -146,7 +146,7 @@ def test_a_joint_that_rests_in_what_is_held_out_is_named(structure, run, sound):
 def test_without_held_out_data_halves_of_the_recording_judge_each_other(structure, run):
     found, result = graded(structure, [run])
     assert found.word == 'good'
-    assert 'half of the data' in found.reasons[0]
+    assert 'halves of the data' in found.reasons[0]
     assert result.halves.relative_error_percent < 5.0
 
 

@@ -5,6 +5,7 @@
 from dataclasses import replace
 import re
 
+from armid_ros import inspect
 from armid_ros.arm import ArmModel
 from armid_ros.effects import make_effect
 from armid_ros.identification import grade, identify
@@ -16,7 +17,6 @@ from armid_ros.identification.assess.sensor_faults import (
     velocity_faults,
 )
 from armid_ros.identification.rows.signals import conditioning, segments, SignalSettings
-from armid_ros.inspection import inspect
 from armid_ros.model import inverse_dynamics
 from armid_ros.recording import Recording
 from armid_ros.recording.recording import PositionRange
@@ -83,7 +83,7 @@ def test_a_constant_speed_is_dead_where_it_is_not_the_way_gone(arm, stated, dead
     turning = replace(run, q=q, dq=dq)
     found = [text for text in said(arm.robot, turning) if 'velocity' in text]
     assert bool(found) == dead
-    remarks = [one.text for one in inspect(turning, rng=np.random.default_rng(0)).remarks]
+    remarks = inspect(turning).remarks
     assert sum('velocit' in text for text in remarks) == dead
 
 
@@ -143,11 +143,11 @@ def test_identification_grades_the_one_as_unusable_and_not_the_other(structure, 
 
 
 def test_inspection_says_so_with_and_without_a_robot(arm, blind, locked):
-    for known in (arm, None):
-        found = inspect(blind, known, rng=np.random.default_rng(0))
+    for known in ((arm,), ()):
+        found = inspect(*known, blind).core
         assert found.remarks[0].weight == 'bad'
         assert 'frozen' in found.remarks[0].text
-        sound = inspect(locked, known, rng=np.random.default_rng(0))
+        sound = inspect(*known, locked).core
         assert not any(remark.weight == 'bad' for remark in sound.remarks)
 
 
