@@ -283,7 +283,7 @@ def _p(score: float, freedom: float, tried: int) -> float:
 
 
 class _Splits(NamedTuple):
-    """Mean estimates before and after each possible step, and a line through all estimates."""
+    """Mean estimates before and after each possible jump, and a line fitted to all estimates."""
 
     low: FloatArray  # (K - 1,)
     high: FloatArray

@@ -173,7 +173,7 @@ class _Ties:
     def _problem(
         self, bare: ArmModel, inertias: Inertias, slack: float = 0.0
     ) -> InteractionProblem:
-        """Return the regression problem of all ties, with other effects of the arm subtracted."""
+        """Return the regression of torques on all ties, without torques of other effects."""
 
         def rest(motion: Motion) -> FloatArray:
             return np.asarray(bare.torque(motion) - inverse_dynamics(bare.robot, motion))

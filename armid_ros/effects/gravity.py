@@ -156,7 +156,7 @@ def _unit(gravity: FloatArray) -> FloatArray:
     """Return the direction of gravity; raise a ModelError without gravity."""
     length = np.linalg.norm(gravity)
     if not length > 0.0:
-        raise ModelError('effects on gravity need a model with gravity; that of the model is zero')
+        raise ModelError('effects on gravity need a model with gravity, but its gravity is zero')
     return np.asarray(gravity / length)
 
 

@@ -102,7 +102,7 @@ def find_bags(patterns: Sequence[str], arm_pattern: str | None = None) -> list[B
         raise FleetError(f'--arm {arm_pattern}: {error}') from error
     if regular is not None and regular.groups < 1:
         raise FleetError(
-            f"--arm {arm_pattern}: has no group for the name of the arm, as in 'robots/([^/]+)/'"
+            f"--arm {arm_pattern}: no (group) for the name of the arm, as in 'robots/([^/]+)/'"
         )
     found: dict[str, BagFile] = {}
     for pattern in patterns:

@@ -197,7 +197,7 @@ def require_as_identified(path: str | Path) -> None:
 
 
 def _content(path: Path) -> dict[str, Any]:
-    """Return size [bytes] and digest of a recording, from both ends of each file."""
+    """Return the size of a recording [bytes], and a digest of both ends of its files."""
     inside = sorted(path.rglob('*')) if path.is_dir() else [path]
     digest, total = hashlib.sha256(), 0
     end = 1 << 20  # bytes; enough for the time stamps at the beginning and the index at the end

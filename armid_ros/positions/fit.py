@@ -200,7 +200,7 @@ class _Problem:
         return np.stack(columns, axis=-1)
 
     def solved(self, free: npt.NDArray[np.bool_]) -> FloatArray:
-        """Fit the free parameters by least squares, weighted by the residual of each joint."""
+        """Fit the parameters by least squares, each joint weighted by its inverse residual."""
         x, places = self.start.copy(), np.flatnonzero(free)
         lower, upper = np.zeros(len(x)), np.full(len(x), np.inf)
         lower[0], upper[0] = -0.05, 0.3  # delay [s]; it is negative if the clocks differ

@@ -117,7 +117,7 @@ def _register(store: Typestore, name: str, definition: str | None) -> None:
         except (TypesysError, ValueError) as error:
             raise RecordingError(f'type {name}: no valid message definition: {error}') from error
         if name not in types:
-            raise RecordingError(f'type {name}: the given text defines {", ".join(types)} instead')
+            raise RecordingError(f'type {name}: the definition defines only {", ".join(types)}')
     store.register(types)
     for _, fields in types.values():
         for _, description in fields:

@@ -78,7 +78,7 @@ def require_any_mass(robot: Robot) -> None:
 
 
 def inertia_error(robot: Robot) -> ModelError:
-    """Return the error for an inertia matrix that is not positive definite."""
+    """Return the exception for an inertia matrix that is not positive definite."""
     odd = [
         f"'{name}' ({values[0]:g} kg)"
         for name, values in zip(

@@ -49,7 +49,7 @@ class Load:
 
     @staticmethod
     def along(arm: ArmModel, trajectory: FourierTrajectory) -> Load:
-        """Return the largest load, to one digit, that the drives can bear in a motion."""
+        """Return the largest payload, rounded down, that the drives can carry along a motion."""
         robot = arm.robot
         motion = trajectory.one_period(int(trajectory.period * _RATE))
         last = robot.model.getJointId(robot.tip)
