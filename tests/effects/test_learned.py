@@ -88,7 +88,7 @@ def test_a_file_keeps_it_to_the_last_digit_that_matters(robot, learned, tmp_path
         (lambda m: m['points'].__setitem__(0, '0.1 0.2'), "'shoulder_roll'"),
         (lambda m: m['points'].__setitem__(0, '0 0 0 nan 1'), 'finite'),
         (lambda m: m.__setitem__('amplitude', -1.0), 'positive'),
-        (lambda m: m.__setitem__('joint', 'wrist'), "'shoulder_roll' has"),
+        (lambda m: m.__setitem__('joint', 'wrist'), "map of joint 'shoulder_roll'"),
     ],
 )
 def test_a_damaged_file_is_refused_with_the_joint(robot, learned, tmp_path, change, said):
