@@ -59,9 +59,8 @@ class _Prepared(threading.local):
 
     def data_of(self, robot: Robot) -> pin.Data:
         """Return the work space of Pinocchio for a robot."""
-        if robot not in self.data:
-            self.data[robot] = robot.model.createData()
-        return self.data[robot]
+        data = self.data.get(robot)
+        return self.data.setdefault(robot, robot.model.createData()) if data is None else data
 
     def body_of(self, robot: Robot) -> BodyOfKernel | None:
         """Return a robot in the format of the compiled kernel; None without this kernel."""

@@ -46,10 +46,10 @@ class Sensors:
     torque_delay: int = 0
     acceleration_noise: float = 0.0
     _noisy: bool = field(init=False, repr=False)
-    _quantised: bool = field(init=False, repr=False)
+    _step: FloatArray | None = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        """Raise a ModelError if a value is negative; set whether readings have noise and steps."""
+        """Raise a ModelError if a value is negative; set noise flag and encoder steps."""
         noises = ('torque_noise', 'position_noise', 'velocity_noise', 'acceleration_noise')
         for setting in (*noises, 'resolution'):
             value = np.asarray(getattr(self, setting), dtype=float)
@@ -62,7 +62,8 @@ class Sensors:
             )
         std = (self.torque_noise, self.position_noise, self.velocity_noise)
         object.__setattr__(self, '_noisy', any(np.any(each) for each in std))
-        object.__setattr__(self, '_quantised', bool(np.any(self.resolution)))
+        step = np.where(self.resolution, self.resolution, 1.0) if np.any(self.resolution) else None
+        object.__setattr__(self, '_step', step)
 
     def measure(
         self,
@@ -92,9 +93,8 @@ class Sensors:
             q = q + noise[:, 0] * self.position_noise
             dq = dq + noise[:, 1] * self.velocity_noise
             tau = tau + noise[:, 2] * self.torque_noise
-        if self._quantised:
-            step = np.where(self.resolution, self.resolution, 1.0)
-            q = np.where(self.resolution, np.rint(q / step) * step, q)
+        if self._step is not None:
+            q = np.where(self.resolution, np.rint(q / self._step) * self._step, q)
         return q, dq, tau
 
 

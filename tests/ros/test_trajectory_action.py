@@ -258,7 +258,7 @@ def test_a_controller_that_is_gone_is_said(bench, arm, excitation):
     node = begun(bench, arm, excitation, state_timeout=0.2)
     bench.settle()
     arm.leave()
-    bench.spin_until(lambda: node.poll() or node.condition()[0], 'what is said')
+    bench.spin_until(lambda: node.poll() or node.condition()[0], 'a reported condition')
     assert f'/{NAME}' in node.condition()[0]
 
 

@@ -167,9 +167,10 @@ def explain(
             continue
         named.append(cause.at(means[span], robot))
         steps.append(trial)
-    unset = [trial for trial in _unset(result, unknown, settings) if trial.odds > alarm]
-    large = {t.effect.name for t in unset if np.any(np.abs(t.values) >= t.least)}
-    for trial in unset:  # fit it in all joints, or its torque biases other values
+    unset = list(_unset(result, unknown, settings)) if unknown else []
+    likely = [trial for trial in unset if trial.odds > alarm]
+    large = {t.effect.name for t in likely if np.any(np.abs(t.values) >= t.least)}
+    for trial in likely:  # fit it in all joints, or its torque biases other values
         if trial.effect.name in large:
             named.append(NamedEffect(trial.effect, trial.kept, trial.values))
             steps.append(trial)
@@ -184,7 +185,7 @@ def explain(
         evidence,
         problem,
         tuple(small),
-        *survey(result, settings, unknown, [trial.key for trial in steps]),
+        *survey(result, settings, unset, [trial.key for trial in steps]),
         result.first,
     )
 
@@ -195,10 +196,9 @@ def _unset(
     """
     Yield the result of each friction and offset that is fitted because the model lacks its value.
 
-    The prior of a value is the one of every other effect: a mixture of normal distributions with
-    standard deviations `SIZES`, times the value whose torque is that of the joint. Most joints
-    have friction and an offset, so the default frequency of these effects is 'often'. The variance
-    of a value is that of its posterior, or of the jackknife over recordings if larger.
+    A value has the prior of other effects: a mixture of normal distributions with deviations
+    `SIZES`, times the value whose torque is that of the joint; by default, it is 'often' present.
+    Its variance is the larger one of posterior and jackknife over recordings.
 
     """
     nuisance = result.nuisance
@@ -248,7 +248,7 @@ def _unset(
 def survey(
     result: Selection,
     settings: DiagnosisSettings,
-    unknown: Sequence[Effect] = (),
+    unset: Sequence[CauseResult] = (),
     named: Collection[Key] = (),
 ) -> tuple[tuple[CauseResult, ...], tuple[tuple[str, tuple[str, ...]], ...]]:
     """Return results of all visible causes, named causes first, and names of invisible causes."""
@@ -260,7 +260,7 @@ def survey(
     every = [
         *(ranking.tested(replace(one, posterior=posterior), material) for one in ranked),
         *(ranking.tested(one, material) for one in ranking.others),
-        *_unset(result, unknown, settings),
+        *unset,
     ]
     seen = tuple(one for one in every if one.visible >= settings.thresholds.least_visible)
     keys = {one.key[:2] for one in seen}
