@@ -106,7 +106,7 @@ def positions(
 
 
 def gains_of(text: str, robot: Robot) -> FloatArray:
-    """Return --gains as kp and kd of each joint, shape (2, n); RobotError if malformed."""
+    """Parse the option --gains; return kp and kd of the n joints, shape (2, n)."""
     from armid_ros.errors import RobotError
     from armid_ros.files import reading
     from armid_ros.files.regular import read_text

@@ -76,7 +76,7 @@ class PositionFit:
     duration: float
 
     def of(self, name: str, joint: str = '') -> tuple[float, float]:
-        """Return value and standard error of a parameter."""
+        """Return value and standard error of a fitted parameter, by its name and joint."""
         place = [(one.name, one.joint) for one in self.parameters].index((name, joint))
         return float(self.values[place]), float(self.std[place])
 
@@ -119,7 +119,7 @@ def start_values(
     model: LoopModel, runs: Sequence[Run], gains: FloatArray | None
 ) -> tuple[FloatArray, FloatArray]:
     """
-    Return start values of the parameters, and the size at which each alone explains the torque.
+    Return start values for the fit of the control loop, and a typical size of each parameter.
 
     The torque balance of each joint is linear in gains, rotor inertia and friction. It is solved
     for nonnegative values and several delays. The result has the delay with the smallest
@@ -193,14 +193,14 @@ class _Problem:
         return np.concatenate(simulated) - np.concatenate(measured)
 
     def slopes(self, x: FloatArray, places: npt.NDArray[np.intp]) -> FloatArray:
-        """Return derivatives of simulated positions by k scaled parameters, shape (M, n, k)."""
+        """Return derivatives of simulated positions by k chosen parameters, shape (M, n, k)."""
         share = 1e-3  # step of a parameter, as a share of its size
         now, steps = self.residual(x), share * np.diag(self.size)[places]
         columns = [(self.residual(x + step) - now) / share for step in steps]
         return np.stack(columns, axis=-1)
 
     def solved(self, free: npt.NDArray[np.bool_]) -> FloatArray:
-        """Fit the parameters by least squares, each joint weighted by its inverse residual."""
+        """Return the least-squares parameters; each joint is weighted by its inverse residual."""
         x, places = self.start.copy(), np.flatnonzero(free)
         lower, upper = np.zeros(len(x)), np.full(len(x), np.inf)
         lower[0], upper[0] = -0.05, 0.3  # delay [s]; it is negative if the clocks differ
@@ -242,7 +242,7 @@ class _Problem:
 def _errors(
     information: FloatArray, scores: FloatArray, some: npt.NDArray[np.intp]
 ) -> tuple[FloatArray, FloatArray]:
-    """Return covariance and standard errors of chosen parameters, in units of their sizes."""
+    """Return covariance and standard errors of chosen parameters, both in scaled units."""
     inside = information[np.ix_(some, some)] + np.eye(len(some)) / _PRIOR_STD**2
     covariance = np.linalg.inv(inside)
     blocks = len(scores)
@@ -253,7 +253,7 @@ def _errors(
 
 
 def _fit_at(problem: _Problem, x: FloatArray, free: npt.NDArray[np.bool_]) -> PositionFit:
-    """Return the fit at parameters x, with standard errors, or reasons why they are missing."""
+    """Return the result of the fit at its optimum x: standard errors, or why they are missing."""
     model, n, count = problem.model, problem.model.robot.n_joints, len(x)
     residuals = problem.residual(x)
     sigma = np.sqrt(np.mean(residuals**2, axis=0)) + 1e-9

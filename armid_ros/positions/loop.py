@@ -60,7 +60,7 @@ class CommandedMotion:
         return cls(t, commanded.q, dq)
 
     def mean(self, edges: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return mean commanded positions and velocities between successive times, (K - 1, n)."""
+        """Return mean commanded position and velocity between successive edges, (K - 1, n)."""
         ends = min(self.t[0], edges[0]) - 1.0, max(self.t[-1], edges[-1]) + 1.0
         t = np.concatenate([ends[:1], self.t, ends[1:]])
         values = np.hstack([self.q, self.dq])
@@ -74,7 +74,7 @@ class CommandedMotion:
 @dataclass(frozen=True, eq=False)
 class Window:
     """
-    Part of a recording that is simulated from a measured state.
+    Section of a recording that is simulated, starting from a measured state.
 
     Attributes
     ----------
@@ -99,7 +99,7 @@ class Window:
 
 
 def windows_of(recording: Recording, commands: CommandedMotion) -> Iterator[Window]:
-    """Yield the windows of about 5 s without a gap in a recording and in its commands."""
+    """Yield sections of about 5 s in which positions and commands are recorded without gaps."""
     t = recording.t
     length, lead = 5.0, 0.5  # of a window, and of the time before it to forget the start state [s]
     around = 0.03  # half of the time over which a parabola gives the start state [s]
@@ -126,7 +126,7 @@ def windows_of(recording: Recording, commands: CommandedMotion) -> Iterator[Wind
 @dataclass(frozen=True, eq=False)
 class LoopModel:
     """
-    Robot under position control, with drives and tool that depend on P parameters.
+    Model of a position-controlled robot: its drives and its tool depend on P parameters.
 
     Attributes
     ----------
@@ -142,13 +142,13 @@ class LoopModel:
 
     @cached_property
     def bare(self) -> ArmModel:
-        """Return the described arm with the effects to fit, whose values are zero."""
+        """Return the arm of the robot description, with the effects to fit at zero."""
         names = 'rotor_inertia', 'viscous_friction', 'coulomb_friction', 'payload'
         return ArmModel.of(self.robot, effects=names)
 
     @cached_property
     def parameters(self) -> tuple[ParameterName, ...]:
-        """Return names and units of the parameters: delay, gains, effects, payload centre."""
+        """Return names and units of the P parameters: delay, gains, effects, payload centre."""
         robot = self.robot
         units = list(zip(robot.torque_units, robot.position_units, strict=True))
         gains = [
@@ -166,7 +166,7 @@ class LoopModel:
         )
 
     def arm(self, x: FloatArray) -> ArmModel:
-        """Return the arm model for P parameters; the tool has equal moments of inertia."""
+        """Return the arm model for parameters x; the tool has three equal moments of inertia."""
         n, (mass, *center, radius) = self.robot.n_joints, x[-5:]
         tool = pin.Inertia(mass, np.array(center), mass * radius**2 * np.eye(3))
         values = (*np.split(x[2 * n + 1 : -5], 3), tool.toDynamicParameters())
@@ -176,7 +176,7 @@ class LoopModel:
         self, x: FloatArray, recording: Recording, commands: CommandedMotion
     ) -> Recording:
         """
-        Return a recording with the torque that the controller computes from its commands.
+        Return a recording with the torques that the position controller computes from commands.
 
         Parameters
         ----------
@@ -202,7 +202,7 @@ class LoopModel:
 
     def simulated(self, x: FloatArray, windows: Sequence[Window]) -> list[FloatArray]:
         """
-        Simulate the arm in windows, with parameters of shape (P,).
+        Simulate each window with parameters x, shape (P,); return its positions.
 
         Returns
         -------

@@ -26,7 +26,7 @@ _COLUMNS = {
 
 
 def limit_hints(runs: Sequence[Run], torques: Sequence[Recording], robot: Robot) -> list[str]:
-    """Return hints on joints with commands beyond position limits, or torques at their limits."""
+    """Return hints on joints with commands beyond position limits, or with torques at limits."""
     commands = np.concatenate([commands.q for _, commands in runs])
     torque = np.concatenate([one.tau for one in torques if one.tau is not None])
     beyond = np.mean((commands < robot.lower) | (commands > robot.upper), axis=0)
@@ -43,7 +43,7 @@ def limit_hints(runs: Sequence[Run], torques: Sequence[Recording], robot: Robot)
 
 
 def fit_document(found: PositionFit, hints: Sequence[str] = ()) -> dict[str, Any]:
-    """Return the content of positions.json for a fit and the hints of `limit_hints`."""
+    """Return the content of the file positions.json: a fit and the hints of `limit_hints`."""
     poor = bool(np.any(found.residual > 0.3 * found.tracking))
     std = [float(one) if np.isfinite(one) else None for one in found.std]
     values = zip(found.parameters, found.values.tolist(), std, found.reasons, strict=True)
@@ -88,7 +88,6 @@ def fit_summary(found: PositionFit, document: dict[str, Any], step: str) -> Summ
     joints = found.arm.robot.joints
 
     def cell(name: str, joint: str = '', factor: float = 1.0) -> str:
-        """Return a fitted value with its 95 % interval as text."""
         value, std = found.of(name, joint)
         if not np.isfinite(std):
             return 'not det.'
