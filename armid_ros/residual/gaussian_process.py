@@ -26,7 +26,7 @@ _LENGTHS = (0.02, 10.0)
 
 
 class _Cells(NamedTuple):
-    """Cells that group N samples: cell of each sample (N,), mean state (M, 3) and torque (M,)."""
+    """Clusters of N samples: cluster of each sample (N,), mean state (M, 3) and torque (M,)."""
 
     labels: npt.NDArray[np.intp]
     points: FloatArray
@@ -93,7 +93,7 @@ def _span(inputs: FloatArray) -> FloatArray:
 
 
 def _cells(rows: JointRows, labels: npt.NDArray[np.intp], used: npt.NDArray[np.bool_]) -> _Cells:
-    """Average states and residuals over the used rows of each cell; leave out empty cells."""
+    """Return mean state and mean residual of each cluster; only rows marked as used count."""
     own, n = labels[used], int(labels.max()) + 1
     count = np.bincount(own, minlength=n)
     there = count > 0
@@ -104,7 +104,7 @@ def _cells(rows: JointRows, labels: npt.NDArray[np.intp], used: npt.NDArray[np.b
 
 
 def _fitted(cells: _Cells, knee: float) -> tuple[float, _Scales]:
-    """Maximise the log marginal likelihood; return its value per cell and the hyperparameters."""
+    """Fit the hyperparameters by maximum likelihood; return log likelihood per cell, and them."""
     from sklearn.gaussian_process import GaussianProcessRegressor, kernels
 
     size = max(float(np.sqrt(np.mean(cells.torque**2))), 1e-12)

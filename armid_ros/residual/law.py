@@ -22,7 +22,7 @@ import numpy as np
 
 
 class Term(NamedTuple):
-    """Term of a formula in q, dq and the load w, such as 'dq^3', with its factor and unit."""
+    """Term of a formula for residual torque, such as 'dq^3', with its factor and unit."""
 
     text: str
     coefficient: float
@@ -32,7 +32,7 @@ class Term(NamedTuple):
 @dataclass(frozen=True)
 class Law:
     """
-    A formula of few terms that approximates the residual torque of a joint.
+    Formula of a few terms that approximates the residual torque of a joint.
 
     Attributes
     ----------
@@ -48,7 +48,7 @@ class Law:
 
     @property
     def text(self) -> str:
-        """Return the formula in a line, such as '0.31 dq^3 - 0.02 q'."""
+        """Return the formula as text, such as '0.31 dq^3 - 0.02 q'."""
         text = ''
         for number, term in enumerate(self.terms):
             sign = '-' if term.coefficient < 0.0 else ('' if number == 0 else '+')
@@ -69,7 +69,7 @@ class Law:
 def _library(
     inputs: FloatArray, low: float, high: float, prismatic: bool
 ) -> list[tuple[str, str, FloatArray]]:
-    """Return the candidate terms of a formula: text, unit of the factor, and values, (N,)."""
+    """Return candidate terms of the formula: text, unit of the factor, and values (N,)."""
     q, dq, w = inputs.T
     sign = np.sign(dq)
     force, x = ('N', 'm') if prismatic else ('N m', 'rad')
@@ -106,7 +106,7 @@ def _library(
 
 def suggest_law(rows: JointRows, prismatic: bool) -> Law | None:
     """
-    Return a formula of few terms for a joint's residual torque; None if no formula fits well.
+    Fit a formula of up to three terms to a joint's residual torque; None if it fits badly.
 
     Parameters
     ----------
@@ -143,12 +143,12 @@ def suggest_law(rows: JointRows, prismatic: bool) -> Law | None:
 
 
 def share_of(residual: FloatArray, torque: FloatArray) -> float:
-    """Return the share of the squared residual that a torque explains."""
+    """Return the share of the squared residual that a predicted torque explains, at most 1."""
     return 1.0 - float(np.sum((residual - torque) ** 2)) / max(float(np.sum(residual**2)), 1e-300)
 
 
 def _fit(x: FloatArray, residual: FloatArray, count: int) -> FloatArray:
-    """Fit a residual by at most ``count`` of L terms; return L factors, zero for unused terms."""
+    """Fit a residual by at most ``count`` of L terms; return L factors, unused ones zero."""
     from sklearn.linear_model import orthogonal_mp
 
     size = np.sqrt(np.mean(x**2, axis=0))

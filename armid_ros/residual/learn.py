@@ -74,7 +74,7 @@ class JointResidual:
     law: Law | None
 
     def axis(self, number: int, count: int) -> FloatArray:
-        """Return evenly spaced values in the recorded range of position, velocity or load."""
+        """Return evenly spaced values over the recorded range of position, velocity or load."""
         return np.linspace(float(self.ranges[number, 0]), float(self.ranges[number, 1]), count)
 
 
@@ -103,7 +103,7 @@ class Residual:
     joints: tuple[JointResidual, ...]
 
     def sentences(self) -> tuple[str, ...]:
-        """Return a sentence on the map and the formula of each joint."""
+        """Return for each joint a sentence on its learned map and formula."""
         lines = []
         for one in self.joints:
             alone = ''
@@ -121,7 +121,7 @@ class Residual:
         return tuple(lines)
 
     def steps(self) -> list[str]:
-        """Return the next step for the user, for each joint with a learned map."""
+        """Return for each joint with a learned map what the user can do next."""
         return [
             f'Inspect gear, cables and stops of {one.joint} where its map is strong.'
             if one.law is None
@@ -131,7 +131,7 @@ class Residual:
         ]
 
     def section(self) -> ContentSection:
-        """Return the report section on the learned maps, drawn at the middle of the load range."""
+        """Return the report section that shows the learned maps at the mid-range load."""
         robot = self.base.robot
         rows, pictures = [], []
         for one in self.joints:
@@ -183,7 +183,7 @@ class Residual:
 
     def table(self) -> list[tuple[str, ...]]:
         """
-        Return the learned maps as a table: torques in SI units on a grid over the recorded range.
+        Return the learned maps as a table of torques on a grid over the recorded range.
 
         Returns
         -------
@@ -313,7 +313,7 @@ def _learned(
     rng: np.random.Generator,
 ) -> JointResidual | None:
     """
-    Learn the residual torque of one joint as a map, and test the map on held-out data.
+    Learn the residual torque of a joint as a map; None if it predicts held-out data badly.
 
     The map is None if it does not predict held-out blocks beyond chance. It is also None if its
     torque is below a material torque [N m] and it predicts no held-out recording.
@@ -351,13 +351,13 @@ def _learned(
 
 
 def near_data(learned: TorqueMap, rows: JointRows) -> npt.NDArray[np.bool_]:
-    """Return a mask of the rows that are near the training data of a learned map, shape (N,)."""
+    """Return a mask (N,) of the rows near the data from which a map was learned."""
     # a map is informative where its standard deviation is less than half of that of the prior
     return np.asarray(learned.std(rows.inputs) < 0.5 * learned.amplitude)
 
 
 def _pictures(one: JointResidual, unit: str, length: str) -> list[tuple[str, str, Markup, str]]:
-    """Return pictures of a map's torque and its standard deviation, at the mid-range load."""
+    """Return images of the torque and standard deviation of a map, at the mid-range load."""
     # cells along position and velocity
     q, dq = (one.axis(number, count) for number, count in enumerate((80, 60)))
     load = np.full((len(dq), len(q)), one.ranges[2].mean())

@@ -21,7 +21,7 @@ BLOCKS = 10
 @dataclass(frozen=True)
 class JointRows:
     """
-    Residual torque of one joint with position, velocity and load, for N informative samples.
+    Residual torque, position, velocity and load of one joint in N informative samples.
 
     Attributes
     ----------
@@ -39,15 +39,15 @@ class JointRows:
     block: npt.NDArray[np.intp]
 
     def __len__(self) -> int:
-        """Return the number of rows N."""
+        """Return the number N of samples."""
         return len(self.residual)
 
     def select(self, chosen: npt.NDArray[np.bool_]) -> JointRows:
-        """Return the rows that a mask of shape (N,) selects."""
+        """Return the samples that a mask of shape (N,) selects."""
         return JointRows(self.inputs[chosen], self.residual[chosen], self.block[chosen])
 
     def folds(self) -> Iterator[npt.NDArray[np.bool_]]:
-        """For each block that has rows, yield a mask (N,) of the rows in all other blocks."""
+        """Yield for each nonempty block a mask (N,) of the samples outside the block."""
         for block in range(BLOCKS):
             others = self.block != block
             if others.any() and not others.all():
@@ -56,7 +56,7 @@ class JointRows:
 
 def joint_rows(arm: ArmModel, data: Sequence[Trajectory]) -> list[JointRows]:
     """
-    Return, for each joint, a model's residual torques on recordings with the joint's state.
+    Return for each joint the residual torques of a model on recordings, with the states.
 
     Parameters
     ----------
