@@ -38,7 +38,7 @@ _HOST, _PORT = '127.0.0.1', 9876
 
 
 def rerun() -> ModuleType:
-    """Import and return the module of the viewer rerun; ArmidError if it is not installed."""
+    """Import and return the module `rerun`; ArmidError if this viewer is not installed."""
     try:
         import rerun
     except ImportError:
@@ -52,7 +52,7 @@ def rerun() -> ModuleType:
 
 def open_stream(name: str, out: Path | None = None) -> Any:
     """
-    Open a rerun window or a file, to which the data of a recording can be sent.
+    Open a rerun window or a file that accepts the data of a recording.
 
     Parameters
     ----------
@@ -108,7 +108,7 @@ def log_recording(
     stream: Any, arm: ArmModel, recording: Recording, marked: Sequence[str] = ()
 ) -> list[str]:
     """
-    Send moving arm, curves and window layout to rerun; return notes on links that are not drawn.
+    Send the moving arm and curves to rerun; return notes on links that are not drawn.
 
     Parameters
     ----------
@@ -173,7 +173,7 @@ def interpolated_poses(recording: Recording) -> tuple[FloatArray, FloatArray]:
 
 
 def _log_bodies(stream: Any, robot: Robot, marked: Sequence[str]) -> list[str]:
-    """Send link shapes to rerun, or bars if there are none; return notes on undrawn links."""
+    """Send the shapes of links to rerun, or bars if there are none; return notes on the rest."""
     rr, drawn = rerun(), 0
     notes: list[str] = []
     absent: list[str] = []
@@ -214,7 +214,7 @@ def _log_bodies(stream: Any, robot: Robot, marked: Sequence[str]) -> list[str]:
 
 
 def _entity(shape: LinkShape, colour: tuple[int, int, int]) -> Any:
-    """Convert a link shape to an entity of rerun; raise a RobotError for an invalid mesh."""
+    """Convert the shape of a link to an entity of rerun; RobotError if the mesh is invalid."""
     rr = rerun()
     if shape.path is not None:
         load_mesh(shape.path, np.ones(3))  # the viewer ignores invalid meshes without a message
@@ -232,7 +232,7 @@ def _entity(shape: LinkShape, colour: tuple[int, int, int]) -> Any:
 
 
 def _layout(joints: Sequence[str], marked: Sequence[str]) -> Any:
-    """Return the layout of the rerun window: the arm, and tabs with the curves of each joint."""
+    """Return the layout of the rerun window: the arm, and a tab of curves for each joint."""
     import rerun.blueprint as layout
 
     def plots(kind: str, names: Sequence[str]) -> list[Any]:
@@ -258,7 +258,7 @@ def _layout(joints: Sequence[str], marked: Sequence[str]) -> Any:
 
 
 def _part(name: str) -> str:
-    """Escape the name of a joint or link for the path of a rerun entity."""
+    """Escape the name of a joint or link for use in the path of a rerun entity."""
     return str(rerun().escape_entity_path_part(name))
 
 

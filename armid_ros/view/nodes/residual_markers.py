@@ -31,7 +31,7 @@ _SHAFT, _LETTER = 0.015, 0.05
 
 class ResidualMarkersNode(ListeningNode):
     """
-    Node that draws the residuals of the online identifier on the joints, for RViz and Foxglove.
+    Node that draws the online residual torque at each joint, for RViz and Foxglove.
 
     At each joint, the length of an arrow along the axis shows the present residual. The colour of
     a sphere shows the ratio of residual to torque, as root mean squares over two seconds. The
@@ -74,7 +74,7 @@ class ResidualMarkersNode(ListeningNode):
         self.create_steady_timer(1.0 / self.value('rate'), self.draw)
 
     def condition(self) -> tuple[str, Mapping[str, object]]:
-        """Return the missing inputs, and the ratio of residual to torque of each joint."""
+        """Return missing inputs, and the ratio of residual to measured torque of each joint."""
         if self.robot is None:
             return self.awaited, {}
         if not np.isfinite(self._q).all():
@@ -132,11 +132,11 @@ class ResidualMarkersNode(ListeningNode):
         return text
 
     def _shares(self) -> FloatArray:
-        """Return the ratio of residual to torque of each joint, both as root mean squares."""
+        """Return the ratio of residual to measured torque of each joint, both as RMS."""
         return np.asarray(np.sqrt(self._residual / np.maximum(self._torque, 1e-12)))
 
     def take_description(self, urdf: str) -> None:
-        """Draw the markers on the robot that the topic robot_description describes."""
+        """Set up the markers for the robot that the topic robot_description describes."""
         self._draw_on(robot_from_urdf(urdf, joints=self.value('joints') or None))
 
     def _draw_on(self, robot: Robot) -> None:
@@ -153,7 +153,7 @@ class ResidualMarkersNode(ListeningNode):
         self._reach = max(float(np.linalg.norm(steps, axis=1).sum()), 0.1)
 
     def take_sample(self, sample: JointSample) -> None:
-        """Store the positions of a joint state, and update the mean square of its torques."""
+        """Store the positions of a joint state, and update the mean squares of its torques."""
         self._q = sample.q
         self._torque = self._mean_square('torque', sample.t, self._torque, sample.tau)
 
@@ -171,7 +171,7 @@ class ResidualMarkersNode(ListeningNode):
     def _mean_square(
         self, signal: str, t: float, before: FloatArray, values: FloatArray
     ) -> FloatArray:
-        """Return the mean square of a signal over about 2 s, updated with values at time t [s]."""
+        """Return the mean square of a signal over about 2 s, after new values at time t [s]."""
         step, self._seen[signal] = t - self._seen[signal], t
         share = 1.0 if not before.any() else float(np.clip(step / 2.0, 0.0, 1.0))
         return np.asarray(before + share * (values**2 - before))
