@@ -119,7 +119,7 @@ def fit(
     seed: int,
     as_json: bool,
 ) -> None:
-    """Find zeros, gains, gravity, tool and friction from the rests of recordings."""
+    """Find zeros, gains, gravity, tool and friction from recordings of an arm at rest."""
     from armid_ros import ArmModel, save_model
     from armid_ros.cli import options
     from armid_ros.identification.known_payload import payloads_of

@@ -49,7 +49,7 @@ _REMEDY = 'record a run of armid zero plan'
 @dataclass(frozen=True)
 class FittedQuantity:
     """
-    Fitted quantity with the half-width of its 95 % interval, which is 0 if the value is known.
+    Fitted quantity with half the width of its 95 % interval (0 if its value is given).
 
     The joint is empty for a quantity of the whole arm. The reason why the quantity is not
     determined ends with a remedy; it is empty for a determined one.
@@ -67,7 +67,7 @@ class FittedQuantity:
 @dataclass(frozen=True)
 class ZeroFit:
     """
-    Result of a fit of torque sensor zeros and gains, gravity and tool to K rests of an arm.
+    Fit of torque sensor zeros and gains, gravity and tool to K rests of an arm.
 
     Attributes
     ----------
@@ -94,11 +94,11 @@ class ZeroFit:
     outliers: int
 
     def of(self, name: str, joint: str = '') -> FittedQuantity:
-        """Return the fitted quantity of a name and a joint; joint '' is the whole arm."""
+        """Return the fitted quantity with a name and a joint; '' as joint means the whole arm."""
         return next(one for one in self.quantities if (one.name, one.joint) == (name, joint))
 
     def model(self) -> ArmModel:
-        """Return the arm with all determined effects but friction; the tool is a point mass."""
+        """Return the arm with all determined quantities but friction; the tool is a point mass."""
         arm = ArmModel(self.arm.robot)
         for effect, values in zip(self.arm.effects, self.arm.values, strict=True):
             if effect.name == 'payload' and values[0] > 0.0:
@@ -112,7 +112,7 @@ class ZeroFit:
 
 
 def arm_at_rest(robot: Robot, known: Collection[str] = ()) -> ArmModel:
-    """Return a quasi-static arm with effects to fit, such as gravity if the gains are known."""
+    """Return a static arm model with the effects that a fit to rests determines."""
     names = ['payload', 'base_tilt', 'coulomb_friction', 'torque_offset', 'torque_gain']
     if 'gain' in known and 'tilt' not in known:
         names.append('gravity_magnitude')
@@ -125,7 +125,7 @@ def arm_at_rest(robot: Robot, known: Collection[str] = ()) -> ArmModel:
 
 def quantities_of(arm: ArmModel) -> dict[tuple[str, str, str], float]:
     """
-    Return fitted zeros, gains, friction, gravity and tool, keyed by name, joint and unit.
+    Return zeros, gains, friction, gravity and tool of an arm, by name, joint and unit.
 
     A zero is the reading without any torque. The centre of the tool is in the frame of the last
     joint.
@@ -156,7 +156,7 @@ def fit_rests(
     link_error: float = 0.0,
 ) -> ZeroFit:
     """
-    Fit torque sensor zeros and gains, gravity, tool and friction to the rests of recordings.
+    Fit torque sensor zeros and gains, gravity, tool and friction to an arm's rests.
 
     Parameters
     ----------
@@ -205,7 +205,7 @@ def fit_rests(
 def _predicted(
     arms: Sequence[ArmModel], rests: Sequence[Motion], x: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Return torques (K, n) predicted with changed parameters, and derivatives (K, n, P)."""
+    """Return torques (K, n) predicted after a parameter change x, and derivatives (K, n, P)."""
     pairs = [(a.with_theta(a.theta + x), motion) for a, motion in zip(arms, rests, strict=True)]
     torque = np.concatenate([arm.torque(motion) for arm, motion in pairs])
     return torque, np.concatenate([arm.columns(motion) for arm, motion in pairs])
@@ -213,7 +213,7 @@ def _predicted(
 
 class _Solution(NamedTuple):
     """
-    Solution: change x of all P parameters, indices and covariance of the F fitted parameters.
+    Solution of the fit: changes of P parameters, and the covariance of F free ones.
 
     Covariances (F, F) are from the variances of joints and from the scatter of the rests;
     information (F, F) is without the prior; freedom is the fewest redundant readings of a joint.
@@ -233,7 +233,7 @@ class _Solution(NamedTuple):
 def _solved(
     arms: Sequence[ArmModel], rests: Sequence[Motion], prior: FloatArray, scales: FloatArray
 ) -> _Solution:
-    """Fit the free parameters by Gauss-Newton, with estimated noise and without outliers."""
+    """Fit the free parameters by Gauss-Newton; noise is estimated and outliers are left out."""
     y = np.concatenate([np.asarray(one.tau) for one in rests])
     # readings without a motion of the joint before only bound its dry friction
     approached = np.concatenate([one.dq for one in rests]).astype(bool)
@@ -267,7 +267,7 @@ def _solved(
 def _quantities(
     arm: ArmModel, solved: _Solution, units: Mapping[str, float], few: str
 ) -> tuple[FittedQuantity, ...]:
-    """Return the fitted quantities with intervals; `few` is the message on too few poses."""
+    """Return all quantities with intervals; `few` is the message if poses are too few."""
     factor = float(student.ppf(0.975, max(solved.freedom, 1.0)))
     middle, std = quantities_of(arm), np.sqrt(np.diag(solved.covariance))
     found, tool = [], True
@@ -294,7 +294,7 @@ def _quantities(
 
 
 def _reason(arm: ArmModel, solved: _Solution, slope: FloatArray, limit: float) -> str:
-    """Return why a quantity is not determined, from its derivatives by free parameters."""
+    """Return the reason why the data do not determine a quantity, with a remedy."""
     std = np.sqrt(np.diag(solved.covariance))
     most = int(np.argmax(np.abs(slope) * std))
     correlation = np.abs(solved.covariance[most]) / std
@@ -316,7 +316,7 @@ def _reason(arm: ArmModel, solved: _Solution, slope: FloatArray, limit: float) -
 def fit_document(
     found: ZeroFit, known: Collection[str], link_error: float, external: bool
 ) -> dict[str, Any]:
-    """Return the results of a fit as the content of zero.json."""
+    """Return the content of the file zero.json."""
     gains = [one.value for one in found.quantities if one.name == 'gain' and not one.reason]
     links = f'links within {100.0 * link_error:g} %' if link_error else 'links as described'
     held = [links, *known]
@@ -343,7 +343,7 @@ def fit_document(
 
 
 def fit_summary(found: ZeroFit, document: dict[str, Any], step: str, noise: FloatArray) -> Summary:
-    """Return the terminal summary of a fit; `noise` is the torque noise of rests, shape (n,)."""
+    """Return the terminal summary of a fit; `noise` is each joint's torque noise at rest, (n,)."""
     names = ('zero', 'gain', 'friction')
     rows = [
         (joint, *(_cell(found.of(name, joint)) for name in names), f'{residual:.2g}')
@@ -392,7 +392,7 @@ def fit_summary(found: ZeroFit, document: dict[str, Any], step: str, noise: Floa
 
 
 def _cell(one: FittedQuantity) -> str:
-    """Return the text of a quantity with its interval, for a table."""
+    """Format a quantity with its interval for a table."""
     if one.reason:
         return 'not det.'
     value, half = measured(one.value, one.half_width)

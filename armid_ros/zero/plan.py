@@ -44,7 +44,7 @@ def plan_zero(
     seed: int = 0,
 ) -> ExcitationResult:
     """
-    Plan a tour through static poses, with a rest of `hold` [s] after each approach.
+    Plan a motion through static poses, at each of which the arm rests for `hold` seconds.
 
     The tour approaches each pose from each free side. `seed` is the seed of the random poses.
     TrajectoryError: too few poses are free, or no tour is found.
@@ -78,7 +78,7 @@ def _poses(
     rng: np.random.Generator,
 ) -> FloatArray:
     """
-    Return the most informative collision-free poses, (count, n), in the order of a short tour.
+    Return the most informative collision-free poses, (count, n), ordered for a short path.
 
     The determinant of the information on all effects is maximised, pose by pose and then by
     exchange. Source: Fedorov 1972.
@@ -120,7 +120,7 @@ def _poses(
 def _tour(
     planner: TransferPlanner, limits: Limits, poses: FloatArray, hold: float
 ) -> FourierTrajectory:
-    """Return a closed tour through all poses that can be reached."""
+    """Return a closed trajectory that rests at each reachable pose."""
     rate, smoothing = 20.0, 0.5  # [Hz], and standard deviation of the filter [s]
     # the filter moves the arm for three standard deviations at either end of a rest
     count = round((hold + 6.0 * smoothing) * rate)

@@ -17,7 +17,7 @@ _WINDOW, _SETTLING_TIME, _MIN_REST = 1.0, 0.5, 0.5
 
 
 def reading_noise(recording: Recording) -> FloatArray:
-    """Return the standard deviation of the mean torque over the shortest rest, (n,) [N m or N]."""
+    """Return the standard deviation of the mean torque of a shortest rest, (n,) [N m or N]."""
     assert recording.tau is not None
     count = max(_MIN_REST / max(recording.period, 1e-6), 1.0)
     # the median leaves out steps of friction; for white noise it is 0.954 standard deviations
@@ -27,7 +27,7 @@ def reading_noise(recording: Recording) -> FloatArray:
 
 def find_rests(recording: Recording) -> Motion:
     """
-    Return the K rests of a recording as K samples of position and torque.
+    Find the K rests of a recording; return their positions and torques as K samples.
 
     Position and torque are means over a rest. The velocity is the direction of the approach of a
     joint, 1 or -1, or 0 if the joint hardly moved since the previous rest.
