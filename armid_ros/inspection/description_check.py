@@ -38,7 +38,7 @@ _MIN_SHARE, _MAX_CHI_SQUARED = 0.5, 10.0
 @dataclass(frozen=True, eq=False)
 class LinkCheck:
     """
-    Comparison of the n described links of a robot with an identification.
+    Comparison of the inertial parameters of n described links with an identification.
 
     Attributes
     ----------
@@ -89,7 +89,7 @@ class LinkCheck:
 
     @property
     def agrees(self) -> bool:
-        """Whether fitted links reduce the torque error by less than 1 % of the torque."""
+        """Whether fitting the links reduces the torque error by less than 1 % of the torque."""
         return self.error_percent - self.fitted_error_percent < _MIN_IMPROVEMENT
 
 
@@ -112,7 +112,7 @@ def description_remarks(robot: Robot) -> tuple[Remark, ...]:
 
 
 def _thin_inertias(robot: Robot) -> Iterator[Remark]:
-    """Yield a remark on each inertia whose body would be thinner than `THINNEST` of its length."""
+    """Yield a remark on each inertia that only an implausibly thin body could have."""
     for link, inertial in robot.description.links.items():
         if inertial is None or inertial.doubt():
             continue
@@ -129,7 +129,7 @@ def _thin_inertias(robot: Robot) -> Iterator[Remark]:
 
 
 def _joint_remarks(robot: Robot) -> Iterator[Remark]:
-    """Yield remarks on limits that may be in degrees, and on axes that are no unit vectors."""
+    """Yield remarks on limits that may be in degrees, and on axes that are not unit vectors."""
     for k, name in enumerate(robot.joints):
         if robot.prismatic[k]:
             continue
@@ -151,7 +151,7 @@ def _joint_remarks(robot: Robot) -> Iterator[Remark]:
 
 
 def _limit_remarks(robot: Robot) -> Iterator[Remark]:
-    """Yield remarks on effort and velocity limits that are improbably small or large."""
+    """Yield remarks on effort and velocity limits that are implausibly small or large."""
     if robot.mechanism is not None:  # not every pose of the driven joints exists
         return
     # largest torque of each joint that holds the arm in random poses [N m]
@@ -192,7 +192,7 @@ def _limit_remarks(robot: Robot) -> Iterator[Remark]:
 
 
 def _shape_remarks(robot: Robot) -> Iterator[Remark]:
-    """Yield remarks on sizes of shapes, densities of links and links without collision shape."""
+    """Yield remarks on sizes and densities of links, and on links without a collision shape."""
     # shapes of a link may overlap, so volumes are upper bounds
     geometry, missing = collision_geometry(robot, other='visual')
     volume = dict.fromkeys(robot.description.links, 0.0)
@@ -241,7 +241,7 @@ def _shape_remarks(robot: Robot) -> Iterator[Remark]:
 def _centre_remarks(
     link: str, centre: FloatArray, corners: Sequence[FloatArray]
 ) -> Iterator[Remark]:
-    """Yield a remark if a centre of mass lies far outside the bounding box of a link's shapes."""
+    """Yield a remark if a link's centre of mass is far outside the link's bounding box."""
     if not corners:
         if np.linalg.norm(centre) > _MAX_LENGTH:
             yield Remark(
@@ -258,7 +258,7 @@ def _centre_remarks(
 
 def check_links(found: Identification, robot: Robot, grade: str, fault: str) -> LinkCheck:
     """
-    Find the described links whose errors explain the difference from an identification.
+    Find the links whose described inertial parameters disagree with an identification.
 
     Parameters
     ----------
@@ -330,7 +330,7 @@ def check_links(found: Identification, robot: Robot, grade: str, fault: str) -> 
 
 
 def _errors(found: Identification, theta: FloatArray) -> tuple[float, float]:
-    """Return the relative torque errors [%] with parameters theta, and with those of the fit."""
+    """Return relative torque errors [%] for parameters theta, and for the fitted parameters."""
     before = found.arm.with_theta(theta)
     fits = [
         replace(
@@ -344,7 +344,7 @@ def _errors(found: Identification, theta: FloatArray) -> tuple[float, float]:
 
 
 def _selected(rows: FloatArray, spread: FloatArray, total: float) -> list[int]:
-    """Return the links with wrong parameters, by forward selection without redundant links."""
+    """Select the links with wrong inertial parameters by forward selection; return indices."""
     every = range(len(spread) // PER_LINK)
     wrong: list[int] = []
     rest = total
@@ -365,7 +365,7 @@ def _selected(rows: FloatArray, spread: FloatArray, total: float) -> list[int]:
 def _fit(
     rows: FloatArray, spread: FloatArray, links: Sequence[int]
 ) -> tuple[FloatArray, FloatArray, float]:
-    """Fit inertial parameters of links; return changes, covariance and remaining chi-squared."""
+    """Fit inertial parameters of links; return their changes, covariance and the chi-squared."""
     size = PER_LINK
     own = [size * k + i for k in links for i in range(size)]
     columns, target = rows[:, own] * spread[own], rows[:, -1]

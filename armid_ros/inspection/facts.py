@@ -24,7 +24,7 @@ from scipy.signal import savgol_filter
 @dataclass(frozen=True)
 class Sampling:
     """
-    Statistics of the time stamps of a recording.
+    Statistics of the time stamps of a recording: rate, jitter, gaps.
 
     Attributes
     ----------
@@ -89,7 +89,7 @@ def repetition_period(recording: Recording) -> float | None:
 @dataclass(frozen=True)
 class JointFacts:
     """
-    Statistics of one joint of a recording, in the units of the file.
+    Statistics of one joint in a recording, in the units of the recorded file.
 
     Attributes
     ----------
@@ -132,12 +132,12 @@ class JointFacts:
 
     @property
     def still(self) -> bool:
-        """Whether the joint rests throughout the recording."""
+        """Whether the joint is at rest in the whole recording."""
         return self.upper - self.lower < REST_RANGE
 
 
 def joint_facts(recording: Recording) -> tuple[JointFacts, ...]:
-    """Return range, speed, resolution and efforts of every joint of a recording."""
+    """Return position range, speed, resolution and efforts of each recorded joint."""
     speeds = np.abs(_derivative(recording))
     found = []
     for j, (name, ratio, fit) in enumerate(
@@ -167,7 +167,7 @@ def joint_facts(recording: Recording) -> tuple[JointFacts, ...]:
 
 
 def _derivative(recording: Recording) -> FloatArray:
-    """Differentiate the positions of a recording by local parabolas, shape (N, n)."""
+    """Return velocities (N, n): slopes of parabolas fitted locally to recorded positions."""
     half = 5  # samples on either side
     if len(recording) <= 2 * half + 1:
         return np.gradient(recording.q, recording.t, axis=0)
@@ -183,7 +183,7 @@ def _derivative(recording: Recording) -> FloatArray:
 @dataclass(frozen=True)
 class TrialFit:
     """
-    Quality of a trial identification from one recording.
+    Quality of a quick identification from one recording.
 
     Attributes
     ----------
@@ -234,7 +234,7 @@ class TrialFit:
     def of(
         cls, found: Identification, graded: Grade, recording: Recording, scale: FloatArray
     ) -> TrialFit:
-        """Return the quality of an identification; `scale` is effort over described torque."""
+        """Assess a quick identification; `scale` is the ratio of effort to described torque."""
         robot, motions = found.arm.robot, [fit.motion for fit in found.training]
         score = Score.of(found.training)
         errors = score.joint_relative_error_percent

@@ -28,7 +28,7 @@ Weight = Literal['bad', 'doubt', 'note']
 @dataclass(frozen=True)
 class Remark:
     """
-    A remark for the user on a recording or a robot description.
+    Remark for the user on a fault of a recording or of a robot description.
 
     Attributes
     ----------
@@ -46,7 +46,7 @@ class Remark:
 @dataclass(frozen=True)
 class Inspection:
     """
-    The result of the inspection of a recording.
+    Result of the inspection of a recording.
 
     Attributes
     ----------
@@ -77,7 +77,7 @@ class Inspection:
 
     @property
     def verdict(self) -> str:
-        """Return one sentence that states whether the recording is fit for identification."""
+        """Return a sentence that states whether the recording is suitable for identification."""
         if self.trial is None:
             if self.recording.tau is None:
                 return 'No efforts: nothing can be identified from motion alone.'
@@ -98,7 +98,7 @@ class Inspection:
 
     @property
     def units(self) -> tuple[str, ...]:
-        """Return the unit of each joint position, 'rad' or 'm'."""
+        """Return the unit of the position of each joint, 'rad' or 'm'."""
         if self.robot is None:
             return ('rad',) * self.recording.n_joints
         return self.robot.position_units
@@ -152,7 +152,7 @@ def inspect(
 
 
 def inspection_document(found: Inspection) -> dict[str, Any]:
-    """Return an inspection as a JSON document."""
+    """Return the result of an inspection as a JSON document."""
     trial = None
     if found.trial is not None:
         trial = asdict(found.trial)
@@ -178,7 +178,7 @@ def inspection_document(found: Inspection) -> dict[str, Any]:
 
 
 def notes_on(robot: Robot) -> list[str]:
-    """Return the warnings and notes on a described robot, with one note on undriven joints."""
+    """Return warnings and notes on a robot description; one note covers all undriven joints."""
     held = {f"joint '{joint.name}'" for joint in held_joints(robot)}
     others = [note for note in robot.notes if note.partition(': not')[0] not in held]
     return list(
@@ -187,17 +187,16 @@ def notes_on(robot: Robot) -> list[str]:
 
 
 def worst_first(remarks: Iterable[Remark]) -> tuple[Remark, ...]:
-    """Sort remarks from the worst to the mildest; remarks of equal weight keep their order."""
+    """Sort remarks from the worst to the mildest; equally bad remarks keep their order."""
     return tuple(sorted(remarks, key=lambda remark: get_args(Weight).index(remark.weight)))
 
 
 def _contains_any(text: str, others: Iterable[str]) -> bool:
-    """Return whether a text contains one of several other texts, regardless of case."""
     return any(other.casefold() in text.casefold() for other in others)
 
 
 def _fit_remarks(trial: TrialFit, known: Sequence[str]) -> Iterator[Remark]:
-    """Yield remarks on faults that a trial identification found and no other remark names."""
+    """Yield remarks on faults that the quick identification found and others do not name."""
     weight: Weight = 'bad' if trial.grade == 'unusable' else 'doubt'
     others = [*known, *trial.elsewhere]
     yield from (
@@ -212,7 +211,7 @@ def _fit_remarks(trial: TrialFit, known: Sequence[str]) -> Iterator[Remark]:
 
 
 def _time_remarks(recording: Recording, sampling: Sampling) -> Iterator[Remark]:
-    """Yield remarks on damaged data, time stamps, gaps, jitter and repetition of a recording."""
+    """Yield remarks on damaged data, time stamps, gaps, jitter and repeated periods."""
     report = recording.report
     if report.damage:
         yield Remark('doubt', report.damage)
@@ -275,7 +274,7 @@ def _unit_remarks(
 
 
 def _motion_remarks(joints: tuple[JointFacts, ...], sampling: Sampling) -> Iterator[Remark]:
-    """Yield remarks on joints at rest, and on joints whose encoder readings repeat."""
+    """Yield remarks on joints at rest, and on joints with many repeated encoder readings."""
     still = [joint.name for joint in joints if joint.still]
     if len(still) == len(joints):
         yield Remark('bad', 'no joint moves')
@@ -291,7 +290,7 @@ def _motion_remarks(joints: tuple[JointFacts, ...], sampling: Sampling) -> Itera
 
 
 def _effort_remarks(joints: tuple[JointFacts, ...], trial: TrialFit | None) -> Iterator[Remark]:
-    """Yield remarks on efforts that are missing, constant or multiples of described torques."""
+    """Yield remarks on efforts that are missing, constant or in wrong units."""
     if joints[0].effort_rms is None:
         yield Remark('bad', 'no efforts: nothing can be identified; is JointState.effort filled?')
         return
