@@ -58,7 +58,7 @@ _trigamma = partial(special.polygamma, 1)
 @dataclass(frozen=True, eq=False)
 class ParameterHistory:
     """
-    Estimates of a parameter of an arm over time.
+    Estimates of one parameter of an arm from successive recordings.
 
     Attributes
     ----------
@@ -90,7 +90,7 @@ class ParameterHistory:
 @dataclass(frozen=True)
 class Spread:
     """
-    Scatter of a parameter between bags, in addition to the standard deviations of its estimates.
+    Scatter of a parameter between recordings, beyond the standard errors of its estimates.
 
     Attributes
     ----------
@@ -116,7 +116,7 @@ class Spread:
 @dataclass(frozen=True)
 class HistoryChange:
     """
-    Largest step in the estimates of a parameter over time, or the trend of these estimates.
+    Largest step of a parameter between its estimates over time, or their linear trend.
 
     Attributes
     ----------
@@ -147,7 +147,7 @@ class HistoryChange:
 @dataclass(frozen=True)
 class Judged:
     """
-    Changes of the parameters of one arm over time, with their significance.
+    Steps and trends of the parameters of one arm over time, with their significance.
 
     Attributes
     ----------
@@ -203,7 +203,7 @@ def judge(
 
 
 def significant(judged: Judged, alpha: float) -> tuple[HistoryChange, ...]:
-    """Return an arm's parameter changes that are significant at a false discovery rate alpha."""
+    """Return the significant parameter changes of an arm at false discovery rate alpha."""
     if judged.adjusted > alpha or not judged.changes:
         return ()
     limit = alpha * judged.p / judged.adjusted / len(judged.changes)
@@ -211,13 +211,13 @@ def significant(judged: Judged, alpha: float) -> tuple[HistoryChange, ...]:
 
 
 def wear(series: ParameterHistory, spread: Spread) -> tuple[float, float]:
-    """Return the fitted change of a parameter per month, and the change's standard deviation."""
+    """Return the fitted linear change of a parameter per month, and its standard deviation."""
     slope, std, _ = _line(series.days, series.values, 1.0 / _variances(series, spread)[0])
     return slope * MONTH, std * spread.trends * MONTH
 
 
 def spreads(series: Sequence[ParameterHistory]) -> dict[tuple[str, str], Spread]:
-    """Return the scatter of each parameter between bags, by name and joint of the parameter."""
+    """Return the scatter between recordings of each parameter, by parameter name and joint."""
     found = {parameter: _spread(group) for parameter, group in _by_parameter(series).items()}
     for name in dict.fromkeys(one.name for one in series):  # of all joints together
         group = [one for one in series if one.name == name]
@@ -230,7 +230,7 @@ def spreads(series: Sequence[ParameterHistory]) -> dict[tuple[str, str], Spread]
 
 def without_days(series: Sequence[ParameterHistory]) -> list[ParameterHistory]:
     """
-    Return estimates minus the deviation that all arms share on a day, such as by temperature.
+    Subtract from estimates the daily deviation that all arms share, such as by temperature.
 
     The shared deviation is proportional to the size of the parameter, as for friction that falls
     with temperature. It is found by a median polish. Days on which few arms have bags are
@@ -262,7 +262,7 @@ def without_days(series: Sequence[ParameterHistory]) -> list[ParameterHistory]:
 
 
 def _largest_change(series: ParameterHistory, spread: Spread) -> HistoryChange:
-    """Return the largest step of a series of estimates, or its trend if the trend fits as well."""
+    """Return the largest step of a parameter over time, or its trend if this fits as well."""
     split, count = _splits(series, spread), len(series.values)
     scores, trend = split.scores / spread.steps, split.trend / spread.trends
     best = int(np.argmax(scores))
@@ -277,13 +277,13 @@ def _largest_change(series: ParameterHistory, spread: Spread) -> HistoryChange:
 
 
 def _p(score: float, freedom: float, tried: int) -> float:
-    """Return the p-value of the largest of `tried` scores, which is in standard deviations."""
+    """Return the p-value of the largest of `tried` z-scores."""
     # lower bound of the p-value, which underflows for larger scores
     return min(1.0, tried * max(float(tail(score**2, 1, freedom)), 1e-300))
 
 
 class _Splits(NamedTuple):
-    """Mean estimates before and after each possible jump, and a line fitted to all estimates."""
+    """Means before and after each possible step of a parameter, and its linear trend."""
 
     low: FloatArray  # (K - 1,)
     high: FloatArray
@@ -297,7 +297,7 @@ class _Splits(NamedTuple):
 
 
 def _splits(series: ParameterHistory, spread: Spread) -> _Splits:
-    """Fit each possible step, and a straight line, to a series of estimates."""
+    """Fit a step at each possible place, and a straight line, to the estimates."""
     variance, freedom = _variances(series, spread)
     std = np.sqrt(variance)
     # outliers are clipped to three standard deviations around the median of five bags
@@ -316,7 +316,7 @@ def _splits(series: ParameterHistory, spread: Spread) -> _Splits:
 def _by_parameter(
     series: Sequence[ParameterHistory],
 ) -> dict[tuple[str, str], list[ParameterHistory]]:
-    """Return the series of all arms by the name and joint of their parameter."""
+    """Group the estimates of all arms by parameter name and joint."""
     groups: dict[tuple[str, str], list[ParameterHistory]] = {}
     for one in series:
         groups.setdefault(one.parameter, []).append(one)
@@ -324,7 +324,7 @@ def _by_parameter(
 
 
 def _spread(group: Sequence[ParameterHistory]) -> Spread:
-    """Return the scatter of a parameter between bags, from differences of successive estimates."""
+    """Estimate the scatter of a parameter between recordings from successive differences."""
     # the scatter t solves median(d^2 / (s_k^2 + s_k+1^2 + 2 t^2)) = median of chi-squared
     squares = np.concatenate([np.diff(one.values) ** 2 for one in group])
     stated = np.concatenate([one.std[1:] ** 2 + one.std[:-1] ** 2 for one in group])
@@ -347,7 +347,7 @@ def _prior_freedom(
     group: Sequence[ParameterHistory], found: Mapping[tuple[str, str], Spread]
 ) -> float:
     """
-    Return how many degrees of freedom the prior of an arm's variance has (empirical Bayes).
+    Return the prior degrees of freedom of the variances of arms, by empirical Bayes.
 
     The logarithms of variance ratios have the variance trigamma(d_a / 2) + trigamma(d_0 / 2). The
     degrees of freedom of one series are d_a, and the equation is solved for d_0. Only scatter
@@ -372,14 +372,14 @@ def _prior_freedom(
 
 
 def _ratio(series: ParameterHistory, spread: Spread) -> float:
-    """Return the observed variance of a series over that expected from the scatter of all arms."""
+    """Return the ratio of a history's variance to that expected from all arms."""
     stated = series.std[1:] ** 2 + series.std[:-1] ** 2 + 2.0 * spread.std**2
     squares = np.diff(series.values) ** 2 / np.maximum(stated, 1e-300)
     return max(float(np.median(squares)) / MEDIAN_SQUARE, 1e-100)
 
 
 def _freedom(bags: int) -> float:
-    """Return the degrees of freedom of a variance that is estimated from a number of bags."""
+    """Return the degrees of freedom of a variance estimated from successive differences."""
     # a line through simulated series of white noise; right to 6 % from 4 to 80 bags
     return 0.8 + 0.31 * bags
 
@@ -398,7 +398,7 @@ def _variances(series: ParameterHistory, spread: Spread) -> tuple[FloatArray, fl
 def _lasting(
     group: Sequence[ParameterHistory], found: dict[tuple[str, str], Spread]
 ) -> tuple[float, float]:
-    """Return factors, at least 1, by which steps and trends of healthy arms exceed expectation."""
+    """Return inflation factors (at least 1) for the steps and the trends of healthy arms."""
     steps, trends = [], []
     for one in group:
         if len(one.values) < _MIN_BAGS:
@@ -419,7 +419,7 @@ def _lasting(
 
 
 def _line(days: FloatArray, x: FloatArray, weights: FloatArray) -> tuple[float, float, float]:
-    """Fit a weighted line; return slope, the slope's standard deviation, and the first value."""
+    """Fit a weighted line; return slope, standard deviation of the slope, and first value."""
     total = weights.sum()
     middle, mean = weights @ days / total, weights @ x / total
     deviation = days - middle

@@ -19,7 +19,7 @@ def quadratic_form(
     score: FloatArray, information: FloatArray, tolerance: float
 ) -> tuple[FloatArray, npt.NDArray[np.intp]]:
     """
-    Return the quadratic form s^T S^+ s of scores s with covariance S, and the rank of S.
+    Return s^T S^+ s for scores s with covariance S (S^+: pseudo-inverse), and the rank of S.
 
     Parameters
     ----------
@@ -51,7 +51,7 @@ def tail(
     square: npt.ArrayLike, rank: npt.ArrayLike, freedom: npt.ArrayLike = np.inf
 ) -> FloatArray:
     """
-    Return the p-value of a quadratic form under the hypothesis that nothing changed.
+    Return the p-value of a quadratic form of scores, if nothing changed.
 
     Parameters
     ----------
@@ -70,7 +70,7 @@ def tail(
 
 
 def limits(chance: float, rank: FloatArray, freedom: FloatArray) -> FloatArray:
-    """Return thresholds that quadratic forms exceed with a given chance if nothing changed."""
+    """Return the threshold that a quadratic form exceeds by chance with the given probability."""
     # Fisher's distribution by the beta distribution, as scipy.stats takes ten times as long
     share = special.betaincinv(0.5 * freedom, 0.5 * rank, chance)
     return np.asarray(freedom * (1.0 - share) / share)
@@ -78,7 +78,7 @@ def limits(chance: float, rank: FloatArray, freedom: FloatArray) -> FloatArray:
 
 def two_means(x: FloatArray, weights: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     """
-    Return the weighted means of values before and after each possible change point.
+    Return the weighted mean before and the one after each possible change point.
 
     Parameters
     ----------
