@@ -56,23 +56,23 @@ class BagFile:
 
     @property
     def name(self) -> str:
-        """Return the name of the bag's files in the results: bag name and hash of the URL."""
+        """Return the file name for the results of the bag: bag name and hash of its URL."""
         last = self.url.rstrip('/').rsplit('/', 1)[-1]
         return f'{re.sub(r"[^A-Za-z0-9_.-]", "_", last)}-{digest(self.url, size=10)}'
 
 
 def digest(*parts: str, size: int = 16) -> str:
-    """Return the first ``size`` hexadecimal digits of the SHA-256 hash of texts."""
+    """Return the first ``size`` hexadecimal digits of the SHA-256 hash of given texts."""
     return hashlib.sha256('\n'.join(parts).encode()).hexdigest()[:size]
 
 
 def folder_of(arm: str) -> str:
-    """Return the name of an arm's folder in the partitioned results."""
+    """Return the name of the results folder of an arm."""
     return f'arm={file_name(arm)}'
 
 
 def file_name(arm: str) -> str:
-    """Return the name of an arm as a file name; all but letters and digits are escaped."""
+    """Convert the name of an arm to a valid file name: escape all but letters and digits."""
     return ''.join(char if char.isalnum() else quote(char, safe='') for char in arm)
 
 
@@ -140,7 +140,7 @@ def find_bags(patterns: Sequence[str], arm_pattern: str | None = None) -> list[B
 def _bags(
     filesystem: Any, listed: Mapping[str, Mapping[str, Any]]
 ) -> Iterator[tuple[str, int, str]]:
-    """Yield path, size [bytes] and version of each bag among listed files and directories."""
+    """Yield path, size [bytes] and version of each bag in a listing of files and directories."""
 
     def version(info: Mapping[str, Any]) -> str:
         found = [str(info[name]) for name in _VERSIONS if info.get(name)][:1]
@@ -165,7 +165,7 @@ def _bags(
 
 
 def _arm(pattern: str, path: str) -> str:
-    """Return the name of a bag's arm: the path part at the first wildcard, or the bag's folder."""
+    """Return the arm's name: the path component at the first wildcard, or the bag's folder."""
     wild = [k for k, part in enumerate(pattern.split('/')) if _WILDCARD.search(part)]
     parts = path.rstrip('/').split('/')
     last = len(parts) - 1

@@ -34,7 +34,7 @@ _DASK_SETTINGS = {
 @contextmanager
 def connected(scheduler: str | None, workers: int | None = None) -> Iterator[Client]:
     """
-    Yield a client of a Dask cluster, or of worker processes on this machine.
+    Connect to a Dask cluster, or start worker processes on this machine; yield the client.
 
     Parameters
     ----------
@@ -71,7 +71,7 @@ def connected(scheduler: str | None, workers: int | None = None) -> Iterator[Cli
 
 @contextmanager
 def _local(count: int) -> Iterator[Client]:
-    """Yield a client of worker processes on this machine."""
+    """Start worker processes on this machine; yield their Dask client."""
     before = os.environ.get('PYTHONSAFEPATH', '')
     os.environ['PYTHONSAFEPATH'] = '1'  # workers do not import modules from the current folder
     try:

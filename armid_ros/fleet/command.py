@@ -49,10 +49,10 @@ _alpha = click.option(
 
 
 class _Fleet(click.Group):
-    """Group of the fleet commands, which raises an error if a package is missing."""
+    """Group of the fleet commands; it raises an error if an optional package is missing."""
 
     def invoke(self, ctx: click.Context) -> Any:
-        """Raise a FleetError for missing packages; otherwise run a command of the group."""
+        """Run a command of the group; raise a FleetError if an optional package is missing."""
         missing = [n for n in ('dask', 'distributed', 'fsspec', 'pyarrow') if not find_spec(n)]
         if missing:
             raise FleetError(
@@ -72,7 +72,7 @@ def fleet() -> None:
 
 @contextmanager
 def _results(out: str, doing: str) -> Iterator[tuple[Store, Callable[..., None]]]:
-    """Lock the folder of results during a command; yield its store and a function for progress."""
+    """Lock the results folder during a command; yield the folder and a progress function."""
     from armid_ros.files import result_folder
     from armid_ros.fleet.plan import SCHEMA
     from armid_ros.fleet.store import Store, StoreError
@@ -90,7 +90,7 @@ def _results(out: str, doing: str) -> Iterator[tuple[Store, Callable[..., None]]
 
 
 def _print_shown(lines: Sequence[str], rest: str) -> None:
-    """Print up to eight lines; if there are more, print the name of the file with all lines."""
+    """Print up to eight lines; if there are more, name the file that has all lines."""
     most = 8
     for line in lines[:most]:
         say(line)

@@ -51,7 +51,7 @@ DIAGNOSES = pa.schema(
 
 def cases(found: Watch, arms: Sequence[str] = (), everyone: bool = False) -> list[Case]:
     """
-    Choose the baseline bags and the bags to diagnose for each arm, before and after its change.
+    Choose for each arm the baseline bags (before its change) and the bags to diagnose (after).
 
     Parameters
     ----------
@@ -104,7 +104,7 @@ def diagnose_fleet(
     report: Callable[[int, int], None] = lambda finished, arms: None,
 ) -> list[dict[str, Any]]:
     """
-    Diagnose arms on a cluster, and return a row of ``watch/diagnoses.parquet`` for each arm.
+    Diagnose arms on a cluster; return each arm's row for ``watch/diagnoses.parquet``.
 
     Rows of other arms in the table are kept.
 
@@ -139,7 +139,7 @@ def diagnose_fleet(
 def one_arm(
     case: Case, model: ArmModel, filters: Conditioning, topic: str | None, out: str
 ) -> dict[str, Any]:
-    """Task: identify an arm from baseline bags and diagnose later bags; return the diagnosis."""
+    """Dask task: identify an arm from baseline bags, diagnose later bags, return the diagnosis."""
     store = Store(out)
     try:
         with ExitStack() as stack:

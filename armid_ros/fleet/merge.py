@@ -40,7 +40,7 @@ import numpy as np
 @dataclass(frozen=True)
 class Refused:
     """
-    A bag that is left out of the identification, and the reason.
+    Bag that is left out of the identification of its arm, and the reason.
 
     Attributes
     ----------
@@ -61,7 +61,7 @@ class Refused:
 @dataclass(frozen=True, eq=False)
 class FleetEstimate:
     """
-    Parameter estimate from one bag, or from all bags of an arm.
+    Parameter estimate of an arm, from one bag or from all its bags.
 
     Attributes
     ----------
@@ -89,7 +89,7 @@ class FleetEstimate:
 @dataclass(frozen=True, eq=False)
 class FleetFit:
     """
-    Least-squares fit of parameters, without their standard deviations.
+    Parameters fitted by least squares, before their standard deviations are known.
 
     Attributes
     ----------
@@ -108,7 +108,7 @@ class FleetFit:
 
     @classmethod
     def of(cls, normal: NormalEquations, job: Job) -> FleetFit | None:
-        """Fit parameters to normal equations; return None if the equations are of too few rows."""
+        """Fit parameters to normal equations; return None if these contain too few samples."""
         base, kept = identifiable_base(job.theory, normal)
         if normal.counts.sum() < 2 * base.rank:
             return None
@@ -117,7 +117,7 @@ class FleetFit:
         return cls(base, tuple(kept), replace(fit, values=values))
 
     def noise(self, rows: Iterable[Regression]) -> FloatArray:
-        """Return the covariance (r, r) of the noise in the normal equations of given rows."""
+        """Return the noise covariance (r, r) of the normal equations of the given rows."""
         products = np.zeros((len(self.kept), len(self.kept)))
         for part in rows:
             some = part.restrict(self.kept)
@@ -127,7 +127,7 @@ class FleetFit:
         return products
 
     def estimate(self, normal: NormalEquations, noise: FloatArray) -> FleetEstimate:
-        """Return the estimate, with standard deviations computed from a noise covariance."""
+        """Return the estimate with standard deviations, from the covariance of the noise."""
         some, inverse = normal.restrict(self.kept), self.fit.inverse
         return FleetEstimate(
             self.base.parameters,
@@ -167,7 +167,7 @@ class MergedBags:
 
     @classmethod
     def of(cls, bags: Sequence[BagSummary | Refused]) -> MergedBags:
-        """Return the sum of the normal equations of bags, with a list of the refused bags."""
+        """Return the sum of the normal equations of bags, and the list of refused bags."""
         used = [one for one in bags if isinstance(one, BagSummary)]
         parts = [
             cls(one.normal, one.seconds, ((one.bag.url, one.bag.version),), not one.computed)
@@ -228,7 +228,7 @@ class BagSummary:
     rows: tuple[Regression, ...] | None = None
 
     def rows_again(self, job: Job) -> Iterator[Regression]:
-        """Yield the regression rows of the bag from memory, or read the bag again."""
+        """Yield the regression rows of the bag, from memory if kept, else from the file."""
         if self.rows is not None:
             yield from self.rows
             return
@@ -239,7 +239,7 @@ class BagSummary:
 
 def prepare(bag: BagFile, job: Job, bags_of_arm: int = 1) -> BagSummary | Refused:
     """
-    Read a bag and compress it to normal equations; return a `Refused` if it cannot be used.
+    Read a bag and compress it to normal equations; return a `Refused` if this is impossible.
 
     Parameters
     ----------
@@ -267,7 +267,7 @@ def prepare(bag: BagFile, job: Job, bags_of_arm: int = 1) -> BagSummary | Refuse
 
 
 def pieces(path: str, job: Job) -> Iterator[tuple[Recording, Sequence[Regression]]]:
-    """Yield successive pieces of a bag, each with its regression rows."""
+    """Read a bag in successive pieces; yield each piece with its regression rows."""
     yield from streamed(
         path,
         job.arm,

@@ -148,7 +148,7 @@ def _arm_page(found: Watch, arm: WatchedArm, diagnoses: Diagnoses) -> str:
 
 
 def _step(arm: WatchedArm, is_diagnosed: bool, fault: str) -> str:
-    """Return the next step for the user on the page of an arm."""
+    """Return the advice for the user on the page of an arm."""
     if not (arm.named or fault):
         first = 'Record more' if arm.health == 'too few bags' else 'After the next'
         return f'{first} recordings, run armid fleet identify and armid fleet watch again.'
@@ -198,7 +198,7 @@ def _verdict(found: Watch, diagnoses: Diagnoses) -> VerdictSection:
 
 
 def _diagnosed(arm: WatchedArm, diagnosis: Mapping[str, Any] | None) -> str:
-    """Return the verdict if a diagnosis found a fault in an arm without change; else empty."""
+    """Return the verdict on an arm without change in which a diagnosis found a fault."""
     if arm.named or diagnosis is None or diagnosis['verdict'] in ('consistent', 'failed'):
         return ''
     return str(diagnosis['verdict']).replace('_', ' ')
@@ -303,7 +303,7 @@ def _drawing(
     links: Sequence[str] = (),
     title: str = '',
 ) -> tuple[Markup, tuple[float, float]]:
-    """Draw values over time as a line, or as points with links; return SVG and ordinate range."""
+    """Draw values over time as a line, or as points with links; return SVG and range of values."""
     # [px]; a large curve has intervals
     (width, height), wide = ((250, 74), HALF_WIDTH) if links else ((84, 20), 0.0)
     low, high = float(np.min(values - wide * std)), float(np.max(values + wide * std))

@@ -79,7 +79,7 @@ class FleetSettings:
 
 def filters_at(filters: Conditioning, rate_hz: float, source: str) -> Conditioning:
     """
-    Adapt the filters of a kind of arm to the sampling rate of a recording.
+    Adapt the filters, chosen for a kind of arm, to the sampling rate of a recording.
 
     Raises
     ------
@@ -102,7 +102,7 @@ def filters_at(filters: Conditioning, rate_hz: float, source: str) -> Conditioni
 @dataclass(frozen=True)
 class Job:
     """
-    Model, filters and settings for bags of one kind of arm.
+    Arm model, filters and settings with which bags of one kind of arm are identified.
 
     Attributes
     ----------
@@ -130,7 +130,7 @@ class Job:
 
     @cached_property
     def facts(self) -> dict[str, Any]:
-        """Return the settings that determine a bag's results, as fleet.json contains them."""
+        """Return the settings that determine a bag's results, in the form of fleet.json."""
         robot, effects = self.arm.robot, self.arm.effects
         return {
             'robot': robot.name,
@@ -147,13 +147,13 @@ class Job:
 
     @cached_property
     def digest(self) -> str:
-        """Return a hash of the settings and kinematics on which the results of a bag depend."""
+        """Return a hash of the settings and kinematics that determine a bag's results."""
         facts = {**self.facts, 'kinematics': kinematics_digest(self.arm.robot)}
         return digest(json.dumps(facts, sort_keys=True))
 
     @property
     def samples(self) -> int:
-        """Return the number of samples of a bag that are read into memory at once."""
+        """Return how many samples of a bag are read into memory at once."""
         joints = self.arm.robot.n_joints
         rows = 16_000_000 // (joints * self.theory.rank)  # larger columns are read in pieces
         return min(rows * self.filters.decimation, 1_400_000 // joints)
@@ -184,7 +184,7 @@ class Entry:
 
 def read_table(url: str) -> dict[str, Entry]:
     """
-    Read the table of robots: a CSV with columns arm, robot, and optional settings of each arm.
+    Read a CSV file with columns arm and robot, and optional settings of each arm.
 
     Raises
     ------
@@ -223,7 +223,7 @@ def plan_fleet(
     settings: FleetSettings,
 ) -> dict[str, Job]:
     """
-    Plan the job of every arm, and write the plan to fleet.json.
+    Choose robot, filters and settings for every arm, and write them to fleet.json.
 
     Parameters
     ----------
@@ -282,7 +282,7 @@ def plan_fleet(
 
 
 def kind_arm(store: Store, facts: Mapping[str, Any], key: str) -> ArmModel:
-    """Return the arm model for a key of the entry `kinds` in fleet.json."""
+    """Return the arm model of a kind of arm, by its key in the entry `kinds` of fleet.json."""
     urdf = store.read(f'robots/{key}.urdf')
     if urdf is None:
         raise FleetError(
@@ -295,7 +295,7 @@ def kind_arm(store: Store, facts: Mapping[str, Any], key: str) -> ArmModel:
 
 def document(store: Store) -> dict[str, Any]:
     """
-    Return the content of fleet.json; empty if there is no such file.
+    Return the content of fleet.json; empty if the file does not exist.
 
     Raises
     ------

@@ -128,7 +128,7 @@ def write_summary(store: Store, summary: BagSummary, job: Job) -> None:
 
 def find_summary(store: Store, bag: BagFile, job: Job) -> BagSummary | Refused | None:
     """
-    Return the stored result of a bag; None if there is none for this version and these settings.
+    Return the stored result of a bag; None if it is missing or from other settings.
 
     Results of an earlier run are used only if the job resumes.
 
@@ -155,7 +155,7 @@ def find_summary(store: Store, bag: BagFile, job: Job) -> BagSummary | Refused |
 
 
 def write_refused(store: Store, refused: Refused, job: Job) -> None:
-    """Write to the table `refused` why a bag is left out of the identification."""
+    """Write to the table `refused` that a bag is left out, and why."""
     row = {
         'bag': refused.bag.url,
         'version': refused.bag.version,
@@ -189,7 +189,7 @@ def write_arm(
 
 def arm_is_done(store: Store, arm: str, bags: Sequence[BagFile], job: Job) -> list[Refused] | None:
     """
-    Check whether the stored estimate of an arm is from exactly the given bags.
+    Check whether a stored estimate is from exactly these bags; return the refused ones.
 
     Returns
     -------
@@ -234,6 +234,6 @@ def _estimate(arm: str) -> str:
 
 
 def _days(store: Store, bag: BagFile, data_set: str = 'bags') -> list[str]:
-    """Return the days under which the results contain a file of a given bag."""
+    """Return the days under which the stored results contain a file of the bag."""
     pattern = f'{data_set}/{folder_of(bag.arm)}/day=*/{bag.name}.parquet'
     return [name.split('/')[2].removeprefix('day=') for name in store.names(pattern)]

@@ -77,12 +77,12 @@ class FleetOutcome:
 
     @property
     def done(self) -> int:
-        """Number of bags from which the arms are estimated."""
+        """Number of bags that contribute to the estimates of the arms."""
         return sum(arm.done for arm in self.arms)
 
     @property
     def found(self) -> int:
-        """Number of bags in the estimates of the arms that an earlier run had read already."""
+        """Number of contributing bags that an earlier run had already read."""
         return sum(arm.found for arm in self.arms)
 
     @property
@@ -98,7 +98,7 @@ Fitted = tuple[MergedBags, FleetFit | None]
 
 
 def take(bags: Group, job: Job, bags_of_arm: int) -> tuple[BagSummary | Refused, ...]:
-    """Task: return the summary of each bag; read a bag if the results have no summary of it."""
+    """Dask task: return the summary of each bag; read bags without a stored summary."""
     store, taken = Store(job.out), []
     for bag in bags:
         one = find_summary(store, bag, job)
@@ -113,18 +113,18 @@ def take(bags: Group, job: Job, bags_of_arm: int) -> tuple[BagSummary | Refused,
 
 
 def same(job: Job) -> Job:
-    """Task: return a job, so that Dask keeps it on a worker and can create a lost job again."""
+    """Dask task: return a job unchanged, so that a worker keeps it and Dask can recreate it."""
     return job
 
 
 def fit(groups: Sequence[MergedBags], job: Job) -> Fitted:
-    """Task: sum the normal equations of all groups of an arm, and fit its parameters."""
+    """Dask task: sum the normal equations of all groups of an arm's bags, and fit parameters."""
     merged = MergedBags.together(groups)
     return merged, None if merged.normal is None else FleetFit.of(merged.normal, job)
 
 
 def noise(taken: Sequence[BagSummary | Refused], fitted: Fitted, job: Job) -> FloatArray | None:
-    """Task: compute the covariance of the noise in the normal equations of a group's bags."""
+    """Dask task: compute the noise covariance of the normal equations of a group of bags."""
     known, found = fitted[1], None
     for one in taken:
         if known is not None and isinstance(one, BagSummary):
@@ -136,7 +136,7 @@ def noise(taken: Sequence[BagSummary | Refused], fitted: Fitted, job: Job) -> Fl
 def finish(
     arm: str, fitted: Fitted, products: Sequence[FloatArray | None], job: Job
 ) -> ArmOutcome:
-    """Task: write the estimate of an arm to the results; return the outcome of the arm."""
+    """Dask task: write the estimate of an arm to the results; return the arm's outcome."""
     merged, known = fitted
     problem = ''
     if known is None or merged.normal is None:
@@ -149,7 +149,7 @@ def finish(
 
 def grouped(bags: Sequence[BagFile]) -> tuple[Group, ...]:
     """
-    Divide the bags of an arm into groups for tasks, in order.
+    Divide the bags of an arm into groups, one for each Dask task, in order.
 
     Groups depend on sizes alone, so the order of sums, and so the last digit, is the same on every
     cluster. A bag of unknown size forms a separate group.
@@ -204,7 +204,7 @@ def identify_fleet(
 
 @dataclass(frozen=True)
 class _Waiting:
-    """Arm whose tasks are not submitted yet, with the bags to read and the bags that failed."""
+    """Arm whose Dask tasks are not submitted yet, with bags to read and failed bags."""
 
     arm: str
     groups: tuple[Group, ...]
@@ -214,7 +214,7 @@ class _Waiting:
 
 @dataclass
 class _UnderWay:
-    """Submitted tasks of an arm, in the order of its groups of bags."""
+    """Submitted Dask tasks of an arm, in the order of its groups of bags."""
 
     arm: _Waiting
     prepared: list[Future]
@@ -294,7 +294,7 @@ class _Run:
         return self._jobs[job.digest]
 
     def _submitted(self, arm: _Waiting) -> _UnderWay:
-        """Submit the tasks of an arm: read its bags, fit, compute noise covariances, and write."""
+        """Submit the Dask tasks of an arm: read bags, fit, compute noise covariances, write."""
         job, count = self._job(arm.arm), sum(len(group) for group in arm.groups)
         prepared = []
         for group in arm.groups:
@@ -313,7 +313,7 @@ class _Run:
         return _UnderWay(arm, prepared, fitted, products, last)
 
     def _begin_again(self, tasks: _UnderWay) -> None:
-        """Submit a failed arm again without the bags that caused the failure."""
+        """Submit a failed arm again, without the bags that caused its failure."""
         # A failed group is divided into single bags, to find the bag that fails. Tasks that depend
         # on a failed task fail too, so the noise tasks are checked only if all bags were read. If
         # another bag may have killed the worker, the bag is read once more alone.

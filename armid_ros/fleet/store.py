@@ -22,7 +22,7 @@ from pyarrow import parquet
 
 
 class StoreError(Exception):
-    """A store failed or gave an invalid answer; the operation can be repeated."""
+    """Failed access to a store or invalid answer; the operation can be repeated."""
 
 
 def opened(url: str) -> tuple[Any, str]:
@@ -44,7 +44,7 @@ def opened(url: str) -> tuple[Any, str]:
 @contextmanager
 def fetched(url: str) -> Iterator[str]:
     """
-    Yield a local path of a bag; a remote bag is copied, and the copy is removed at the end.
+    Yield the local path of a bag; a remote bag is copied first, and the copy is deleted later.
 
     Raises
     ------
@@ -133,7 +133,7 @@ class Store:
             filesystem.rm_file(f'{root}/{name}')
 
     def names(self, pattern: str) -> list[str]:
-        """Return the sorted names of the files below the folder that match a pattern."""
+        """Return the sorted names of the files in the folder that match a pattern."""
         filesystem, root = self._place
         found = filesystem.glob(f'{root}/{pattern}')
         return sorted(path[len(root) + 1 :] for path in found)

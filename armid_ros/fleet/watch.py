@@ -132,7 +132,7 @@ class WatchedArm:
         return float(np.median(errors)) if errors else None
 
     def bag_at(self, change: HistoryChange) -> dict[str, Any]:
-        """Return the table row of the bag after a sudden change, or of the last bag of a drift."""
+        """Return the table row of the first bag after a step, or of the last bag of a trend."""
         day = change.series.days[change.index if change.kind == 'step' else -1]
         return min(self.bags, key=lambda row: abs(row['start_ns'] / DAY_NS - day))
 
@@ -157,7 +157,7 @@ class Watch:
 
 def watch_fleet(store: Store, alpha: float = 0.05) -> Watch:
     """
-    Test the parameter estimates of all arms of a fleet for changes over time.
+    Test the parameter estimates of all arms of a fleet for steps and trends over time.
 
     Raises
     ------
@@ -237,7 +237,7 @@ def write_watch(store: Store, found: Watch) -> None:
 
 
 def change_rows(arm: WatchedArm) -> list[dict[str, Any]]:
-    """Return the significant changes of an arm as table rows, the smallest p-value first."""
+    """Return the significant changes of an arm as table rows, sorted by p-value."""
     rows = []
     for change in arm.named:
         series = change.series
@@ -264,7 +264,7 @@ def change_rows(arm: WatchedArm) -> list[dict[str, Any]]:
 
 
 def sentence(change: HistoryChange) -> str:
-    """Describe a change in a sentence: parameter, size with 95 % interval, and date."""
+    """Describe a parameter change in a sentence: name, size with 95 % interval, and date."""
     series = change.series
     what = parameter_label(*series.parameter)
     if series.name == RESIDUAL:
@@ -290,7 +290,7 @@ def sentence(change: HistoryChange) -> str:
 
 
 def day_text(days: float) -> str:
-    """Return a number of days since 1970 as a date, such as 2026-01-31."""
+    """Format a number of days since 1970 as a date, such as 2026-01-31."""
     moment = datetime.datetime.fromtimestamp(86_400.0 * days, datetime.UTC)
     return moment.date().isoformat()
 
@@ -312,7 +312,7 @@ def _table(store: Store, data_set: str) -> pa.Table:
 
 
 def _by_arm(table: pa.Table | None) -> dict[str, list[dict[str, Any]]]:
-    """Return the rows of a table, grouped by the name of the arm."""
+    """Group the rows of a table by the name of the arm."""
     rows: dict[str, list[dict[str, Any]]] = {}
     for row in [] if table is None else table.to_pylist():
         rows.setdefault(str(row['arm']), []).append(row)
@@ -322,7 +322,7 @@ def _by_arm(table: pa.Table | None) -> dict[str, list[dict[str, Any]]]:
 def _series(
     parameters: pa.Table, bags: Mapping[str, list[dict[str, Any]]]
 ) -> list[ParameterHistory]:
-    """Return the history of each parameter and of each joint's log residual, for every arm."""
+    """Return the history of each parameter and of each joint's log residual, for all arms."""
     found = []
     for arm, own in sorted(bags.items()):
         fitted = [row for row in own if row['residual_std']]
