@@ -68,7 +68,7 @@ class _Plant(Structure):
 
 class CompiledLoop:
     """
-    A plant and its controller in the data structures of the compiled kernel.
+    Plant and controller, stored in the data structures of the compiled kernel.
 
     Parameters
     ----------
@@ -177,7 +177,7 @@ class CompiledLoop:
         return advance
 
     def _smooth_effects(self) -> int:
-        """Compute the torque of the smooth effects for the kernel; return 1 after an exception."""
+        """Compute the torque of smooth effects for the kernel; return 1 if this raised, else 0."""
         n = len(self._law_torque)
         t, q, dq = self._law_input[0], self._law_input[1 : n + 1], self._law_input[n + 1 :]
         assert self._torque is not None
@@ -215,7 +215,7 @@ class Trace(NamedTuple):
 def command(
     plant: Plant, controller: Controller, state: State, targets: Motion, row: int
 ) -> FloatArray:
-    """Return controller torque at a sample of the desired motion, within limits, (n,) [N m]."""
+    """Return the controller's torque at one sample of the desired motion, limited, (n,) [N m]."""
     assert targets.tau is not None
     desired = targets.q[row], targets.dq[row], targets.ddq[row]
     q, dq = (state.q, state.dq) if state.rotors is None else plant.motors(state)[:2]

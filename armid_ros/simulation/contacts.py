@@ -44,7 +44,7 @@ def solve_box_complementarity(
     shift: float = REGULARISATION,
 ) -> tuple[FloatArray, Modes]:
     """
-    Solve the complementarity conditions for torques and modes of all friction elements.
+    Solve the complementarity problem for torques and modes of all friction elements.
 
     Parameters
     ----------
@@ -139,7 +139,7 @@ class Contacts:
         return cls(friction.directions, friction.lower, friction.upper, axes, single, loaded)
 
     def with_load(self, load: FloatArray) -> Contacts:
-        """Return the contacts with dry friction under a load (rigid-body torque), (n,) [N m]."""
+        """Return the contacts with the dry friction caused by a rigid-body torque, (n,) [N m]."""
         if self.friction is None:
             return self
         more = self.friction.widening(load)
@@ -153,7 +153,7 @@ class Contacts:
 
 
 def split_constant(friction: DryFriction | None, n_joints: int) -> tuple[DryFriction, FloatArray]:
-    """Return the dry friction elements that can stick, and the constant torque of the others."""
+    """Return the dry friction elements that can stick, and the sum of the constant torques."""
     if friction is None:
         return DryFriction(np.empty((0, n_joints)), np.empty(0), np.empty(0)), np.zeros(n_joints)
     span = friction.upper - friction.lower

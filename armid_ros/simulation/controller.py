@@ -60,14 +60,14 @@ class LinearFeedback:
     _data: pin.Data = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        """Set the rigid body of the inverse dynamics, and the memory for its computation."""
+        """Set the rigid body for the inverse dynamics, and allocate memory for it."""
         body = self.robot if self.weighs else self.robot.with_gravity(np.zeros(3))
         object.__setattr__(self, '_body', body)
         object.__setattr__(self, '_data', body.model.createData())
 
     @classmethod
     def of(cls, arm: ArmModel, **terms: Any) -> LinearFeedback:
-        """Return a feedback law for the rigid body of an arm and the inertia that effects add."""
+        """Return a feedback law for an arm's rigid body, including inertia added by effects."""
         action = arm.action()
         robot = action.robot or arm.robot
         none = np.zeros((robot.n_joints, robot.n_joints))
@@ -153,7 +153,7 @@ class Controller:
 
 class ComputedTorque(Controller):
     """
-    Inverse dynamics of a nominal arm, with feedback on the acceleration.
+    Inverse dynamics of a nominal arm, with feedback that acts on the acceleration.
 
     tau = ID(q, dq, ddq_d + 2 omega (dq_d - dq) + omega^2 (q_d - q)) + friction at dq_d.
     Source: Siciliano et al. 2009, section 8.5.2.
@@ -174,7 +174,7 @@ class ComputedTorque(Controller):
         self.feedback = LinearFeedback.of(arm, bandwidth=bandwidth, follows=True)
 
     def feedforward(self, desired: Motion) -> FloatArray:
-        """Return damping, dry friction and other effect torques along the reference, (N, n)."""
+        """Return the torques of friction and other effects along the reference, shape (N, n)."""
         action = self.arm.action()
         depends = action.dry_friction is not None and action.dry_friction.load_share is not None
         load = self.arm.load(desired) if depends else np.zeros_like(desired.q)
@@ -185,7 +185,7 @@ class ComputedTorque(Controller):
 @dataclass(frozen=True, eq=False)
 class VelocityLoop:
     """
-    Proportional-integral control of the motor velocities, sampled at every step of the plant.
+    Gains of a proportional-integral control of motor velocities, sampled at every step.
 
     tau_k = kp e_k + ki s_k, with e_k = reference - velocity and s_k = s_k-1 + dt e_k.
 
@@ -267,7 +267,7 @@ class MotorControl(Controller):
         return cls(VelocityLoop(gain, gain**2 / (4.0 * inertia)), plant.dt, plant)
 
     def in_initial_state(self) -> MotorControl:
-        """Return a controller with the same velocity loops, and with zero integrals."""
+        """Return a controller with the same velocity loops and zero integrals."""
         return replace(self)
 
     def targets(self, desired: Motion, previous: FloatArray | None = None) -> Motion:

@@ -44,7 +44,7 @@ def two_link_arm(parameters: TwoLinkParameters, robot: Robot | None = None) -> A
 
 
 def two_link_loop(shipped: TwoLinkSet, share: float = 1.0) -> VelocityLoop:
-    """Return the velocity loops of the two-link arm, with their gains times a factor."""
+    """Return the velocity loops of the two-link arm, with gains multiplied by a factor."""
     # units of the gains are V s/rad and V/rad at the motors
     scale = share * shipped.parameters.torque_per_volt * shipped.parameters.gear
     proportional, integral = (
@@ -70,7 +70,7 @@ def shipped_arm(robot: Robot) -> tuple[ArmModel, TwoLinkSet | None]:
 
 def elastic_joints(arm: ArmModel) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """
-    Return the names of elastic joints with rotor inertia, and of those without rotor inertia.
+    Return the names of the elastic joints with rotor inertia, and of those without.
 
     A motor without inertia has no independent motion. The twist of its spring follows the load
     without delay.
@@ -97,7 +97,7 @@ def make_simulated_arm(
     start: npt.ArrayLike | None = None,
 ) -> SimulatedArm:
     """
-    Make a simulated arm; its joints are elastic if they have joint_elasticity and rotor_inertia.
+    Return a simulated arm; joints with elasticity and rotor inertia are simulated as elastic.
 
     Parameters
     ----------
@@ -163,7 +163,7 @@ def multisine(
     rng: np.random.Generator,
 ) -> FloatArray:
     """
-    Return a period of signals: sums of sines at every frequency of a band, with random phases.
+    Return a period of random-phase multisine signals with all frequencies of a band.
 
     Parameters
     ----------
@@ -196,7 +196,7 @@ def multisine_course(
     robot: Robot, duration: float, torque: float, rng: np.random.Generator, clear: Clear
 ) -> Reference:
     """
-    Return a reference of moves between poses, each with an added multisine of torque.
+    Return a random reference: moves between poses, each with a multisine torque added.
 
     Friction keeps its sign during a move. The arm rests between two moves.
 
@@ -255,7 +255,7 @@ def step_course(
     robot: Robot, duration: float, velocity: float, rng: np.random.Generator, clear: Clear
 ) -> Reference:
     """
-    Return a reference of velocity steps from rest, of single joints and of all joints.
+    Return a random reference: velocity steps from rest, of single joints and of all joints.
 
     Parameters
     ----------
@@ -300,7 +300,7 @@ def step_course(
 def _next_pose(
     robot: Robot, here: FloatArray, rng: np.random.Generator, clear: Clear, beyond: FloatArray
 ) -> FloatArray:
-    """Draw a pose that a free straight line reaches and that leaves room for a given step."""
+    """Draw a pose that is reached in a free straight line, with room for a step beyond it."""
     middle = robot.middle_pose
     reach, tries = np.pi / 3.0, 1000  # largest distance from the middle [rad or m]; drawn poses
     lower = np.maximum(robot.lower, middle - reach)

@@ -29,7 +29,7 @@ from scipy.linalg.lapack import dgesv, dposv
 
 def step(plant: Plant, state: State, torque: FloatArray) -> State:
     """
-    Integrate the plant over one step under a constant actuator torque.
+    Integrate the plant over one time step with constant motor torque; return the new state.
 
     Parameters
     ----------
@@ -83,7 +83,7 @@ def _end_velocity(
     dq: FloatArray,
     modes: Modes,
 ) -> tuple[FloatArray, FloatArray, Modes]:
-    """Return velocity and acceleration at the end of a time step, and modes of the contacts."""
+    """Return velocity, acceleration and contact modes at the end of a time step."""
     dt, directions = plant.dt, contacts.directions
     right = np.empty((1 + len(directions), len(force)))
     right[0], right[1:] = force, directions
@@ -122,7 +122,7 @@ def _stop(
     q_next: FloatArray,
     load: FloatArray | None,
 ) -> tuple[FloatArray, FloatArray, FloatArray, Modes]:
-    """Repeat a time step with contacts at the joint stops that were hit; return its result."""
+    """Repeat a time step in which joints hit their stops, with contacts at these stops."""
     robot, count = plant.robot, len(state.modes)
     at_upper, at_lower = q_next > robot.upper, q_next < robot.lower
     while True:
@@ -141,7 +141,7 @@ def _stop(
 def spring_substep(
     plant: Plant, springs: ElasticJoints, rotors: Rotors, state: State, torque: FloatArray
 ) -> State:
-    """Integrate a plant with elastic joints over one substep under a constant motor torque."""
+    """Integrate elastic joints over one substep with constant motor torque; return the state."""
     dt, e = springs.dt, len(springs.joints)
     half = 0.5 * dt
     x = np.concatenate([rotors.twist, rotors.dq, state.dq])
@@ -180,7 +180,7 @@ def spring_substep(
 
 
 def _propagated(springs: ElasticJoints, rates: FloatArray, x: FloatArray) -> FloatArray:
-    """Return spring twists and velocities after a substep, with changes per friction torque."""
+    """Return spring twists and velocities after a substep, and derivatives by friction torque."""
     e, size = len(springs.joints), len(x)
     z = np.zeros((size, size))
     z[:e, e:] = springs.to_twists
@@ -203,7 +203,7 @@ def _force(
     v: FloatArray,
     twist: FloatArray,
 ) -> tuple[FloatArray, FloatArray]:
-    """Return the torques on motors and links at mid-substep, and the new hysteresis states."""
+    """Return torques on motors and links in mid-substep, and the new hysteresis states."""
     robot, action, e = plant.robot, plant.action, len(springs.joints)
     t = state.t + 0.5 * springs.dt
     motor_speed = springs.to_motors.dot(v)
@@ -234,7 +234,7 @@ def _hold(
     modes: Modes,
     moved: FloatArray,
 ) -> None:
-    """Set velocity and motion of sticking motors to exactly zero, without rounding errors."""
+    """Set velocity and motion of sticking motors to exactly zero."""
     e = len(springs.joints)
     for axis, mode in zip(plant.contacts.axes, modes, strict=True):
         if mode != 0 or axis < 0:

@@ -39,7 +39,7 @@ def require_masses(robot: Robot) -> None:
 
 def possible_loads(robot: Robot, values: FloatArray) -> bool:
     """
-    Return whether the inertial parameters of loads are those of possible bodies within reach.
+    Return whether loads have physically possible inertial parameters, near the arm.
 
     Parameters
     ----------
@@ -61,7 +61,7 @@ def possible_loads(robot: Robot, values: FloatArray) -> bool:
 
 def require_any_mass(robot: Robot) -> None:
     """
-    Raise a ModelError if no link of a robot has a mass, as its torque is then always zero.
+    Raise a ModelError if no link of a robot has mass: all its torques would be zero.
 
     Raises
     ------
@@ -78,7 +78,7 @@ def require_any_mass(robot: Robot) -> None:
 
 
 def inertia_error(robot: Robot) -> ModelError:
-    """Return the exception for an inertia matrix that is not positive definite."""
+    """Return the error for an inertia matrix that is not positive definite."""
     odd = [
         f"'{name}' ({values[0]:g} kg)"
         for name, values in zip(
@@ -146,7 +146,7 @@ class State(NamedTuple):
 
 class Plant:
     """
-    An arm model prepared for the integration of its motion.
+    Arm model, prepared for the simulation of its motion.
 
     The motor and the link of a rigid joint have the same velocity. If elasticity is given, motor
     and link of joints with joint_elasticity and rotor_inertia have different velocities. Otherwise
@@ -304,7 +304,7 @@ class Plant:
     def subtract_smooth_effects(
         self, force: FloatArray, t: float, q: FloatArray, dq: FloatArray, memory: FloatArray
     ) -> None:
-        """Subtract the torques of all smooth effects from the motor torques, (n,) [N m]."""
+        """Subtract the torques of all smooth effects from motor torques (n,) in place [N m]."""
         if self.constant is not None:
             force -= self.constant
         if self.torque is not None:
@@ -339,7 +339,7 @@ class Plant:
 
 
 def _damping_weight(robot: Robot, inertia: FloatArray, damping: FloatArray, dt: float) -> float:
-    """Return the weight of the velocity after a step in the mean damping torque of the step."""
+    """Return the weight of the end velocity, 0.5 to 1, in the damping torque of a step."""
     # 1/2 (second order) for weak damping, 1 (no overshoot) for stiff damping. In between, the
     # value for which the fastest decay rate of the arm is exact (Liniger and Willoughby 1970)
     try:

@@ -49,7 +49,7 @@ class Sensors:
     _step: FloatArray | None = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        """Raise a ModelError if a value is negative; set noise flag and encoder steps."""
+        """Raise a ModelError for invalid values; precompute noise flag and encoder steps."""
         noises = ('torque_noise', 'position_noise', 'velocity_noise', 'acceleration_noise')
         for setting in (*noises, 'resolution'):
             value = np.asarray(getattr(self, setting), dtype=float)
@@ -102,7 +102,7 @@ def readings(
     action: Action, truth: Motion, commanded: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """
-    Return the sensor readings without noise for a true motion and torque.
+    Return the sensor readings of a true motion and torque, before noise is added.
 
     Parameters
     ----------
@@ -131,7 +131,7 @@ def readings(
 
 class RecentPast:
     """
-    The latest true samples of an arm, on which late or filtered readings depend.
+    Latest true samples of an arm, from which delayed or filtered readings are computed.
 
     Parameters
     ----------
@@ -159,7 +159,7 @@ class RecentPast:
 
     def extend(self, trace: Trace) -> None:
         """
-        Add the samples of a simulated trace.
+        Append the samples of a simulated trace.
 
         Torque is constant over a step. With rigid joints, the reading between two steps is the
         mean of their torques, because the acceleration jumps with the torque. With elastic joints,

@@ -149,17 +149,17 @@ class SimulatedArm:
 
     @property
     def steps(self) -> int:
-        """Time of the arm as a number of plant steps."""
+        """Time since the start, as a number of simulation steps."""
         return self._state.steps - self._ahead
 
     @property
     def t(self) -> float:
-        """Time of the arm since its start [s]."""
+        """Time since the start [s]."""
         return self.steps * self.plant.dt
 
     @property
     def ends_at(self) -> float:
-        """Time at which the present trajectory ends, or has ended [s]."""
+        """Time at which the present trajectory ends, or ended [s]."""
         return self._begun * self.plant.dt + self._reference.duration
 
     def reset(self, steps: int = 0) -> None:
@@ -217,7 +217,7 @@ class SimulatedArm:
 
     def successor(self, arm: ArmModel) -> Plant:
         """
-        Return the plant that simulates another arm model in place of the present arm model.
+        Return the plant of a new arm model, after a check that it can replace the present one.
 
         Raises
         ------
@@ -301,7 +301,7 @@ class SimulatedArm:
             yield trace
 
     def _take(self, steps: int) -> Trace:
-        """Simulate steps, at most to the end of the computed targets, and return their trace."""
+        """Simulate steps, at most up to the last computed target; return their trace."""
         row = self._row + 1
         if row >= len(self._targets):
             self._look_ahead(self._targets.q[-1])
@@ -314,7 +314,7 @@ class SimulatedArm:
         return trace
 
     def _end_block(self) -> None:
-        """Compute the present state: repeat the steps of the simulated block up to the present."""
+        """Discard steps simulated ahead of time; compute the state at the present time."""
         if self._ahead <= 0:
             return
         (state, torque), present = self._block_start, self.steps
@@ -375,16 +375,16 @@ class SimulatedArm:
 
     @property
     def _row(self) -> int:
-        """Index of the present step in the targets of the controller."""
+        """Row of the present step in the controller's targets."""
         return self._state.steps - self._first
 
     def _look_ahead(self, commanded: FloatArray | None = None, steps: int = 1000) -> None:
-        """Set the controller targets of the next steps, from the last commanded motor position."""
+        """Compute the controller's targets for the next steps from the last commanded position."""
         self._first = self._state.steps
         self._targets = self.controller.targets(self._desired(steps + 1), commanded)
 
     def _desired(self, count: int) -> Motion:
-        """Return the desired motion at successive steps from the present step on."""
+        """Return the desired motion at the present and the following time steps."""
         first, times = self._state.steps, self.plant.times
         motion = self._reference.sample(times(first - self._begun, count))
         return replace(motion, t=times(first, count))

@@ -46,7 +46,7 @@ class Elasticity:
 @dataclass(frozen=True, eq=False)
 class ElasticJoints:
     """
-    The e elastic joints of an arm; velocity vectors contain e motors, then n links.
+    The e elastic joints of an arm; velocity vectors contain e motors and then n links.
 
     Attributes
     ----------
@@ -86,7 +86,7 @@ class ElasticJoints:
 
     @cached_property
     def pull(self) -> FloatArray:
-        """Matrix from twists and velocities to spring and damper torques, (e + n, e + e + n)."""
+        """Matrix that maps twists and velocities to spring torques, (e + n, e + e + n)."""
         return self._pull_of(self.transmission.stiffness, self.transmission.damping)
 
     @cached_property
@@ -156,12 +156,12 @@ class ElasticJoints:
         )
 
     def _pull_of(self, stiffness: FloatArray, damping: FloatArray) -> FloatArray:
-        """Return the matrix from twists and velocities to torques, (e + n, e + e + n)."""
+        """Return the matrix that maps twists and velocities to torques, (e + n, e + e + n)."""
         w = self.to_twists
         return np.hstack([-w.T * stiffness, -self.damping - (w.T * damping) @ w])
 
     def meshing(self, twist: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return the `pull` of engaged springs, and the torque offset due to backlash, (e,)."""
+        """Return `pull` for springs out of their backlash, and backlash torque offsets (e,)."""
         springs = self.transmission
         meshes = np.abs(twist) > springs.gap
         stiffness = np.where(meshes, springs.stiffness, 0.0)
@@ -174,12 +174,12 @@ class ElasticJoints:
         return np.asarray(push / springs.stiffness + np.sign(push) * springs.gap)
 
     def at_motors(self, links: FloatArray, twist: FloatArray) -> FloatArray:
-        """Return the motor positions from link positions and twists, (..., n)."""
+        """Return motor positions (..., n) from link positions and spring twists."""
         return np.asarray(links + twist.dot(self.to_motors[:, : len(self.joints)].T))
 
 
 def _required_springs(robot: Robot, action: Action) -> Transmission:
-    """Return the springs of an arm; raise a ModelError if they cannot be simulated."""
+    """Return the springs of an arm; raise a ModelError if the simulation cannot use them."""
     springs = action.transmission
     if springs is None or not np.any(np.isfinite(springs.stiffness)):
         raise ModelError(

@@ -12,7 +12,7 @@ import numpy as np
 
 def temperature_course(text: str, n_joints: int, duration: float) -> Temperatures:
     """
-    Return the joint temperatures of a run from a text START:END:TIME_CONSTANT.
+    Return joint temperatures over a run, from a text START:END:TIME_CONSTANT.
 
     Parameters
     ----------
@@ -48,6 +48,6 @@ def temperature_course(text: str, n_joints: int, duration: float) -> Temperature
 
 
 def at_temperature(arm: ArmModel, course: Temperatures) -> ArmModel:
-    """Return an arm model whose effects follow given joint temperatures in a simulation."""
+    """Return an arm model whose effects follow the given joint temperatures."""
     still = np.zeros_like(course.values)
     return arm.along(Motion(arm.robot.joints, course.t, still, still, still, temperature=course))
