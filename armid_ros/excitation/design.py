@@ -28,7 +28,7 @@ Progress = Callable[[float, float], None]
 @dataclass(frozen=True)
 class Design:
     """
-    A designed excitation, with the predicted information of its recording on the parameters.
+    Designed excitation, and the information on parameters that its recording would give.
 
     Attributes
     ----------
@@ -63,13 +63,13 @@ class Design:
     stopped: str = ''
 
     def robot_limits_used(self, arm: ArmModel) -> dict[str, FloatArray]:
-        """Return the share of each limit of the robot that the excitation uses at its peak."""
+        """Return the peak of the excitation relative to each limit of the robot, by quantity."""
         full = Limits.of(arm.robot, speed=1.0, reserve=False)
         return replace(self, limits=full).limits_used(arm)
 
     def limits_used(self, arm: ArmModel) -> dict[str, FloatArray]:
         """
-        Return the share of each limit of the design that the excitation uses at its peak.
+        Return the peak of the excitation relative to each limit of the design, by quantity.
 
         Transfers to and from the excitation do not count.
 
@@ -180,7 +180,7 @@ def with_run_in(problem: DesignProblem, trajectory: FourierTrajectory) -> Excita
     settings, limits = problem.settings, problem.limits
 
     def effort(run: Excitation) -> float:
-        """Return the largest share of a velocity or acceleration limit that the run-in uses."""
+        """Return the largest ratio of velocity or acceleration to its limit in the run-in."""
         path = run.at(np.linspace(0.0, run.run_in, 40))
         velocity = np.abs(path.dq) / limits.velocity
         acceleration = np.abs(path.ddq) / limits.acceleration
@@ -214,7 +214,7 @@ def evaluate(
     stopped: str = '',
 ) -> Design:
     """
-    Return a given excitation or trajectory as a design, with its information and cost.
+    Compute information and cost of a given excitation or trajectory; return a `Design`.
 
     Parameters
     ----------

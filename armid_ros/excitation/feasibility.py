@@ -27,7 +27,7 @@ _CHECK_SAMPLES = 200
 
 
 class Faults(tuple[Violation | Approach, ...]):
-    """Faults of a trajectory: exceeded limits, and pairs of bodies closer than the clearance."""
+    """Faults of a trajectory: exceeded limits, and pairs of bodies that come too close."""
 
     __slots__ = ()
 
@@ -43,7 +43,7 @@ def trajectory_faults(
     clearance: ClearanceModel | None,
 ) -> Faults:
     """
-    Return the limits that a periodic trajectory exceeds, and two bodies closer than the clearance.
+    Return the limits that a periodic trajectory exceeds, and bodies that come too close.
 
     Parameters
     ----------
@@ -93,7 +93,7 @@ def _violations(arm: ArmModel, limits: Limits, motion: Motion) -> tuple[Violatio
 
 
 def _outward(values: FloatArray) -> FloatArray:
-    """Return signals moved away from their mean by a bound on their peaks between samples."""
+    """Move signals away from their mean by a bound on their peaks between samples."""
     # the bound is h^2 M / 8 for second derivatives below M, estimated from second differences.
     # Nothing is added where dry friction makes the second differences jump
     bend = np.zeros_like(values)
@@ -118,7 +118,7 @@ def random_feasible(
     clearance: ClearanceModel | None = None,
 ) -> FourierTrajectory:
     """
-    Draw a random trajectory that keeps all limits and the clearance, also between samples.
+    Draw a random trajectory that obeys all limits and the clearance, even between samples.
 
     The coefficients are normally distributed, with equal position amplitudes in all harmonics.
     Each joint moves about a random centre, with a random share of the largest amplitude that its
@@ -169,7 +169,7 @@ def feasible_pose(
     clearance: ClearanceModel | None,
 ) -> FloatArray:
     """
-    Return the pose with the largest clearance among random poses within torque limits.
+    Draw random poses within torque limits; return the pose with the largest clearance.
 
     Raises
     ------
@@ -241,7 +241,7 @@ def _shrunk(
     clearance: ClearanceModel | None,
     shrinks: int,
 ) -> FourierTrajectory | None:
-    """Return a trajectory with amplitudes reduced until feasible; None if this fails."""
+    """Reduce the amplitudes of a trajectory until it is feasible; return None if this fails."""
 
     def clear(q: FloatArray) -> bool:
         if clearance is None:
@@ -265,7 +265,7 @@ CLEARANCE = 0.01
 @dataclass(frozen=True)
 class Template:
     """
-    Settings for random motions of joints, at a share of velocity and acceleration limits.
+    Settings for random motions of chosen joints at a share of the dynamic limits.
 
     Attributes
     ----------
@@ -298,7 +298,7 @@ class Template:
         self, arm: ArmModel, clearance: ClearanceModel, rng: np.random.Generator
     ) -> FourierTrajectory:
         """
-        Draw a random trajectory of the template that keeps all limits and the clearance.
+        Draw a random trajectory from the template that obeys all limits and the clearance.
 
         Raises
         ------
@@ -335,7 +335,7 @@ _WHOLE_ARM = (
 
 
 def templates(joints: Sequence[str]) -> tuple[Template, ...]:
-    """Return templates of motions to identify effects: of the whole arm, and of given joints."""
+    """Return templates of motions that reveal effects: of the whole arm, and of given joints."""
     chosen = list(_WHOLE_ARM)
     if joints:
         names, alone = ', '.join(joints), tuple(joints)

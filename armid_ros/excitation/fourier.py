@@ -81,7 +81,7 @@ class FourierTrajectory:
 
     @classmethod
     def of(cls, joints: tuple[str, ...], period: float, x: FloatArray) -> FourierTrajectory:
-        """Return the trajectory of a coefficient matrix x = (q0, a, b), shape (n, 1 + 2 H)."""
+        """Return the trajectory with coefficient matrix x = (q0, a, b), shape (n, 1 + 2 H)."""
         middle = (x.shape[1] + 1) // 2
         return cls(joints, period, x[:, 0], x[:, 1:middle], x[:, middle:])
 
@@ -134,12 +134,12 @@ class FourierTrajectory:
         return self.motion(np.arange(n_samples) * (self.period / n_samples))
 
     def with_margins(self, n_samples: int) -> Motion:
-        """Return samples of a period, with `MARGIN` more samples before and after the period."""
+        """Return samples of a period, with `MARGIN` more samples before and after it."""
         step = self.period / n_samples
         return self.motion(np.arange(-MARGIN, n_samples + MARGIN) * step)
 
     def shifted(self, time: float) -> FourierTrajectory:
-        """Return the same periodic motion, begun later in its period by a given time [s]."""
+        """Return the same periodic motion that starts later in its period, by a time [s]."""
         angle = self.angular_frequency * time * np.arange(1, self.harmonics + 1)
         cosine, sine = np.cos(angle), np.sin(angle)
         a = self.a * cosine + self.b * sine
@@ -151,7 +151,7 @@ class FourierTrajectory:
         return replace(self, a=self.a * factors, b=self.b * factors)
 
     def stretched(self, period: float) -> FourierTrajectory:
-        """Return the trajectory along the same path with another period [s]."""
+        """Return the trajectory along the same path, with another period [s]."""
         ratio = self.period / period
         return replace(self, period=period, a=self.a * ratio, b=self.b * ratio)
 

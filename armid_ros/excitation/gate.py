@@ -21,7 +21,7 @@ import numpy as np
 @dataclass(frozen=True)
 class MotionGate:
     """
-    Safety check of every motion before it is sent to the arm during a run.
+    Safety check that each motion passes before it is sent to the arm in a run.
 
     Attributes
     ----------
@@ -44,7 +44,7 @@ class MotionGate:
     @classmethod
     def of(cls, run: Run, planner: TransferPlanner) -> MotionGate:
         """
-        Check all samples of a planned run, and return the gate for motions sent during the run.
+        Check all samples of a planned run; return the gate for later motions of the run.
 
         Parameters
         ----------
@@ -162,7 +162,7 @@ class MotionGate:
 
     def overload(self, effort: FloatArray, factor: float) -> str:
         """
-        Return a message that names a joint with too large an effort; empty if there is none.
+        Return a message on a joint whose effort is too large; empty if there is none.
 
         Parameters
         ----------
@@ -183,7 +183,7 @@ class MotionGate:
         )
 
     def _time_of(self, step: FloatArray, speed: FloatArray) -> float:
-        """Return the time [s] that moving joints need for a small step within their limits."""
+        """Return the time [s] that joints need for a small step within their limits."""
         velocity = np.where(np.isfinite(self.limits.velocity), self.limits.velocity, SLOW_VELOCITY)
         stopping = speed / self.limits.acceleration
         slowest = stopping + np.sqrt(stopping**2 + step / self.limits.acceleration)
@@ -233,7 +233,7 @@ class Ending:
     def stopped_again(
         self, monitor: PoseMonitor, now: float, tolerance: float, duration: float
     ) -> Motion | None:
-        """Return another stop motion if the arm still moves along its path; otherwise None."""
+        """Return a further stop motion if the arm still moves along its path; otherwise None."""
         phase = now - self.begun
         if self.last is None or now - self.sent < self.last.t[-1]:
             return None
@@ -253,7 +253,7 @@ class Ending:
         duration: float,
     ) -> tuple[Ending | None, Motion | None, str]:
         """
-        Return the next supervision state, a motion to send, and a message to report.
+        Return the next state of supervision, a motion to send, and a message to report.
 
         Parameters
         ----------

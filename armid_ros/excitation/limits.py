@@ -89,7 +89,7 @@ class Limits:
         reserve: bool = True,
     ) -> Limits:
         """
-        Return the limits of a robot for a speed class such as 'slow', by default with a reserve.
+        Return the limits of a robot at a speed such as 'slow', by default with a reserve.
 
         Parameters
         ----------
@@ -151,7 +151,7 @@ class Limits:
 
 
 def has_velocity_limit(robot: Robot) -> npt.NDArray[np.bool_]:
-    """Return the mask of joints with a finite, positive velocity limit."""
+    """Return a mask of the joints with a finite, positive velocity limit, shape (n,)."""
     return np.isfinite(robot.velocity_limit) & (robot.velocity_limit > 0.0)
 
 
@@ -309,7 +309,7 @@ def with_joint_limits(
 
 
 def with_acceleration_limit(robot: Robot, limit: FloatArray) -> Robot:
-    """Return a robot with given, lower acceleration limits, shape (n,) [rad/s^2 or m/s^2]."""
+    """Return a robot whose acceleration limits are lowered to `limit`, (n,) [rad/s^2 or m/s^2]."""
     limit = np.nan_to_num(limit, nan=np.inf)
     _require_narrower(robot, 'acceleration', limit, robot.acceleration_limit)
     return replace(robot, acceleration_limit=np.minimum(limit, robot.acceleration_limit))

@@ -34,7 +34,7 @@ class _State(NamedTuple):
 
 @dataclass
 class _Source:
-    """Sender of joint states: the joints that it sends, their limits and their recent states."""
+    """Sender of joint states: its joints, their limits and its recent messages."""
 
     columns: npt.NDArray[np.int_]
     joints: list[int]
@@ -171,7 +171,7 @@ class PoseMonitor:
         return self._sources[names]
 
     def contradiction(self, now: float, count: int = MIN_AGREEING) -> str:
-        """Return the last reason for rejection if many occurred within 0.5 s; otherwise empty."""
+        """Return the last reason for rejection if there were many in 0.5 s; otherwise empty."""
         recent = [
             fault for arrived, fault in self._rejections if now - arrived <= _REJECTION_WINDOW
         ]
@@ -193,7 +193,7 @@ class PoseMonitor:
 
     def unsteady(self, span: float, count: int = MIN_AGREEING) -> str | None:
         """
-        Return a message that names a moving joint; empty if the arm is at rest.
+        Return a message on a joint that moves; empty if the arm is at rest, None if unknown.
 
         Parameters
         ----------
@@ -244,7 +244,7 @@ class PoseMonitor:
         )
 
     def _unreachable(self, source: _Source, state: _State, last: _State) -> str:
-        """Return a message if a new position is too far from the last, or its stamp is too old."""
+        """Return a message if a new position is too far from the last, or its stamp too old."""
         if state.stamp_ns and state.stamp_ns <= last.stamp_ns:
             back = (last.stamp_ns - state.stamp_ns) * 1e-9
             return (

@@ -132,7 +132,7 @@ class DesignSettings:
 
 def whole_period(duration: float, n_periods: int, run_in: float, rate: float) -> float:
     """
-    Return the period [s], a whole number of samples, for an excitation of given duration.
+    Return the period [s] of an excitation of given duration, as a multiple of the sample time.
 
     Parameters
     ----------
@@ -164,7 +164,7 @@ def whole_period(duration: float, n_periods: int, run_in: float, rate: float) ->
 @dataclass(frozen=True)
 class DesignProblem:
     """
-    Design problem of an excitation: arm, limits, parameters to identify, noise and cost.
+    Optimisation problem of an excitation: arm, limits, parameters, noise and cost.
 
     Attributes
     ----------
@@ -202,7 +202,7 @@ class DesignProblem:
         rival: ArmModel | None = None,
     ) -> DesignProblem:
         """
-        Return the design problem of an arm: limits, noise, base parameters and criterion.
+        Return the optimisation problem for an arm: limits, noise, parameters and criterion.
 
         Raises
         ------
@@ -263,12 +263,12 @@ class DesignProblem:
             )
 
     def columns(self, motion: Motion) -> FloatArray:
-        """Return the regressor of a motion, with rows divided by their torque noise, (N n, P)."""
+        """Return the regressor of a motion, divided by the torque noise, shape (N n, P)."""
         columns = _target_columns(self.arm, self.settings.target, motion)
         return (columns / self.noise[:, np.newaxis]).reshape(-1, columns.shape[-1])
 
     def recorded(self, trajectory: FourierTrajectory, n_periods: int) -> Information:
-        """Return the information on the base parameters in a recording of n_periods periods."""
+        """Return the information on base parameters from n_periods recorded periods."""
         # six times as many samples as in the search
         count, margin = 6 * self.settings.samples, MARGIN * trajectory.n_joints
         columns = self.columns(trajectory.with_margins(count))[margin:-margin]
@@ -277,7 +277,7 @@ class DesignProblem:
 
     def information(self, motion: Motion, n_recorded: float | None = None) -> Information:
         """
-        Return the information of a motion on the base parameters.
+        Return the information that a motion gives on the base parameters.
 
         Parameters
         ----------
@@ -296,7 +296,7 @@ class DesignProblem:
 
 
 def _target_columns(arm: ArmModel, target: str, motion: Motion) -> FloatArray:
-    """Return the regressor, (N, n, P); columns outside the design target are zero."""
+    """Return the regressor (N, n, P) with zero columns for parameters outside the target."""
     effects = arm.effect_columns(motion)
     if target == 'effects':
         rigid = np.zeros((*motion.q.shape, len(arm.robot.rigid_parameters)))
@@ -330,7 +330,7 @@ def torque_noise(arm: ArmModel, settings: DesignSettings) -> FloatArray:
 
 
 def _joined(arm: ArmModel, rival: ArmModel) -> ArmModel:
-    """Return the rival model, extended by the effects that only the arm has."""
+    """Return the rival model with the effects added that only the arm has."""
     known = {(effect.name, effect.joints) for effect in rival.effects}
     joined = replace(rival, robot=arm.robot)
     for effect, values in zip(arm.effects, arm.values, strict=True):
@@ -340,7 +340,7 @@ def _joined(arm: ArmModel, rival: ArmModel) -> ArmModel:
 
 
 def parameter_mask(arm: ArmModel, names: Collection[str]) -> npt.NDArray[np.bool_]:
-    """Return a mask of the P parameters, True for those of the named effects."""
+    """Return a mask (P,) that is True for the parameters of the named effects."""
     rigid = np.zeros(len(arm.robot.rigid_parameters), dtype=bool)
     named = [np.full(len(e.parameters(arm.robot)), e.name in names) for e in arm.effects]
     return np.concatenate([rigid, *named])

@@ -22,7 +22,7 @@ import numpy.typing as npt
 @dataclass(frozen=True)
 class Run:
     """
-    An excitation, with a path from the start pose to it and a path back to the start pose.
+    Excitation with an approach from the start pose and a return to it.
 
     Attributes
     ----------
@@ -43,7 +43,7 @@ class Run:
     rate: float
 
     def __post_init__(self) -> None:
-        """Check that approach and return meet the excitation; round durations up to samples."""
+        """Check that approach and return join the excitation; round durations up to samples."""
         ends = self.excitation.at([0.0, self.excitation.duration]).q
         for transfer, own, end in ((self.approach, -1, 0), (self.back, 0, 1)):
             # tolerance for rounding [rad or m]
@@ -71,11 +71,11 @@ class Run:
 
     @property
     def _excitation_duration(self) -> float:
-        """Duration of the excitation, as a whole number of samples [s]."""
+        """Duration of the excitation, rounded to whole samples [s]."""
         return self.excitation.sampled_duration(self.rate)
 
     def at(self, t: npt.ArrayLike) -> Motion:
-        """Evaluate the run at times, shape (N,) [s]; the arm rests before and after the run."""
+        """Return the motion at given times (N,) [s]; the arm rests before and after the run."""
         time = np.clip(np.asarray(t, dtype=float), 0.0, self.duration)
         begin, lasts = self.approach.duration, self._excitation_duration
         early = 0.5 * (lasts - self.excitation.duration)
@@ -102,7 +102,7 @@ class Run:
 
     def require_waypoints(self) -> None:
         """
-        Raise a TrajectoryError if interpolation by a controller leaves the path between samples.
+        Raise a TrajectoryError if a controller's interpolation would leave the path.
 
         A controller interpolates between its waypoints with quintic polynomials. Limits and
         collisions are checked only on the path itself. A polynomial through samples of a sine
@@ -132,7 +132,7 @@ def plan_run(
     seed: int = 0,
 ) -> Run:
     """
-    Plan a run from the present pose of the arm to an excitation, along it, and back.
+    Plan a run: from the present pose to the excitation, along it, and back.
 
     Parameters
     ----------
@@ -170,7 +170,7 @@ def plan_run(
 def _unwound(
     excitation: Excitation, arm: ArmModel, limits: Limits, start: FloatArray
 ) -> Excitation:
-    """Return the excitation with joints moved by whole turns towards a start pose, if allowed."""
+    """Shift joints of an excitation by whole turns towards the start pose, if limits allow."""
     # A joint with a range of two turns reaches most poses at two positions. The path to one of the
     # two is often blocked, as the shoulder would hit the floor.
     trajectory = excitation.trajectory

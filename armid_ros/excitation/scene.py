@@ -27,7 +27,7 @@ import pinocchio as pin
 @dataclass(frozen=True)
 class CollisionScene:
     """
-    Bodies, floor and obstacles that a motion must not touch.
+    Robot bodies, floor and obstacles that must not touch each other in a motion.
 
     Attributes
     ----------
@@ -57,7 +57,7 @@ class CollisionScene:
         progress: Callable[[float], None] | None = None,
     ) -> CollisionScene:
         """
-        Return the bodies of a robot, its floor, and the obstacles of an environment file.
+        Return the collision scene: robot bodies, floor, and obstacles from a file.
 
         Parameters
         ----------
@@ -88,12 +88,12 @@ class CollisionScene:
 
     @property
     def bodies(self) -> CollisionModel:
-        """Return the bodies of the robot together with the obstacles."""
+        """Return the collision model of the robot together with the obstacles."""
         return with_obstacles(self.collision, self.obstacles)
 
     @property
     def unchecked(self) -> tuple[str, ...]:
-        """Return items that a check of motions leaves out, such as a missing floor or limit."""
+        """Return what the safety checks leave out, such as a missing floor or limit."""
         robot = self.collision.robot
         found: list[str] = []
         if self.floor.height is None and not any(o.kind == 'plane' for o in self.obstacles):
@@ -168,7 +168,7 @@ _REMEDIES = {
 @dataclass(frozen=True)
 class Fitness:
     """
-    Summary of the safety checks of a run.
+    Result of the safety checks of a run: verdict, reasons and advice.
 
     Attributes
     ----------
@@ -190,7 +190,7 @@ class Fitness:
 
     @property
     def word(self) -> str:
-        """Return the verdict: fit to run, partly checked, or not to be run."""
+        """Return the verdict in words: fit to run, partly checked, or not to be run."""
         if self.nearest is not None and self.nearest.distance < 0.0:
             return UNFIT
         if self.floor.height is not None and self.lowest.height < self.floor.height:
@@ -236,7 +236,7 @@ class Fitness:
 
 def fitness(motion: Motion, scene: CollisionScene) -> Fitness:
     """
-    Return a summary of the safety checks of a run that keeps all limits and the clearance.
+    Summarise the safety checks of a run that is within all limits and the clearance.
 
     Parameters
     ----------

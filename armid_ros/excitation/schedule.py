@@ -183,7 +183,7 @@ class Excitation:
         return Motion(run.joints, t, run.q, run.dq, run.ddq)
 
     def sampled_duration(self, rate: float) -> float:
-        """Return the time of the last sample of ``motion(rate)`` [s]."""
+        """Return the time of the last sample at a sampling rate [s]; see ``motion``."""
         samples = 2 * self._run_in_samples(rate) + self.n_periods * self._period_samples(rate)
         return samples / rate
 
@@ -205,7 +205,7 @@ SCHEMA = 'armid/excitation/1'
 
 
 def save_excitation(excitation: Excitation, path: str | Path) -> None:
-    """Write an excitation in the format of the suffix: .yaml, .yml or .csv."""
+    """Write an excitation to a file; the suffix .yaml, .yml or .csv selects the format."""
     path = Path(path)
     writer = {'.yaml': excitation_text, '.yml': excitation_text, '.csv': _to_csv}.get(path.suffix)
     if writer is None:

@@ -18,10 +18,10 @@ HANDOVER_TIME = 0.05
 
 
 class Path(Protocol):
-    """Path to follow: a `Run`, an `Excitation` or a `Transfer`."""
+    """Protocol of a path to follow: a `Run`, an `Excitation` or a `Transfer`."""
 
     def at(self, t: npt.ArrayLike) -> Motion:
-        """Evaluate the path at times [s]."""
+        """Return the motion on the path at given times [s]."""
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,7 @@ class MeasuredPose:
 
     @classmethod
     def unknown(cls, joints: tuple[str, ...]) -> MeasuredPose:
-        """Return the pose of an arm without any received position."""
+        """Return a measured pose without any received position."""
         n = len(joints)
         return cls(joints, np.full(n, np.nan), np.full(n, -np.inf), np.zeros(n, np.int64))
 
@@ -103,7 +103,7 @@ def tracking_fault(
     measured: FloatArray,
     tolerance: float,
 ) -> str:
-    """Return a message if the tracking error of a joint exceeds a tolerance; otherwise empty."""
+    """Return a message if a joint's tracking error exceeds a tolerance; otherwise empty."""
     error = measured - wanted
     worst = int(np.argmax(np.abs(error)))
     if abs(error[worst]) <= tolerance:
@@ -122,7 +122,7 @@ def jump_fault(
     tolerance: float,
 ) -> str:
     """
-    Return a message if a trajectory starts too far from the present position of the arm.
+    Return a message if a trajectory starts too far from the arm's present position.
 
     Parameters
     ----------
@@ -158,7 +158,7 @@ def jump_fault(
 
 def slowed(path: Path, phase: float, duration: float, rate: float) -> Motion:
     """
-    Return a motion that follows a path from a given time on and slows down to rest.
+    Return a motion that follows a path from a given time on, and slows down to rest.
 
     Parameters
     ----------
@@ -219,7 +219,7 @@ class Rehearsal:
 
     def add(self, phase: float, q: FloatArray, tau: FloatArray) -> None:
         """
-        Add a measured joint state to the results of a rehearsal.
+        Add a measured joint state to the tracking errors and torques of the rehearsal.
 
         Parameters
         ----------
@@ -240,7 +240,7 @@ class Rehearsal:
         return np.asarray(np.abs(self._arm.joint_torque(wanted)).max(axis=0))
 
     def report(self) -> tuple[str, tuple[str, ...]]:
-        """Return a summary of a rehearsal, and a sentence on each joint with unexpected torque."""
+        """Return a summary of the rehearsal, and a sentence on each joint with odd torque."""
         if not self._count:
             fault = 'no joint state was received during the rehearsal'
             return fault, (fault,)

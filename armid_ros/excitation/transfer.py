@@ -30,11 +30,11 @@ class Transfer(Reference):
         super().__post_init__()
 
     def at(self, t: npt.ArrayLike) -> Motion:
-        """Evaluate the transfer at times, (N,) [s]; the arm rests before and after it."""
+        """Return the motion at given times (N,) [s]; the arm rests before and after it."""
         return self.sample(np.clip(np.asarray(t, dtype=float), 0.0, self.duration))
 
     def lasting(self, duration: float) -> Transfer:
-        """Return the transfer along the same path with another duration [s]."""
+        """Return a transfer along the same path with another duration [s]."""
         return replace(self, t=self.t * (duration / self.duration))
 
     def reversed(self) -> Transfer:
@@ -45,7 +45,7 @@ class Transfer(Reference):
 @dataclass(frozen=True)
 class TransferPlanner:
     """
-    Planner of motions between two poses that keep the limits and the clearance.
+    Planner of motions between two poses, within all limits and the clearance.
 
     Attributes
     ----------
@@ -128,7 +128,7 @@ class TransferPlanner:
         raise TrajectoryError(f'no transfer to the trajectory keeps the limits: {violations[0]}')
 
     def fault(self, q: FloatArray) -> str:
-        """Return why a pose, (n,), is not allowed; empty if it is allowed."""
+        """Return the reason why a pose (n,) is not allowed; empty if it is allowed."""
         violations = check_limits(self.limits, Motion.of_states(self.limits.joints, q, 0.0, 0.0))
         overload = self._overload(q[np.newaxis])
         if violations or overload:
@@ -143,17 +143,17 @@ class TransferPlanner:
 
     @property
     def zero_pose(self) -> FloatArray:
-        """Return the pose with all joints at zero, clipped to the position limits with reserve."""
+        """Return the pose with all joints at zero, clipped to the reduced position limits."""
         return self._as_start(self.arm.robot.zero_pose)
 
     def _as_start(self, q: FloatArray) -> FloatArray:
-        """Return poses, (..., n), clipped to the position limits with reserve."""
+        """Clip poses (..., n) to the position limits with reserve."""
         limits = Limits.of(self.arm.robot)
         return np.clip(q, limits.lower, limits.upper)
 
     def free_start(self) -> FloatArray:
         """
-        Return the zero pose, or the nearest allowed pose that was found, shape (n,).
+        Return the zero pose if allowed, else the nearest allowed pose found, shape (n,).
 
         Raises
         ------
@@ -188,7 +188,7 @@ class TransferPlanner:
         )
 
     def _overload(self, q: FloatArray) -> str:
-        """Return a message if a joint is too weak to hold the arm in some of N poses, (N, n)."""
+        """Return a message if a joint is too weak to hold the arm in any of N poses (N, n)."""
         if not np.isfinite(self.limits.torque).any():
             return ''
         torque = np.abs(self.arm.joint_torque(Motion.of_states(self.limits.joints, q, 0.0, 0.0)))
@@ -206,7 +206,7 @@ class TransferPlanner:
 
 def transfer_limits(robot: Robot, speed: str | float = 'slow') -> Limits:
     """
-    Return the limits of a motion between poses: slow, because it identifies no parameters.
+    Return the limits for a motion between two poses, at low speed.
 
     Parameters
     ----------

@@ -49,7 +49,7 @@ class NearPairs:
 @dataclass(frozen=True)
 class Approach:
     """
-    Approach of two bodies: their names, the time of the approach, and their distance.
+    Approach of two bodies: their names, their distance, and the time.
 
     Attributes
     ----------
@@ -209,7 +209,7 @@ class ClearanceModel:
         times: FloatArray,
     ) -> Approach | None:
         """
-        Prove that all bodies keep the margin along a path, or return the closest approach found.
+        Return an approach below the margin along a path; None proves that there is none.
 
         On an interval, the joints between two bodies move them by a limited travel. Their distance
         is at least the mean of the distances at both ends, minus half this travel. An interval
@@ -285,7 +285,7 @@ class ClearanceModel:
     def _measure(
         self, q: FloatArray, sample: IntArray, pair: IntArray
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return distances of pairs, normals to the second body, nearest points of the first."""
+        """Return distances of body pairs, normals, and nearest points on the first bodies."""
         model, geometry = self.collision.robot.model, self.collision.geometry
         data, placed = model.createData(), geometry.createData()
         q, distance = self.collision.robot.positions(q), np.empty(len(sample))

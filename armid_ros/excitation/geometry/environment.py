@@ -123,7 +123,7 @@ _ORIGIN = '_frame'
 
 def with_obstacles(collision: CollisionModel, obstacles: Sequence[Obstacle]) -> CollisionModel:
     """
-    Return the collision bodies of a robot together with the obstacles around it.
+    Return the collision model of a robot together with the obstacles around it.
 
     Every moving body is checked against every obstacle, except the links that the obstacle
     ignores. A link without a body gets a small sphere at the frame of its joint. The size of
@@ -172,7 +172,7 @@ def with_obstacles(collision: CollisionModel, obstacles: Sequence[Obstacle]) -> 
 
 
 def obstacles_alone(collision: CollisionModel, obstacles: Sequence[Obstacle]) -> CollisionModel:
-    """Return the bodies of arm and obstacles, to check only the arm against the obstacles."""
+    """Return a collision model that checks the arm against obstacles only, not itself."""
     geometry = collision.geometry.copy()
     geometry.removeAllCollisionPairs()
     return with_obstacles(replace(collision, geometry=geometry), obstacles)
@@ -277,7 +277,7 @@ def _scene_obstacles(document: Mapping[str, Any], robot: Robot | None) -> tuple[
 
 
 def _shapes(entry: Mapping[str, Any], robot: Robot | None) -> Iterator[_Shape]:
-    """Yield kind, size and placement of each shape in a CollisionObject message."""
+    """Yield kind, size and placement of each shape in a CollisionObject message of MoveIt."""
     base = _frame(str(entry['header']['frame_id']), robot) * _pose(entry.get('pose'))
     for primitive, pose in zip(entry['primitives'], entry['primitive_poses'], strict=True):
         # numbers of shape_msgs/SolidPrimitive; a cone becomes a cylinder
@@ -307,7 +307,7 @@ def _shapes(entry: Mapping[str, Any], robot: Robot | None) -> Iterator[_Shape]:
 
 
 def _frame(name: str, robot: Robot | None) -> pin.SE3:
-    """Return the placement of a fixed frame, given by its name, in the base frame."""
+    """Return the placement of a fixed frame with this name, in the base frame."""
     if robot is None:
         return pin.SE3.Identity()
     model = robot.model

@@ -118,13 +118,13 @@ def link_heights(
 
 
 def vertical(gravity: FloatArray) -> FloatArray:
-    """Return the unit vector opposite to gravity; the z axis of the base without gravity."""
+    """Return the unit vector opposite to gravity, or the z axis of the base without gravity."""
     size = float(np.linalg.norm(gravity))
     return np.asarray(-gravity / size) if size > 0.0 else np.array([0.0, 0.0, 1.0])
 
 
 def outline(shape: coal.CollisionGeometry) -> tuple[FloatArray, float]:
-    """Return centres and the radius of spheres whose hull encloses a body; none if unbounded."""
+    """Return centres and radius of spheres whose convex hull encloses a body."""
     if isinstance(shape, coal.Convex):
         return np.array(shape.points()), 0.0
     if isinstance(shape, coal.Sphere):
@@ -141,7 +141,7 @@ def outline(shape: coal.CollisionGeometry) -> tuple[FloatArray, float]:
 
 
 def _support(shape: coal.CollisionGeometry, direction: FloatArray) -> FloatArray:
-    """Return the extent of a body from its origin along N unit vectors in its frame, (N,) [m]."""
+    """Return the extent of a body along N unit vectors, from its origin, (N,) [m]."""
     if isinstance(shape, coal.Cylinder):
         axial = np.abs(direction[:, 2])
         radial = np.sqrt(np.maximum(1.0 - axial**2, 0.0))
@@ -245,7 +245,7 @@ def floor_obstacles(
     collision: CollisionModel, floor: Floor, margin: float
 ) -> tuple[Obstacle, ...]:
     """
-    Return the floor as an obstacle of the clearance check; empty without a floor.
+    Return the floor as an obstacle for the clearance check; empty if there is no floor.
 
     Links that are below the clearance in every pose, such as a turret on the base, are not
     checked against the floor.
@@ -286,7 +286,7 @@ def floor_obstacles(
 
 
 def _why_not_standing(collision: CollisionModel, up: FloatArray) -> str:
-    """Return why the base plane of an arm cannot be its floor; empty if it can."""
+    """Return why an arm cannot stand on its base plane; empty if it can."""
     normal = np.array([0.0, 0.0, 1.0])
     if up[2] < np.cos(np.pi / 4.0):
         return 'gravity does not pull it onto its base plane'

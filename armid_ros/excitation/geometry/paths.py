@@ -97,7 +97,7 @@ def find_path(
 def clear_line(
     clearance: ClearanceModel | None, start: FloatArray, goal: FloatArray
 ) -> Approach | None:
-    """Prove that a straight line of poses keeps the clearance, or return the closest approach."""
+    """Return an approach of bodies that is too close on a straight line of poses, if any."""
     if clearance is None:
         return None
     difference = goal - start
@@ -114,7 +114,7 @@ def clear_line(
 
 @dataclass
 class _Tree:
-    """Tree of poses, connected by collision-free straight lines."""
+    """Tree of poses that are connected by collision-free straight lines."""
 
     poses: list[FloatArray]
     free: _Free
@@ -152,7 +152,7 @@ class _Tree:
 
 
 def _shortened(path: list[FloatArray], free: _Free, rng: np.random.Generator) -> list[FloatArray]:
-    """Shorten a path at random, and remove poses that a collision-free straight line can skip."""
+    """Shorten a path at random, and skip poses that a free straight line makes needless."""
     path = _skipped(path, free)
     # attempts to shorten the path
     for _ in range(60 if len(path) > 2 else 0):

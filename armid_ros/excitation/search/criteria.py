@@ -67,7 +67,7 @@ class Information:
 
     @property
     def condition(self) -> float:
-        """Condition number of the weighted regressor: root of that of the information matrix."""
+        """Condition number of the weighted regressor."""
         values = np.linalg.eigvalsh(self.matrix)
         return float(np.sqrt(values[-1] / values[0])) if values[0] > 0 else np.inf
 
@@ -89,7 +89,7 @@ class Information:
 @dataclass(frozen=True)
 class Criterion:
     """
-    Optimality criterion: cost of an information matrix M, shape (r, r), to minimise.
+    Optimality criterion: cost of an information matrix (r, r), to be minimised.
 
     All parameters outside the target are nuisance parameters, which are fitted too. The cost
     depends on the Schur complement S = M_ww - M_wn M_nn^+ M_nw of their block.
@@ -171,7 +171,7 @@ class Criterion:
         return cost, (vectors * slope) @ vectors.T
 
     def _of_eigenvalues(self, values: FloatArray, norm: float) -> tuple[float, FloatArray]:
-        """Return the cost as a function of the ascending eigenvalues, and its derivative."""
+        """Return cost and its derivative as functions of the ascending eigenvalues."""
         if self.name == 'A':
             total = np.sum(1.0 / values)
             return float(np.log(total / len(values))), -1.0 / (values**2 * total)

@@ -60,7 +60,7 @@ class Objective:
 
     def value(self, x: FloatArray) -> tuple[float, Callable[[], FloatArray]]:
         """
-        Return the smooth cost, and a function that computes its gradient.
+        Return a smooth approximation of the cost, and a function that computes its gradient.
 
         Parameters
         ----------
@@ -126,7 +126,7 @@ class Objective:
         return total
 
     def _state_columns(self, motion: Motion) -> list[FloatArray]:
-        """Return the regressor columns without memory: rigid body and instantaneous effects."""
+        """Return regressor columns of the rigid body and of effects without memory."""
         arm, target = self.problem.arm, self.problem.settings.target
         if target == 'effects':
             body = np.zeros((*motion.q.shape, len(arm.robot.rigid_parameters)))
@@ -136,7 +136,7 @@ class Objective:
         return [body, *(arm.columns_of(e, motion) for e in arm.effects if e.instantaneous)]
 
     def _past_columns(self, x: FloatArray) -> list[FloatArray]:
-        """Return the regressor columns of effects that depend on the past of the motion."""
+        """Return regressor columns of effects that depend on the past motion."""
         problem = self.problem
         effects = [effect for effect in problem.arm.effects if not effect.instantaneous]
         path = FourierTrajectory.of(problem.limits.joints, problem.settings.period, x)
@@ -249,7 +249,7 @@ class Constraints:
         upper: FloatArray,
         unit: FloatArray,
     ) -> Part:
-        """Return a constraint on position, velocity or acceleration for each limited joint."""
+        """Return constraints on position, velocity or acceleration of each limited joint."""
         values = basis @ x.T
         limited, totals, signed = self._between(values, lower, upper, unit)
 
@@ -284,7 +284,7 @@ class Constraints:
         return totals, gradients
 
     def _clear(self, motion: Motion) -> Part:
-        """Divide the period into equal parts; return a clearance constraint for each part."""
+        """Return a clearance constraint for each of several equal parts of the period."""
         assert self.clearance is not None
         # unit of the constraint [m]; bodies that are 0.6 units beyond the margin are ignored. At a
         # sharpness of 60, their weight in the soft maximum is exp(-36)
@@ -311,7 +311,7 @@ class Constraints:
     def _between(
         self, values: FloatArray, lower: FloatArray, upper: FloatArray, unit: FloatArray
     ) -> tuple[npt.NDArray[np.intp], FloatArray, FloatArray]:
-        """Return the limited joints, soft maxima of their excess over limits, and derivatives."""
+        """Return the limited joints, soft maxima of their limit violations, and derivatives."""
         limited = np.flatnonzero(np.isfinite(lower) | np.isfinite(upper))
         signed = np.empty((len(limited), len(values)))
         totals = np.empty(len(limited))

@@ -46,12 +46,12 @@ _BOX_HALF_WIDTH = 0.5
 
 
 class _OutOfTime(Exception):
-    """Signal that the time budget of a search is used up."""
+    """Exception that ends a search whose time budget is used up."""
 
 
 class Search:
     """
-    Search for the best trajectory; if it is stopped, the best trajectory so far remains.
+    Search for the trajectory with least cost; if stopped, it keeps the best so far.
 
     Parameters
     ----------
@@ -96,7 +96,7 @@ class Search:
 
     def run(self) -> str:
         """
-        Run the search; return 'time budget' or 'interrupted' if it ended early, otherwise ''.
+        Run the search; return '' or why it ended early: 'time budget' or 'interrupted'.
 
         Raises
         ------
@@ -149,7 +149,7 @@ class Search:
             raise _OutOfTime
 
     def _improve(self, starts: list[FourierTrajectory]) -> None:
-        """Optimise several trajectories in rounds; drop the worse half after some rounds."""
+        """Optimise several trajectories in rounds; drop the worse half after certain rounds."""
         objective, nearby = Objective(self.problem, self.prior), self.clearance
         if nearby is not None:  # ignore pairs of bodies that are far apart in many poses
             limits = self.problem.limits
@@ -170,7 +170,7 @@ class Search:
 
 @dataclass
 class _Branch:
-    """Local search, with its last feasible trajectory and the settings of its next round."""
+    """Local search from one start, with its last feasible trajectory and next settings."""
 
     search: Search
     objective: Objective
@@ -195,7 +195,7 @@ class _Branch:
         self.times, self.box, self.sharpness = np.empty(0), _BOX_HALF_WIDTH, _SHARPNESS[0]
 
     def advance(self) -> None:
-        """Run the solver for a round, within a box about the last feasible trajectory."""
+        """Run the solver for one round, in a box around the last feasible trajectory."""
         if self.remaining <= 0:
             return
         problem, clearance = self.search.problem, self.search.clearance
@@ -233,7 +233,7 @@ class _Branch:
             self.sharpness = _SHARPNESS[-1]
 
     def _solve(self, constraints: Constraints, iterations: int) -> tuple[FloatArray, int]:
-        """Return the scaled coefficients that SLSQP finds, (n, 1 + 2 H), and its step count."""
+        """Run SLSQP; return the scaled coefficients found, (n, 1 + 2 H), and the step count."""
         count, scale = 0, self.scale
         x = self.trajectory.coefficients / scale
 
@@ -279,7 +279,7 @@ class _Branch:
 def _made_feasible(
     problem: DesignProblem, clearance: ClearanceModel | None, trajectory: FourierTrajectory
 ) -> FourierTrajectory | None:
-    """Return a trajectory with amplitudes reduced until feasible; None if this fails."""
+    """Reduce the amplitudes of a trajectory until it is feasible; return None if this fails."""
     # a joint beyond its own limits is reduced alone; torque and clearance reduce all joints
     for _ in range(12):
         faults = trajectory_faults(problem.arm, problem.limits, trajectory, clearance)
