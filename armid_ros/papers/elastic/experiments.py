@@ -65,7 +65,7 @@ def step_experiments() -> list[Reference]:
 
 
 def step_of_velocity(pose: FloatArray, velocity: FloatArray) -> Reference:
-    """Return a two-joint reference that rests in a pose, then moves at a velocity for 0.5 s."""
+    """Return a reference for two joints: rest in a pose, then 0.5 s at constant velocity."""
     t = np.array([0.0, _DT, _DT + 0.5])
     return Reference(_JOINTS, t, np.array([pose, pose, pose + 0.5 * velocity]))
 
@@ -79,7 +79,7 @@ def run_experiment(
     sensors: Sensors | None = None,
 ) -> ElasticRun:
     """
-    Simulate an experiment of the two-link arm from rest, and return motor and link motion.
+    Simulate an experiment of the two-link arm from rest; return motor and link motions.
 
     Parameters
     ----------

@@ -121,7 +121,7 @@ def verdict(result: TwoInertiaIdentification) -> VerdictSection:
 
 
 def named_rows(document: dict[str, Any]) -> list[dict[str, Any]]:
-    """Return parameters and total damping of an elastic.json document, with names in words."""
+    """Return parameters and total damping of an elastic.json document, with readable names."""
     words = {symbol: f'{name_in_words(field)} ({symbol})' for field, symbol, _ in PER_JOINT}
     rows = [*document['parameters'], *document.get('total_damping', [])]
     return [row | {'name': words.get(row['name'], row['name'])} for row in rows]
@@ -202,7 +202,7 @@ def responses_section(result: TwoInertiaIdentification) -> ContentSection:
 def response_error(
     result: TwoInertiaIdentification, joint: int, *, decoupled: bool = True
 ) -> float:
-    """Return the rms error of the modelled frequency response of a joint, 5 to 60 Hz [dB]."""
+    """Return the rms error of a joint's modelled frequency response, 5 to 60 Hz [dB]."""
     measured = result.measured[joint]
     seen = (measured.frequency >= _COMPARED_BAND[0]) & (measured.frequency <= _COMPARED_BAND[1])
     ideal = ideal_response(result.parameters, joint, measured.frequency[seen])[:, 0, 0]

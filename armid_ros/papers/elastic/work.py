@@ -36,7 +36,7 @@ DEMO_BAGS = ('resonances', 'steps')
 
 
 def machine(**given: str | None) -> tuple[FloatArray, TwoLinkParameters, VelocityLoop]:
-    """Return accelerometer positions, drives and velocity loop, by default of the shipped arm."""
+    """Return accelerometer positions, drives, velocity loop; defaults are of the shipped arm."""
     shipped = two_link_set('after')
     loop = two_link_loop(shipped)
     defaults = {

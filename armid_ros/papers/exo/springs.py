@@ -92,7 +92,7 @@ _AVERAGED_RATE = 100.0
 
 @dataclass
 class _Averages:
-    """Buffer of the last seconds of samples, averaged to 100 Hz."""
+    """Buffer of the latest seconds of samples, averaged to 100 Hz."""
 
     memory: float
     t: deque[float] = field(default_factory=deque)
@@ -100,7 +100,7 @@ class _Averages:
     _group: list[tuple[float, FloatArray]] = field(default_factory=list)
 
     def take(self, t: float, row: FloatArray) -> None:
-        """Add a sample; if its time does not exceed the last one, clear the buffer first."""
+        """Add a sample; clear the buffer first if time did not increase."""
         if self._group and not 0.0 < t - self._group[-1][0] < 1.0 / _AVERAGED_RATE:
             if t <= self._group[-1][0]:
                 self.clear()
@@ -195,7 +195,7 @@ class OnlineInteraction:
 
     def take(self, t: float, q: FloatArray, tau: FloatArray) -> bool:
         """
-        Add positions and torques of the first machine, and update the estimates if due.
+        Add positions and torques of the first machine; update the estimates if due.
 
         Parameters
         ----------

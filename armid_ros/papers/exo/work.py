@@ -49,7 +49,7 @@ def record(
 
 
 def walk(pair: TiedPair, gait: Gait, stiffness: float | None, tick: Tick) -> SimulatedWalk:
-    """Simulate a gait cycle of exoskeleton and wearer, and joints driven by their torque."""
+    """Simulate a gait cycle of exoskeleton and wearer, then joints driven by their torques."""
     tick(0.6, 'simulating a gait cycle')
     walkers = walking_pair(stiffness)
     cycle, rate = gait_cycle(walkers, gait), read_assumptions()['torque_rate'].value
@@ -77,7 +77,7 @@ def identify_ties(
 
 
 def single_support(pair: TiedPair, gait: Gait) -> tuple[PairMotion, FloatArray, str]:
-    """Return motions on one foot, their gait phases, and the label of the plots' phase axis."""
+    """Return motions on one foot, their gait phases, and the label of the phase axis."""
     known = read_assumptions()
     begin, end = known['single_support'].value
     cycle = known['cycle_time'].value
@@ -89,7 +89,7 @@ def single_support(pair: TiedPair, gait: Gait) -> tuple[PairMotion, FloatArray, 
 def recorded_motions(
     pair: TiedPair, machine: Recording, wearer: Recording
 ) -> tuple[PairMotion, FloatArray, str]:
-    """Return recorded positions on one time base, times, and the label of the plots' time axis."""
+    """Return recorded positions on one time base, the times, and the label of the time axis."""
     both = recorded_together(machine, wearer, pair.other)
     assert both.partner is not None
     motions = PairMotion(

@@ -108,7 +108,7 @@ def tables_section(repeated: Sequence[Repeated]) -> ContentSection:
 
 
 def _table(one: Repeated) -> DataTable:
-    """Return a table of the paper, with additional rows for the results of the repetition."""
+    """Return a published table with additional rows for the results of the repetition."""
     gravity, dynamics = one.methods
     scale, error, share = 100.0, 'RMSE', 'RMSE over peak [%]'
     if one.table.uniform:

@@ -45,7 +45,7 @@ LOAD = 0.3
 @dataclass(frozen=True, eq=False)
 class PaperTable:
     """
-    Published values of a table of the paper that is repeated here.
+    Values of a published table that is repeated here.
 
     Attributes
     ----------
@@ -124,7 +124,7 @@ _RATE = 100.0
 @dataclass(frozen=True, eq=False)
 class MethodErrors:
     """
-    Torque errors of a model with gravity torques alone, or with the full dynamics.
+    Torque errors of a model that has gravity torques only, or the full dynamics.
 
     Attributes
     ----------
@@ -292,7 +292,7 @@ def attainable(robot: Robot, rng: np.random.Generator) -> FloatArray:
 def _repeat(
     table: PaperTable, run: Excitation, tests: Sequence[Motion], rng: np.random.Generator
 ) -> Repeated:
-    """Repeat one table: simulate the run, identify the arm, and predict the held-out motions."""
+    """Repeat a table: simulate the run, identify the arm, predict the held-out motions."""
     robot = load_robot(table.robot, gravity=table.gravity)
     truth = ArmModel(robot)
     made = simulate(
@@ -339,7 +339,7 @@ def _repeat(
 
 
 def _size(errors: FloatArray, table: PaperTable) -> FloatArray:
-    """Return the mean absolute or rms torque error of each joint, (6,), as in the paper."""
+    """Return the torque error of each joint, (6,): mean absolute or rms, as in the paper."""
     if table.uniform:
         return np.asarray(np.mean(np.abs(errors), axis=0))
     return np.asarray(np.sqrt(np.mean(errors**2, axis=0)))
@@ -348,7 +348,7 @@ def _size(errors: FloatArray, table: PaperTable) -> FloatArray:
 def _compared(
     bare: Repeated, loaded: Repeated, rng: np.random.Generator
 ) -> tuple[tuple[Composite, ...], float, float]:
-    """Return gravity parameters of the runs without and with load, and the load's mass and std."""
+    """Return gravity parameters without and with the load, and the load's mass and its std."""
     robots = [load_robot(r.table.robot, gravity='moon') for r in (bare, loaded)]
     theory = ArmModel(robots[0], quasi_static=True).base_parameters(rng)
     gravity = 1e3 * float(np.linalg.norm(robots[0].gravity))

@@ -149,7 +149,7 @@ def _motor_topic(path: str | Path, settings: ReadSettings) -> str:
 def _experiments(
     t: FloatArray, moving: npt.NDArray[np.bool_], period: float
 ) -> list[tuple[int, int, int]]:
-    """Return sample indices of each experiment: start of rest, start of motion, end of motion."""
+    """Return of each experiment the sample indices: start of rest, start and end of motion."""
     # time of rest between two experiments [s]
     pause, shortest = round(0.1 / period), round(_MIN_DURATION / period)
     found = []
@@ -168,7 +168,7 @@ def _experiments(
 def _common(
     path: str | Path, names: Sequence[str], stamps: Sequence[npt.NDArray[np.int64]]
 ) -> npt.NDArray[np.int64]:
-    """Return the timestamps that all topics have in common [us], at least 90 % of the samples."""
+    """Return the time stamps [us] that all topics share; RecordingError if these are too few."""
     common: npt.NDArray[np.int64] = reduce(np.intersect1d, stamps)
     # smallest share of samples with a common timestamp on all topics
     if len(common) < 0.9 * max(map(len, stamps)):

@@ -37,7 +37,7 @@ HOLD: tuple[Hold, Hold] = ('zero', 'first')
 
 def link_columns(q: FloatArray, dq: FloatArray, ddq: FloatArray) -> FloatArray:
     """
-    Return the regressor of the link torques with respect to the inertias alpha, beta and gamma.
+    Return the regressor of link torques; its columns are the inertias alpha, beta and gamma.
 
     Parameters
     ----------
@@ -74,7 +74,7 @@ def interaction_torques(link: Motion, parameters: TwoLinkParameters) -> FloatArr
 
 def direction(velocity: FloatArray) -> FloatArray:
     """
-    Return the mean sign of velocities between neighbouring samples, (N, n), for friction.
+    Return the mean velocity sign between neighbouring samples, (N, n), for dry friction.
 
     Velocities are interpolated linearly; the last row is the sign of the last sample.
 
@@ -266,13 +266,13 @@ def fit_joints(
 
 
 def frequencies(parameters: TwoLinkParameters) -> tuple[FloatArray, FloatArray]:
-    """Return undamped antiresonances and resonances of both joints, each of shape (2,) [Hz]."""
+    """Return undamped antiresonances and resonances of both joints, two arrays (2,) [Hz]."""
     by_link, by_motor = (parameters.stiffness / x for x in (parameters.inertia, parameters.rotor))
     return np.sqrt(by_link) / (2.0 * np.pi), np.sqrt(by_link + by_motor) / (2.0 * np.pi)
 
 
 def _response(s: ComplexArray, values: FloatArray) -> ComplexArray:
-    """Return the modelled frequency response of a joint at s = i w, shape (K, 2, 2)."""
+    """Return the modelled frequency response of a joint at Laplace variables s, (K, 2, 2)."""
     rotor, inertia, stiffness, between, motor, link, gain = values
     spring = stiffness / s + between
     a, b = rotor * s + motor + spring, inertia * s + link + spring
@@ -282,7 +282,7 @@ def _response(s: ComplexArray, values: FloatArray) -> ComplexArray:
 
 
 def _first_guess(joint: str, frequency: FloatArray, found: ComplexArray) -> FloatArray:
-    """Return initial joint parameters from antiresonance and resonance of the motor velocity."""
+    """Return initial joint parameters, from antiresonance and resonance of the motor."""
     size = np.abs(found[:, 0, 0])
     lowest = int(np.argmin(size[frequency > 4.0 * frequency[0]]))
     lowest += int(np.count_nonzero(frequency <= 4.0 * frequency[0]))

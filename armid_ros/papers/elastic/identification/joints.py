@@ -132,7 +132,7 @@ def fit_transmission(sides: Sequence[Sides], used: Conditioning, joint: int) -> 
 
 
 def _columns(sides: Sides, used: Conditioning, joint: int) -> tuple[FloatArray, FloatArray]:
-    """Return regressor and twist (motor minus link angle) of the samples at which joints move."""
+    """Return regressor and spring twist (motor minus link angle) at samples in motion."""
     motor, link, torque = sides[0].q[:, joint], sides[1].q[:, joint], sides[2][:, joint]
     velocity = sides[0].dq[:, joint]
     # torque range in which the tooth contact reverses, as a share of the median torque
@@ -145,7 +145,6 @@ def _columns(sides: Sides, used: Conditioning, joint: int) -> tuple[FloatArray, 
 
 
 def _interval(value: float, std: float) -> tuple[float, float, float]:
-    """Return a value with the bounds of its 95 % interval."""
     return float(value), float(value - HALF_WIDTH * std), float(value + HALF_WIDTH * std)
 
 
@@ -176,7 +175,7 @@ class SpringEstimate:
 
     @property
     def informative(self) -> bool:
-        """Whether load torque explains the joint's twist, so that stiffness is identifiable."""
+        """Whether load torque explains the twist of the joint, so that its stiffness is known."""
         fit = self.transmission
         # smallest R^2 of the twist for an estimate of stiffness
         return fit.explained > 0.9 and bool(np.isfinite(fit.stiffness).all())
@@ -238,7 +237,7 @@ def fit_springs(
 def _stretches(
     robot: Robot, motors: Recording, links: Recording, used: Conditioning
 ) -> list[Sides]:
-    """Return filtered motor and link motions of unbroken stretches, with spring torques."""
+    """Return filtered motor and link motions of gap-free sections, with spring torques."""
     both = recorded_together(motors, links, robot)
     assert both.partner is not None
     tau = np.zeros_like(both.q) if both.tau is None else both.tau
@@ -249,7 +248,7 @@ def _stretches(
 
 
 def _motor(sides: Sequence[Sides], used: Conditioning, joint: int) -> FloatArray:
-    """Fit rotor inertia, viscous and Coulomb friction of a motor to its torque minus the load."""
+    """Fit rotor inertia and friction of a motor to its torque minus the load torque."""
     rows = []
     for motor, _, load in sides:
         assert motor.tau is not None

@@ -37,13 +37,13 @@ SIZE = 3 + 2 * len(PER_JOINT)
 
 
 def unpack(parameters: TwoLinkParameters) -> FloatArray:
-    """Return the tuned parameters as a vector, (13,): alpha, beta, gamma, those of `PER_JOINT`."""
+    """Return the 13 tuned parameters as a vector: alpha, beta, gamma, and those of `PER_JOINT`."""
     joints = [getattr(parameters, field) for field, _, _ in PER_JOINT]
     return np.concatenate([[parameters.alpha, parameters.beta, parameters.gamma], *joints])
 
 
 def pack(values: npt.ArrayLike, like: TwoLinkParameters) -> TwoLinkParameters:
-    """Convert a vector of `unpack` to parameters, with Coulomb friction and drives of `like`."""
+    """Return parameters from a vector of `unpack`; `like` gives Coulomb friction and drives."""
     vector = np.asarray(values, dtype=float)
     pairs = vector[3:].reshape(len(PER_JOINT), 2)
     fields = {field: pair for (field, _, _), pair in zip(PER_JOINT, pairs, strict=True)}
@@ -105,7 +105,7 @@ class Steps:
 
 
 def velocities(steps: Steps, parameters: TwoLinkParameters) -> FloatArray:
-    """Simulate velocities of motors (at the joints) and links, shape (N, E, 4) [rad/s]."""
+    """Simulate E step experiments; return motor and link velocities, (N, E, 4) [rad/s]."""
     values = _point(parameters)[np.newaxis]
     return np.asarray(_simulate(steps, values, parameters.gear).real[:, :, 0])
 
@@ -114,7 +114,7 @@ def sensitivities(
     steps: Steps, parameters: TwoLinkParameters, directions: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """
-    Simulate velocities and their derivatives with respect to given changes of the parameters.
+    Simulate velocities and their derivatives along given directions in parameter space.
 
     Parameters
     ----------
@@ -139,12 +139,12 @@ def sensitivities(
 
 
 def _point(parameters: TwoLinkParameters) -> FloatArray:
-    """Return the vector of `unpack`, followed by the Coulomb torques of the motors, (15,)."""
+    """Return the 13 parameters of `unpack`, followed by two Coulomb torques of the motors."""
     return np.concatenate([unpack(parameters), parameters.coulomb])
 
 
 def _simulate(steps: Steps, values: DualArray, gear: FloatArray) -> DualArray:
-    """Simulate velocities, (N, E, D, 4), of E experiments with each of D parameter vectors."""
+    """Simulate E experiments with D parameter vectors; return velocities, (N, E, D, 4)."""
     experiments, sets, substeps = len(steps.q), len(values), 2
     arm = _Arm(np.tile(values, (experiments, 1)), gear, steps.dt / substeps)
     size = experiments * sets
@@ -203,7 +203,7 @@ class _Arm:
         modes: npt.NDArray[np.int_],
         torque: DualArray,
     ) -> tuple[DualArray, DualArray, DualArray, npt.NDArray[np.int_]]:
-        """Return angle of joint 2, state, accelerations and slip or stick after a time step."""
+        """Advance by a time step; return angle of joint 2, state, accelerations, friction mode."""
         dt, a = self.dt, self.a
         middle = q2 + 0.5 * dt * (x[:, 5] + 0.25 * dt * dv[:, 3])
         v = x[:, 4:] + 0.5 * dt * dv[:, 2:]

@@ -130,7 +130,7 @@ def identify_subspace(
 
 
 def _observable(experiments: Sequence[Signals], order: int) -> tuple[FloatArray, FloatArray]:
-    """Return state matrix and output matrix of the sampled system."""
+    """Return state matrix and output matrix of the sampled system, from input and output data."""
     m, p = experiments[0].u.shape[1], experiments[0].y.shape[1]
     triangle = np.empty((0, 2 * _HORIZON * (m + p)))
     for e in experiments:
@@ -162,7 +162,7 @@ def _inputs(
     modal: ComplexArray,
     hold: Sequence[Hold],
 ) -> ComplexArray:
-    """Return the input gains of the modes, fitted with a free initial state per experiment."""
+    """Return input gains of the modes; each experiment has a free initial state."""
     # The outputs are real, so the input gains of a conjugate pair of poles are conjugate as well.
     normal, right = [], []
     for e in experiments:
@@ -179,12 +179,12 @@ def _inputs(
 
 
 def _outputs(modal: ComplexArray, states: ComplexArray) -> ComplexArray:
-    """Return the output of each mode as a column, (N p, r), from mode states, (N, r)."""
+    """Return each mode's contribution to the outputs, (N p, r), from mode states (N, r)."""
     return np.asarray((states[:, np.newaxis] * modal).reshape(-1, modal.shape[1]))
 
 
 def _driven(u: FloatArray, dt: float, poles: ComplexArray, hold: Hold) -> ComplexArray:
-    """Return mode states, shape (N, r), that an input drives with unit gain in each mode."""
+    """Return the response of each of r modes to an input with unit gain, shape (N, r)."""
     states = np.empty((len(u), len(poles)), complex)
     for k, pole in enumerate(poles):
         factor = np.exp(pole * dt)

@@ -49,7 +49,7 @@ from scipy.optimize import least_squares
 @dataclass(frozen=True, eq=False)
 class Tuning:
     """
-    Parameters after the fit to closed-loop step responses, and the simulated responses.
+    Parameters fitted to closed-loop step responses, and the responses simulated with them.
 
     Attributes
     ----------
@@ -74,7 +74,7 @@ class Tuning:
 
     @property
     def rms(self) -> tuple[float, float]:
-        """Rms residual of the velocities before and after tuning, noise included [rad/s]."""
+        """RMS velocity residuals before and after tuning, noise included [rad/s]."""
         return (
             float(np.sqrt(np.mean((self.before - self.measured) ** 2))),
             float(np.sqrt(np.mean((self.after - self.measured) ** 2))),
@@ -174,7 +174,7 @@ def _covariance(jacobian: FloatArray) -> FloatArray:
 @dataclass(frozen=True, eq=False)
 class MeasuredJoint:
     """
-    Measured frequency responses of motor and link velocity of a joint to its motor torque.
+    Measured frequency responses from the motor torque of a joint to its velocities.
 
     Attributes
     ----------

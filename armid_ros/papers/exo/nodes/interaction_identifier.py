@@ -113,7 +113,7 @@ class InteractionIdentifierNode(ArmidNode):
             self.publish_diagnostics()
 
     def reset(self) -> str:
-        """Discard all samples and estimates, and return the answer of the reset service."""
+        """Discard all samples and estimates; return the answer of the reset service."""
         self.identifier.reset()
         for machine, gate in enumerate(self._gates):
             gate.reset()
@@ -121,7 +121,7 @@ class InteractionIdentifierNode(ArmidNode):
         return 'samples and estimates are discarded'
 
     def condition(self) -> tuple[str, Mapping[str, object]]:
-        """Return a warning or '', and estimated stiffness and slack of straps, for diagnostics."""
+        """Return a warning (or ''), and stiffness and slack of the straps, for diagnostics."""
         core = self.identifier
         values: dict[str, object] = {'received': self.received}
         for part in (core.together, core.separate):
@@ -145,7 +145,7 @@ class InteractionIdentifierNode(ArmidNode):
         return super().level(troubled)
 
     def _take(self, machine: int, message: JointState) -> None:
-        """Add a joint state of exoskeleton (0) or wearer (1); publish the estimate if new."""
+        """Add a joint state of exoskeleton (0) or wearer (1); publish a new estimate, if any."""
         self.received += 1
         self.freshness[machine].mark_received()
         topic, n = _TOPICS[machine], len(self._joints[machine])
@@ -193,7 +193,7 @@ class InteractionIdentifierNode(ArmidNode):
 
 
 def _named(found: Interaction | None, suffix: str = '') -> dict[str, object]:
-    """Return stiffness values and bounds of their intervals by name, for diagnostics."""
+    """Return stiffness values and their interval bounds by name, for diagnostics."""
     if found is None:
         return {}
     values: dict[str, object] = {}

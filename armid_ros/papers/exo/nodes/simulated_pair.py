@@ -106,7 +106,7 @@ class SimulatedPairNode(ArmidNode):
         return self.stamp_ns
 
     def catch_up(self) -> None:
-        """Simulate up to the scaled real time; skip time if the computer is too slow for it."""
+        """Simulate up to the scaled real time; skip time if the computer is too slow."""
         factor = self.value('real_time_factor')
         skipped = self.real_time.catch_up(factor, 1.0 / self.value('rate'))
         if factor == 1.0:  # stamps stay those of the computer  # noqa: RUF069 - as it is written
@@ -120,7 +120,7 @@ class SimulatedPairNode(ArmidNode):
         return 'exoskeleton and wearer are in the initial state'
 
     def condition(self) -> tuple[str, Mapping[str, object]]:
-        """Return a warning if simulation is slower than real time (else ''), and skipped time."""
+        """Return a warning if simulation is slower than real time, and the skipped time."""
         values = {
             'simulated_time': self.pair.t,
             'skipped_real_time': self.real_time.given_up,

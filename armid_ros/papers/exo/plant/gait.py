@@ -91,7 +91,7 @@ class Gait:
         return cls(cosine, np.vstack([np.zeros((1, 3)), solution[harmonics + 1 :]]))
 
     def __call__(self, phase: FloatArray, derivative: int = 0) -> FloatArray:
-        """Return joint angles, (N, 3) [rad], or a derivative by the phase, at N gait phases."""
+        """Return joint angles (N, 3) [rad] at N gait phases, or a derivative by the phase."""
         w = 2.0 * np.pi * np.arange(len(self.cosine))
         turn = np.outer(phase, w) + derivative * np.pi / 2.0
         return np.asarray(

@@ -101,7 +101,7 @@ class WalkingMachine:
         return np.asarray(np.sum(self.feet[:, :, 1] > 0.01 * self.weight, axis=1))
 
     def feet_by_shares(self) -> FloatArray:
-        """Return foot forces by equations (20) to (22) of the paper, shape (N, 2, 2) [N]."""
+        """Return foot forces by equations (20) to (22) of the exoskeleton paper, (N, 2, 2) [N]."""
         robot, motion = self.robot, self.motion
         # centroids and m (c'' - g) of all bodies
         bodies = list(robot.model.inertias)[1:]
@@ -159,7 +159,7 @@ class GaitCycle:
     def torques(
         self, pair: TiedPair | None = None, ground: FloatArray | None = None
     ) -> FloatArray:
-        """Return exoskeleton torques, (N, n), optionally for other straps or other foot forces."""
+        """Return exoskeleton torques (N, n), if given for other straps or foot forces."""
         feet = self.own.ground if ground is None else ground
         forces = (feet, self.other.ground)
         return walking_torques(pair or self.pair, self.motions, forces).tau
@@ -232,7 +232,7 @@ def walking_torques(
     pair: TiedPair, motions: PairMotion, ground: Sequence[FloatArray]
 ) -> PairTorques:
     """
-    Return joint torques of both machines with strap and ground forces, by (27) of the paper.
+    Return joint torques of both machines with strap and ground forces, equation (27).
 
     Parameters
     ----------
@@ -270,7 +270,7 @@ def _walk(
     pair: TiedPair, legs: PairMotion, start: FloatArray, cycle: float
 ) -> tuple[FloatArray, FloatArray]:
     """
-    Integrate the hip motion of both machines over three gait cycles, with prescribed leg angles.
+    Integrate the hip motions of both machines over three gait cycles; leg angles are given.
 
     States and rates of the last cycle have the shape (N, 2, 2, 2): position and velocity, of the
     machine and its wearer, forward and up.
@@ -341,7 +341,7 @@ def check_cycle(
 def driving_torque(
     cycle: GaitCycle, joint: str, rate: float, tau: FloatArray | None = None
 ) -> DrivingTorque:
-    """Return a function of time for two hip forces, which are zero, and a joint's torque, (3,)."""
+    """Return a function of time that gives two zero hip forces and a joint's torque, (3,)."""
     column = [cycle.pair.robot.index(joint)]
     own = (cycle.own.tau if tau is None else tau)[:, column]
     curve = splined(cycle.own.motion.t, own, rate)
@@ -350,7 +350,7 @@ def driving_torque(
 
 def ground_by_shares(cycle: GaitCycle) -> FloatArray:
     """
-    Return ground forces on heels and toes by equations (20) to (22) of the paper, (N, 4, 2) [N].
+    Return ground forces on heels and toes by equations (20) to (22), (N, 4, 2) [N].
 
     The equations do not give the centre of pressure, so that of the simulated ground is used.
 

@@ -68,20 +68,20 @@ class TiedPair(TiedMachines):
         return tuple(tie.name for tie in self.ties)
 
     def with_stiffness(self, stiffness: npt.ArrayLike) -> TiedPair:
-        """Return the pair with another strap stiffness [N/m], common or for each strap."""
+        """Return the pair with another stiffness [N/m]: one value, or one for each strap."""
         return replace(self, stiffness=np.asarray(stiffness, dtype=float))
 
     def with_slack(self, slack: npt.ArrayLike) -> TiedPair:
-        """Return the pair with another slack of straps [m], common or for each strap."""
+        """Return the pair with another slack [m]: one value, or one for each strap."""
         return replace(self, slack=np.asarray(slack, dtype=float))
 
     def geometry(self, motion: Motion, other_motion: Motion) -> TieGeometry:
-        """Return ends and Jacobians of the straps along the motions of both machines."""
+        """Return end points and Jacobians of the straps during motions of both machines."""
         return tie_geometry(self.robot, motion.q, self.other, other_motion.q, self.ties)
 
     def forces(self, way: FloatArray) -> FloatArray:
         """
-        Return the strap forces on the first machine for given strap vectors.
+        Return the strap forces on the first machine, for vectors along the straps.
 
         The forces on the other machine are opposite.
 
@@ -186,7 +186,7 @@ def assumed_stiffness(stiffness: npt.ArrayLike | None) -> FloatArray:
 
 def walking(pair: TiedPair, gait: Gait, t: FloatArray) -> PairMotion:
     """
-    Return the motion of exoskeleton and wearer in single support.
+    Return the walking motion of exoskeleton and wearer while one foot is on the ground.
 
     The wearer follows the gait, and the exoskeleton follows the wearer with a small error. Single
     support begins at t = 0.

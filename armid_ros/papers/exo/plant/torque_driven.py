@@ -85,7 +85,7 @@ def drive_by_torque(
     on_ground: bool = False,
 ) -> Motion:
     """
-    Integrate torque-driven joints of the exoskeleton while all other joints move as prescribed.
+    Simulate torque-driven joints of the exoskeleton; the other joints move as prescribed.
 
     Parameters
     ----------
@@ -141,7 +141,7 @@ def _forward_dynamics(
     torque: DrivingTorque,
     on_ground: bool,
 ) -> Rate:
-    """Return a function for the time derivative of the state of the torque-driven joints."""
+    """Return a function that gives the state derivative of the torque-driven joints."""
     robot, own, tied = pair.robot, motions.own, len(pair.ties)
     ends = [(tie.joint, np.array(tie.point)) for tie in pair.ties]
     if on_ground:

@@ -116,7 +116,7 @@ def walkable(
     lean: float | None = None,
 ) -> WalkableGait:
     """
-    Return the gait nearest to a desired gait whose feet neither slide nor sink.
+    Return the gait nearest to a desired gait whose feet neither slide nor sink in.
 
     Parameters
     ----------

@@ -133,7 +133,7 @@ def _stiffness_section(
 
 
 def _range(values: FloatArray) -> str:
-    """Format a range of values, or a single value if both ends are equal in two digits."""
+    """Format a range of values; a single value if both ends agree in two digits."""
     ends = dict.fromkeys(f'{end:.2g}' for end in (values.min(), values.max()))
     return ' to '.join(ends)
 

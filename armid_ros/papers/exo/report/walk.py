@@ -92,7 +92,7 @@ class Walk(Section):
 
     @property
     def choices(self) -> list[str]:
-        """Labels of the motions that the reader can choose."""
+        """Labels of the motions that the reader of the page can choose."""
         names = [one.right.joint.removeprefix('exo_') for one in self.walked.driven]
         return [
             'as prescribed',
@@ -104,7 +104,7 @@ class Walk(Section):
 
     @property
     def held(self) -> list[str]:
-        """Largest external moments on the trunks of exoskeleton and wearer [N m], as text."""
+        """Largest external moments [N m] on the trunks of exoskeleton and wearer, as text."""
         cycle = self.walked.cycle
         return [f'{np.abs(one.trunk_moment).max():.0f}' for one in (cycle.own, cycle.other)]
 
@@ -242,5 +242,5 @@ def _placed(points: FloatArray, ahead: FloatArray) -> FloatArray:
 
 
 def _whole(values: FloatArray) -> list[Any]:
-    """Return coordinates rounded to 0.1 px."""
+    """Round coordinates to 0.1 px."""
     return list(np.round(values, 1).tolist())
