@@ -159,7 +159,7 @@ def diagnose(
 
 
 def _hardly_explained(result: Diagnosis, settings: DiagnosisSettings) -> bool:
-    """Return whether a gap remains, or each finding explains less than half of the gap."""
+    """Return whether a residual above its limit remains, or no finding explains half of it."""
     largest = max((one.share for one in result.findings), default=0.0)
     return result.verdict in OPEN or largest <= settings.thresholds.open_share
 
@@ -172,7 +172,7 @@ def _of_spans(
     notes: Sequence[str],
     doubt: str,
 ) -> Diagnosis | None:
-    """Diagnose only the seconds in which a cause acts; None if no cause explains the gap there."""
+    """Diagnose only the seconds in which a cause acts; None if this does not explain them."""
     settings, arm, prepared = explainer.settings, explainer.arm, explainer.prepared
     ranking = explanation.ranking
     spans = () if ranking is None else acting_spans(ranking, settings.thresholds)
@@ -210,7 +210,7 @@ def _of_spans(
 def _with_unfitted_joints(
     arm: ArmModel, recordings: Sequence[Recording], used: Conditioning
 ) -> Iterator[tuple[Recording, npt.NDArray[np.bool_]]]:
-    """Yield recordings with a mask of the joints that fit the model in other recordings only."""
+    """Yield recordings, each with a mask of joints that the model fits in the others only."""
     unit = np.ones(arm.robot.n_joints)
     bad, sound = np.zeros((2, len(recordings), len(unit)), dtype=bool)
     for k, one in enumerate(recordings):
@@ -230,7 +230,7 @@ def _as_diagnosis(
     doubt: str,
     given: ArmModel,
 ) -> Diagnosis:
-    """Return the diagnosis for an explanation: findings, verdict, patched model and notes."""
+    """Convert an explanation to a diagnosis with findings, verdict, patched model and notes."""
     arm, settings, before = explainer.arm, explainer.settings, explainer.baseline
     explainer.tell(0.85, 'held-out gap')
     explanation, of_bodies = as_bodies(on_outer_link(explanation))
@@ -290,7 +290,7 @@ def _with_shares(
     explanation: Explanation, explainer: Explainer
 ) -> tuple[Explanation, Attribution, Evidence | None]:
     """
-    Measure which share of the gap each cause explains; a small share makes a cause minor.
+    Measure the share of the squared residual that each cause explains.
 
     Returns
     -------
@@ -321,7 +321,7 @@ def _with_shares(
 def _not_visible(
     explanation: Explanation, found: Sequence[Finding], explainer: Explainer
 ) -> tuple[str, ...]:
-    """Return the names of effects that the data cannot show on any joint, in catalogue order."""
+    """Return the names of effects that the data cannot reveal on any joint."""
     hidden = {name for name, _ in explanation.invisible}
     hidden -= {one.effect.name for one in explanation.candidates}
     hidden -= {finding.name for finding in found}

@@ -34,7 +34,7 @@ _PARTNER_BAND_RATIO = 1.25
 @dataclass(frozen=True)
 class Prepared:
     """
-    Filtered recordings of a diagnosis, with their torque noise.
+    Filtered recordings of a diagnosis, with their measured torque noise.
 
     Attributes
     ----------
@@ -53,7 +53,7 @@ class Prepared:
 
     @property
     def allowed(self) -> FloatArray:
-        """Largest share of uncertain velocity signs in a used row, (n,); see `Trajectory`."""
+        """Largest allowed share of uncertain velocity signs in a row, (n,); see `Trajectory`."""
         return self.data[0].allowed
 
     @property
@@ -70,7 +70,7 @@ def choose_filters(
     rng: np.random.Generator,
 ) -> Conditioning:
     """
-    Choose cut-off and decimation, as for an identification, but with fewer rows.
+    Choose cut-off and decimation as an identification does, but with fewer rows.
 
     The cut-off is chosen from the baseline, if any, as the baseline has no missing effect.
 
@@ -98,7 +98,7 @@ def prepare(
     misfit: bool = False,
 ) -> Prepared:
     """
-    Measure the torque noise of trajectories, and decide which rows next to reversals are used.
+    Measure the torque noise of trajectories, and select the rows near velocity reversals.
 
     Rows next to reversals are used if their noise exceeds the error of dry friction. They are not
     used if the floor is a misfit: dry friction is then the largest error of a model, and it
@@ -123,7 +123,7 @@ def prepare(
 
 
 def with_friction(arm: ArmModel, library: Sequence[str]) -> tuple[ArmModel, tuple[Effect, ...]]:
-    """Add the friction and offsets that joints lack; return the arm and the added effects."""
+    """Add missing friction and offsets to an arm; return the arm and the added effects."""
     there = {(effect.name, joint) for effect in arm.effects for joint in effect.joints}
     added: list[Effect] = []
     fuller = arm
@@ -138,7 +138,7 @@ def with_friction(arm: ArmModel, library: Sequence[str]) -> tuple[ArmModel, tupl
 def _measured(
     arm: ArmModel, used: Conditioning, data: Sequence[Trajectory], theory: BaseParameters
 ) -> Prepared:
-    """Measure the noise twice: in the residual of the given arm, then of the refitted arm."""
+    """Measure the noise in the residual of the given arm, and again after a refit."""
     base, _ = excited_parameters(arm, theory, data)
     refit = refitted_arm(arm, base, data, [noise_floor(part, arm).sigma for part in data])
     return Prepared(used, tuple(data), tuple(noise_floor(part, refit) for part in data))
@@ -150,7 +150,7 @@ def repaired(
     baseline: Sequence[Recording],
     settings: DiagnosisSettings,
 ) -> tuple[list[Recording], list[Recording], list[Recording], list[str]]:
-    """Return all recordings without damaged samples, and notes on each damage and repair."""
+    """Remove damaged samples from all recordings; return them with notes on each damage."""
     notes: list[str] = []
     whole: list[list[Recording]] = []
     for part in (recordings, validate, baseline):

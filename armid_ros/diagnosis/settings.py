@@ -43,7 +43,7 @@ THERE = 0.3
 @dataclass(frozen=True)
 class Thresholds:
     """
-    Thresholds of the decisions of a diagnosis.
+    Thresholds for the decisions of a diagnosis.
 
     A share is a part of the squared weighted held-out residual.
 
@@ -166,13 +166,13 @@ class DiagnosisSettings:
 
     @property
     def kinds(self) -> tuple[type[Effect], ...]:
-        """All effects that may be named."""
+        """Classes of all effects that may be named."""
         tied = () if self.partner is None else (TiedInteraction.name, TiedSlack.name)
         return (*(CATALOGUE[name] for name in self.library if name not in tied), *self.own)
 
 
 def log_prior(effect: Effect, robot: Robot, changed: bool) -> float:
-    """Return the prior log odds of an effect on its joints, as a model error or as a change."""
+    """Return the prior log odds of an effect: as an error of the model, or as a change."""
     names, name = list(CATALOGUE), effect.name
     odds = RARER * (names.index(name) if name in CATALOGUE else len(names))
     odds += SHAPE * len(effect.shape)

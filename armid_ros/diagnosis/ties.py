@@ -48,7 +48,7 @@ def diagnose_ties(
     explainer: Explainer, recordings: Sequence[Recording], partner: Partner
 ) -> Explanation | None:
     """
-    Explain a residual by springs between arm and other machine (ties), then by other causes.
+    Explain a residual by springs (ties) to another machine first, then by other causes.
 
     Returns
     -------
@@ -87,7 +87,7 @@ def diagnose_ties(
 @dataclass(frozen=True)
 class _Ties:
     """
-    Regression problem of the ties between an arm and another machine.
+    Regression of residual torques on springs (ties) between an arm and another machine.
 
     Attributes
     ----------
@@ -105,7 +105,7 @@ class _Ties:
     partner: Partner
 
     def significant(self) -> list[NamedEffect]:
-        """Return the significant ties with their stiffness; ties with slack become straps."""
+        """Return significant ties with their stiffness; ties with slack are returned as straps."""
         arm = self.explainer.arm
         tried: list[tuple[float, InteractionProblem, Interaction]] = []
         for slack in (0.0, *TiedSlack.shapes[0].grid):
@@ -137,7 +137,7 @@ class _Ties:
 
     def without_bias(self, found: Explanation) -> Explanation:
         """
-        Replace the stiffness of each tie by an estimate without the bias due to angle noise.
+        Return the explanation with tie stiffnesses corrected for the bias by angle noise.
 
         The described links are kept if they explain the torques as well as fitted links.
 
@@ -173,7 +173,7 @@ class _Ties:
     def _problem(
         self, bare: ArmModel, inertias: Inertias, slack: float = 0.0
     ) -> InteractionProblem:
-        """Return the regression of torques on all ties, without torques of other effects."""
+        """Return the regression of torques on all ties, after other effects are subtracted."""
 
         def rest(motion: Motion) -> FloatArray:
             return np.asarray(bare.torque(motion) - inverse_dynamics(bare.robot, motion))
@@ -200,7 +200,7 @@ class _Ties:
 
 def _with_springs(explanation: Explanation, found: Interaction) -> Fitted:
     """
-    Replace the stiffness of ties in a fitted arm, and refit its base parameters.
+    Replace the stiffness of the ties in a fitted arm, and refit its base parameters.
 
     If other effects were fitted jointly, the standard deviations of the stiffness are the larger
     ones of both fits.
@@ -235,7 +235,7 @@ def _with_springs(explanation: Explanation, found: Interaction) -> Fitted:
 def _as_one_cause(
     explainer: Explainer, evidence: Evidence, partner: Partner, fitted: Fitted
 ) -> tuple[tuple[CauseResult, ...], tuple[tuple[str, tuple[str, ...]], ...]]:
-    """Rank all ties together, as a single cause, among other causes; results as of `survey`."""
+    """Compare all ties, as a single cause, with other causes; return results like `survey`."""
     settings, robot = explainer.settings, explainer.arm.robot
     free = [one for one in grid_without_baseline() if one.body]
     comparison = explainer.comparison(Rows.over_noise(evidence), free)

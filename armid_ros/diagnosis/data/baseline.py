@@ -37,7 +37,7 @@ import scipy.linalg
 def excited_parameters(
     arm: ArmModel, theory: BaseParameters, data: Sequence[Trajectory]
 ) -> tuple[BaseParameters, list[FloatArray]]:
-    """Return the base parameters that are identifiable in the data, and their regressors."""
+    """Return the base parameters that the data make identifiable, and their regressors."""
     columns = [part.base_columns(arm, arm.effects, theory.independent) for part in data]
     stacked = np.concatenate([block.reshape(-1, theory.rank) for block in columns])
     names = tuple(theory.standard[column] for column in theory.independent)
@@ -57,7 +57,7 @@ def described_precision(
     base: BaseParameters, arm: ArmModel, known: FloatArray | None = None
 ) -> FloatArray:
     """
-    Return the prior precision of base parameters, from the robot description, shape (r, r).
+    Return the precision (r, r) of base parameters that the robot description gives as prior.
 
     The prior standard deviation of a parameter is about its described value; that of an effect
     with value zero is its largest expected value. Data change the parameters that they determine;
@@ -95,7 +95,7 @@ def described_precision(
 def refitted_arm(
     arm: ArmModel, base: BaseParameters, data: Sequence[Trajectory], sigma: Sequence[FloatArray]
 ) -> ArmModel:
-    """Return the arm with base parameters fitted to trajectories with torque noise `sigma`."""
+    """Fit the base parameters of an arm to trajectories, weighted by torque noise `sigma`."""
     columns = [part.base_columns(arm, arm.effects, base.independent) for part in data]
     weight = row_weights(data, sigma)
     x = (np.concatenate(columns) * weight[:, :, np.newaxis]).reshape(-1, base.rank)
@@ -109,7 +109,7 @@ def refitted_arm(
 @dataclass(frozen=True)
 class Baseline:
     """
-    Recordings from a time when the model was right, with the misfit of the model.
+    Recordings from a time when the model was right, with the model's residual in them.
 
     Attributes
     ----------
@@ -133,7 +133,7 @@ class Baseline:
 
     @classmethod
     def of(cls, arm: ArmModel, data: Sequence[Trajectory], rng: np.random.Generator) -> Baseline:
-        """Measure the misfit of a model in baseline recordings, by cross-validation."""
+        """Measure the residual of a model in baseline recordings by cross-validation."""
         residuals = [part.residual(arm) for part in data]
         base, columns = excited_parameters(arm, arm.base_parameters(rng), data)
         prior = described_precision(base, arm)
@@ -165,7 +165,7 @@ class Baseline:
     @property
     def errors(self) -> tuple[float, FloatArray]:
         """
-        Return rms residual over rms torque for all joints together, and for each joint, (n,).
+        Return rms residual divided by rms torque: of all joints together, and of each joint (n,).
 
         Only rows in which a joint moves are used: at rest, friction can have any torque.
 
@@ -184,7 +184,7 @@ def known_misfit(
     held_out: Sequence[Recording] = (),
 ) -> Misfit:
     """
-    Measure the rms residual of a model in recordings, as reference for later diagnoses.
+    Measure the rms residual of a model in recordings, for comparison in later diagnoses.
 
     Rows in which a joint rests or reverses are not used, as in a diagnosis: friction there is
     the largest error of a model.

@@ -30,7 +30,7 @@ _SPEED_KNOTS = (0.03, 0.25, 1.0)
 
 def discrepancy_columns(data: Sequence[Trajectory], arm: Arm) -> list[FloatArray]:
     """
-    Return the regression columns of the model discrepancy of each joint.
+    Return regressor columns for smooth model errors of each joint (model discrepancy).
 
     Functions of position and velocity are linear between knots and constant beyond them, with a
     unit torque at a knot; friction has a root mean square torque of one.
@@ -77,5 +77,5 @@ def discrepancy_columns(data: Sequence[Trajectory], arm: Arm) -> list[FloatArray
 
 
 def hat_functions(x: FloatArray, knots: FloatArray) -> list[FloatArray]:
-    """Return the values of linear B-splines (hat functions) at x, an array like x per knot."""
+    """Return linear B-splines (hat functions) at x: for each knot an array like x."""
     return [np.interp(x, knots, row) for row in np.eye(len(knots))]

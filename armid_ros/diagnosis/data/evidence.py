@@ -39,7 +39,7 @@ _LOW_HZ, _HIGH_HZ = 4.0, (6.0, 12.0)
 @dataclass(frozen=True)
 class Evidence:
     """
-    Recordings, with the standard deviation by which the residual of each joint is divided.
+    Recordings, with the standard deviation that weights the residual of each joint.
 
     Attributes
     ----------
@@ -61,12 +61,12 @@ class Evidence:
 
     @classmethod
     def over_noise(cls, data: Sequence[Trajectory], noise: Sequence[FloatArray]) -> Evidence:
-        """Return recordings whose residuals are divided by their noise, (n,) each [N m]."""
+        """Return recordings whose residuals are weighted by torque noise, (n,) each [N m]."""
         return cls(tuple(data), tuple(noise), tuple(noise))
 
     @cached_property
     def count(self) -> FloatArray:
-        """Return the number of rows in which each joint moves, shape (n,)."""
+        """Return for each joint the number of samples in which it moves, shape (n,)."""
         parts = [part.informative.sum(axis=0) for part in self.data]
         return np.asarray(np.sum(parts, axis=0, dtype=float))
 
@@ -76,7 +76,7 @@ class Evidence:
         return np.sqrt(self.power([part.torque for part in self.data]))
 
     def chi2_per_row(self, residual: Sequence[FloatArray]) -> FloatArray:
-        """Return the mean square of the residual divided by `sigma` for each joint, (n,)."""
+        """Return the mean square of each joint's residual divided by `sigma`, shape (n,)."""
         return self.power([rows / s for rows, s in zip(residual, self.sigma, strict=True)])
 
     def relative_errors(self, residual: Sequence[FloatArray]) -> FloatArray:
@@ -92,18 +92,18 @@ class Evidence:
         return np.asarray(squares / np.maximum(self.count, 1.0))
 
     def residuals(self, arm: ArmModel) -> list[FloatArray]:
-        """Return measured torque minus the torque of a model, (M, n) per trajectory [N m]."""
+        """Return measured minus modelled torque of each trajectory, (M, n) [N m]."""
         return [part.residual(arm) for part in self.data]
 
     def block_squares(self, residual: Sequence[FloatArray]) -> FloatArray:
-        """Return the sum of squared weighted residuals of each time block and joint, (B, n)."""
+        """Return the sum of squared weighted residuals in each time block and joint, (B, n)."""
         block, _ = block_rows(self.data)
         rows = np.concatenate(residual) * row_weights(self.data, self.sigma)
         return np.column_stack([np.bincount(block, column) for column in rows.T**2])
 
     def limits(self, residual: Sequence[FloatArray], settings: DiagnosisSettings) -> FloatArray:
         """
-        Return the largest `chi2_per_row` that noise and misfit explain, for each joint, (n,).
+        Return for each joint the largest `chi2_per_row` that noise and known misfit explain, (n,).
 
         Noise and residual have one degree of freedom per independent row each, so the ratio of
         their squares has an F distribution. A misfit, or estimated noise, may be larger by the
@@ -122,17 +122,17 @@ class Evidence:
         return np.where(misfit, self.misfit_limit(settings), noise) + self.material_loss(settings)
 
     def misfit_limit(self, settings: DiagnosisSettings) -> FloatArray:
-        """Return the largest `chi2_per_row` that a known misfit explains in another motion."""
+        """Return the largest `chi2_per_row` that the known misfit explains in a new motion."""
         varies = np.ones_like(self.count) if self.varies is None else self.varies
         return np.asarray(settings.thresholds.same_fit * np.maximum(varies, 1.0))
 
     def material_loss(self, settings: DiagnosisSettings) -> FloatArray:
-        """Return the `chi2_per_row` of the largest immaterial residual of each joint, (n,)."""
+        """Return for each joint the `chi2_per_row` of the largest negligible residual, (n,)."""
         unit = np.mean(np.square(self.sigma), axis=0)
         return np.asarray((settings.material * self.torque_rms) ** 2 / unit)
 
     def _correlation_length(self, residual: Sequence[FloatArray]) -> FloatArray:
-        """Return the correlation length of each joint's squared residual, in rows, (n,)."""
+        """Return the correlation length of each joint's squared residual, in samples, (n,)."""
         products = np.zeros((21, len(self.count)))  # correlated over 20 rows at most
         for part, own in zip(self.data, residual, strict=True):
             rows = np.where(part.informative, own, 0.0)
@@ -151,7 +151,7 @@ def torque_rms(data: Sequence[Trajectory]) -> FloatArray:
 @dataclass(frozen=True)
 class NoiseFloor:
     """
-    Torque noise of each joint in a trajectory: total, low-frequency part, and upper limit.
+    Torque noise of each joint in a trajectory: total, at low frequency, and upper limit.
 
     Attributes
     ----------
@@ -177,7 +177,7 @@ class NoiseFloor:
 
 def noise_floor(trajectory: Trajectory, arm: ArmModel) -> NoiseFloor:
     """
-    Measure the torque noise of a trajectory as the difference of two equal periods.
+    Measure the torque noise of a trajectory from the difference between equal periods.
 
     Parameters
     ----------
@@ -233,7 +233,7 @@ def joints_that_do_not_repeat(
     floors: Sequence[NoiseFloor], thresholds: Thresholds, least: FloatArray
 ) -> list[int]:
     """
-    Return the indices of joints whose torque differs between two equal periods of the motion.
+    Return the joints whose torque differs between equal periods of a motion, as indices.
 
     The difference is at low frequency and material, such as that of a contact in one period.
 
@@ -265,7 +265,7 @@ def _difference(
     trajectory: Trajectory, residual: FloatArray, first: npt.NDArray[np.intp], lag: int, joint: int
 ) -> tuple[FloatArray, npt.NDArray[np.bool_]]:
     """
-    Return a joint's residual difference between equal periods, and its samples in motion.
+    Return how a joint's residual differs between equal periods, where the joint moves.
 
     Linear drifts of offset and viscous friction are regressed out, because they are effects.
 
@@ -287,7 +287,7 @@ def _difference(
 def _in_informative_rows(
     trajectory: Trajectory, samples: npt.NDArray[np.intp], joint: int
 ) -> npt.NDArray[np.bool_]:
-    """Return whether the joint moves in the row nearest to each of K samples, (K,)."""
+    """Return a mask (K,) of the samples whose nearest row is one in which the joint moves."""
     rows = trajectory.rows
     nearest = np.searchsorted((rows[1:] + rows[:-1]) / 2, samples)
     return np.asarray(trajectory.informative[nearest, joint])
@@ -295,7 +295,7 @@ def _in_informative_rows(
 
 def _noise_of_second_differences(trajectory: Trajectory, smooth: FloatArray) -> FloatArray:
     """
-    Return an upper limit of the torque noise, from second differences of the residual, (n,) [N m].
+    Return an upper limit (n,) of torque noise from second differences of a residual [N m].
 
     The noise is assumed to be white in the band of the rows. Torque that a model lacks changes
     little from row to row, except for friction at reversals; rows next to reversals are not used.

@@ -18,7 +18,7 @@ import numpy.typing as npt
 @dataclass(frozen=True)
 class Rows:
     """
-    Weighted regression rows of baseline recordings and diagnosed recordings.
+    Weighted regression rows of the baseline recordings and of the diagnosed ones.
 
     Attributes
     ----------
@@ -43,7 +43,7 @@ class Rows:
 
     @classmethod
     def over_noise(cls, evidence: Evidence) -> Rows:
-        """Return the rows of diagnosed recordings without a baseline, divided by their noise."""
+        """Return the rows of diagnosed recordings, weighted by noise; there is no baseline."""
         torque = np.maximum(evidence.torque_rms, 1e-3 * evidence.torque_rms.max())
         amplitude = (torque,) * count_recordings(evidence.data)
         return cls(evidence.data, evidence.sigma, 0, amplitude).above_rounding()
@@ -59,13 +59,13 @@ class Rows:
 
     @cached_property
     def weight(self) -> list[FloatArray]:
-        """Return 1 / sigma in the rows in which a joint moves, else zero, (M, n) [1/(N m)]."""
+        """Return 1 / sigma in rows in which a joint moves, else zero, (M, n) [1/(N m)]."""
         pairs = zip(self.data, self.sigma, strict=True)
         return [row_weights([part], [sigma]) for part, sigma in pairs]
 
     @cached_property
     def diagnosed(self) -> npt.NDArray[np.bool_]:
-        """Return whether each of K recordings is diagnosed, and not part of the baseline."""
+        """Return a mask (K,) of the recordings that are diagnosed; the others are the baseline."""
         return np.arange(max(part.fold for part in self.data) + 1) >= self.n_baseline
 
     @cached_property
@@ -74,7 +74,7 @@ class Rows:
         return [k for k, part in enumerate(self.data) if self.diagnosed[part.fold]]
 
     def rms_of_diagnosed(self, columns: Sequence[FloatArray]) -> FloatArray:
-        """Return the rms of columns (M, n, p) over diagnosed rows in which the joint moves."""
+        """Return the rms of columns (M, n, p) over diagnosed rows in which each joint moves."""
         squares, count = np.zeros(columns[0].shape[1:]), np.zeros((columns[0].shape[1], 1))
         for k in self.diagnosed_parts:
             moving = self.weight[k][:, :, np.newaxis] > 0.0
@@ -90,7 +90,7 @@ class Rows:
         return np.asarray(np.maximum(rms, 1e-3 * rms.max()))
 
     def weighted(self, columns: Sequence[FloatArray], joints: Sequence[int]) -> list[FloatArray]:
-        """Divide columns (M, n, p) by `sigma`; return them per recording, as (joints, M, p)."""
+        """Divide columns (M, n, p) by `sigma`; return each recording as (joints, M, p)."""
         index = list(joints)
         rows = [
             (own[:, index] * weight[:, index, np.newaxis]).swapaxes(0, 1)

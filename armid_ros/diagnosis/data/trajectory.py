@@ -47,7 +47,7 @@ MAX_UNCERTAIN_SHARE = 0.003
 @dataclass(frozen=True)
 class Trajectory:
     """
-    One part of a recording without missing samples, filtered and decimated to matrix rows.
+    Recorded section without missing samples, filtered and decimated to regression rows.
 
     Attributes
     ----------
@@ -81,36 +81,36 @@ class Trajectory:
 
     @cached_property
     def informative(self) -> npt.NDArray[np.bool_]:
-        """Return False for rows in which a joint rests or reverses, otherwise True, (M, n)."""
+        """Return a mask (M, n): False for rows in which a joint rests or reverses."""
         return np.asarray(self.unsure <= self.allowed)
 
     def reduce(self, values: FloatArray) -> FloatArray:
-        """Filter and decimate samples (N, ...) to rows (M, ...)."""
+        """Filter and decimate samples (N, ...) to regression rows (M, ...)."""
         return decimate(values, self.used)
 
     @cached_property
     def at_rows(self) -> Motion:
-        """Return the motion at the central sample of each row."""
+        """Return the motion at the middle sample of each regression row."""
         return self.motion.select(self.rows)
 
     @cached_property
     def period(self) -> tuple[int, slice] | None:
-        """Return lag and samples of the repeated period, or None if no period repeats."""
+        """Return lag and samples of the period that the motion repeats, or None."""
         return find_period(self.motion.t, self.motion.q)
 
     @property
     def torque(self) -> FloatArray:
-        """Filtered measured torque in the rows, shape (M, n) [N m]."""
+        """Filtered measured torque, shape (M, n) [N m]."""
         assert self.motion.tau is not None
         return self.reduce(self.motion.tau)
 
     def residual(self, arm: ArmModel) -> FloatArray:
-        """Return measured torque minus the torque of a model in the rows, (M, n) [N m]."""
+        """Return the filtered residual torque of a model, shape (M, n) [N m]."""
         assert self.motion.tau is not None
         return self.reduce(self.motion.tau - arm.torque(self.motion))
 
     def columns(self, arm: ArmModel, effect: Effect) -> FloatArray:
-        """Return the torque per unit of each parameter of an effect in the rows, (M, n, P)."""
+        """Return the filtered torque per unit of each parameter of an effect, shape (M, n, P)."""
         if effect.smooth:
             return arm.columns_of(effect, self.at_rows)
         return self.reduce(arm.columns_of(effect, self.motion))
@@ -119,7 +119,7 @@ class Trajectory:
         self, arm: ArmModel, effects: Sequence[Effect], chosen: npt.NDArray[np.intp]
     ) -> FloatArray:
         """
-        Return the regressor of chosen rigid parameters and effect values in the rows, (M, n, r).
+        Return the filtered regressor of chosen parameters of body and effects, (M, n, r).
 
         Parameters
         ----------
@@ -145,7 +145,7 @@ class Trajectory:
 
     @property
     def t(self) -> FloatArray:
-        """Time of each row, shape (M,) [s]."""
+        """Time of each regression row, shape (M,) [s]."""
         return self.motion.t[self.rows]
 
 
@@ -156,7 +156,7 @@ def trajectories(
     allowed: FloatArray | None = None,
 ) -> list[Trajectory]:
     """
-    Filter recordings, and divide them where samples are missing.
+    Divide recordings where samples are missing, and filter each section.
 
     Parameters
     ----------
@@ -197,7 +197,7 @@ def trajectories(
 
 def thinnable(used: Conditioning) -> Conditioning:
     """
-    Reduce the decimation of rows to a multiple of the decimation of columns.
+    Reduce the row decimation to a multiple of the decimation of regressor columns.
 
     Each row then spans a whole number of column samples; rows increase by at most an eighth.
 
@@ -208,7 +208,7 @@ def thinnable(used: Conditioning) -> Conditioning:
 
 def _widest(used: Conditioning) -> int:
     """
-    Return the largest decimation of samples that keeps the rate above four times the cut-off.
+    Return the largest decimation that keeps the sampling rate above four times the cut-off.
 
     Columns contain squares of velocities, whose band is twice the cut-off.
 
@@ -219,7 +219,7 @@ def _widest(used: Conditioning) -> int:
 
 
 def _thinned(motion: Motion, used: Conditioning) -> tuple[Motion, Conditioning]:
-    """Decimate a motion to the rate of regressor columns; return also the filter to rows."""
+    """Decimate a motion to the sampling rate of the regressor; return it with the row filter."""
     thin = max(d for d in range(1, _widest(used) + 1) if used.decimation % d == 0)
     if thin == 1:
         return motion, used
@@ -231,7 +231,7 @@ def _thinned(motion: Motion, used: Conditioning) -> tuple[Motion, Conditioning]:
 
 
 def _uncertain_share(motion: Motion, used: Conditioning, slowest: FloatArray) -> FloatArray:
-    """Return the share of uncertain velocity signs around each sample, inf at rest, (N, n)."""
+    """Return the filter-weighted share of uncertain velocity signs; inf at rest, (N, n)."""
     speed = np.abs(motion.dq)
     slow = speed < np.maximum(_REVERSAL_SPEED * speed.max(axis=0), slowest)
     slow[1:] |= np.diff(np.sign(motion.dq), axis=0) != 0
@@ -250,7 +250,7 @@ def _uncertain_share(motion: Motion, used: Conditioning, slowest: FloatArray) ->
 def block_rows(
     data: Sequence[Trajectory],
 ) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]:
-    """Return the time block of each row, (R,), and the recording of each time block, (B,)."""
+    """Return the time block of each of R rows, and the recording of each of B blocks."""
     fold = fold_rows(data)
     block = np.empty(len(fold), dtype=np.intp)
     owner: list[int] = []
@@ -265,17 +265,17 @@ def block_rows(
 
 
 def row_weights(data: Sequence[Trajectory], sigma: Sequence[FloatArray]) -> FloatArray:
-    """Return 1 / sigma in the rows in which a joint moves, else zero, (R, n) [1/(N m)]."""
+    """Return 1 / sigma for rows in which a joint moves, else zero, (R, n) [1/(N m)]."""
     return np.concatenate([part.informative / s for part, s in zip(data, sigma, strict=True)])
 
 
 def count_recordings(data: Sequence[Trajectory]) -> int:
-    """Return the number of recordings to which trajectories belong."""
+    """Return how many recordings the trajectories are from."""
     return len({part.fold for part in data})
 
 
 def unchecked_joints(data: Sequence[Trajectory], joints: Sequence[str]) -> tuple[str, ...]:
-    """Return the joints that rest in all trajectories, or reverse in every row."""
+    """Return the joints without usable data: at rest, or in reversal in each row."""
     if not data:
         return ()
     shown = moving(part.motion for part in data)
@@ -285,7 +285,7 @@ def unchecked_joints(data: Sequence[Trajectory], joints: Sequence[str]) -> tuple
 
 def fold_rows(data: Sequence[Trajectory]) -> npt.NDArray[np.intp]:
     """
-    Return the number of the cross-validation fold of each row, shape (R,).
+    Return the cross-validation fold of each row, shape (R,).
 
     A fold is a stretch of time of one recording. There are at least six folds, and two in each
     recording: an effect in a single fast recording is fitted to one half and predicts the other.

@@ -46,7 +46,7 @@ _SUFFICIENT_Z = 5.0
 @dataclass(frozen=True)
 class NextRun:
     """
-    Planned motion that separates named effects from their rivals.
+    Planned motion that separates the named effects from their rivals.
 
     Attributes
     ----------
@@ -68,12 +68,12 @@ class NextRun:
 
     @property
     def expected_z(self) -> float:
-        """Return the smallest predicted separation of all pairs of effects, as a z-score."""
+        """Return the smallest predicted z-score by which two effects are separated."""
         return min(pair.z for pair in self.separations)
 
     @property
     def sentence(self) -> str:
-        """Describe the motion and the pairs of effects that it separates, in one sentence."""
+        """Return a sentence on the motion and the pairs of effects that it separates."""
         separated = sorted((s for s in self.separations if s.distinct), key=lambda one: one.z)
         most = 3  # pairs in a sentence
         parts = []
@@ -107,7 +107,7 @@ class NextRun:
 
 
 class _Candidate(NamedTuple):
-    """A possible motion, the load of its second run, and the separation of pairs of effects."""
+    """Candidate motion, the load of its second run, and its separation of effect pairs."""
 
     template: Template
     trajectory: FourierTrajectory
@@ -187,7 +187,7 @@ def next_run(
 
 def _in_order(candidates: Sequence[_Candidate]) -> list[_Candidate]:
     """
-    Sort motions by the sum of log(1 + z^2), with z-scores z of effect pairs, largest first.
+    Sort candidate motions by how well they separate all pairs of effects, best first.
 
     Motions with a payload come last if a motion without payload separates all pairs sufficiently.
 
@@ -202,7 +202,7 @@ def _in_order(candidates: Sequence[_Candidate]) -> list[_Candidate]:
 
 
 def _pairs(diagnosis: Diagnosis) -> list[tuple[Effect, Effect]]:
-    """Return the pairs of a named effect and a rival, each combination of names only once."""
+    """Return pairs of a named effect and a rival, each pair of effect names once."""
     explanation = diagnosis.explanation
     if explanation is None:
         return []

@@ -33,7 +33,7 @@ _MAX_TORQUE_SHARE = 0.15
 @dataclass(frozen=True)
 class Load:
     """
-    Known mass that is fixed to the last link for a second run of the same motion.
+    Known mass that is mounted on the last link when a motion is repeated.
 
     Attributes
     ----------
@@ -49,7 +49,7 @@ class Load:
 
     @staticmethod
     def along(arm: ArmModel, trajectory: FourierTrajectory) -> Load:
-        """Return the largest payload, rounded down, that the drives can carry along a motion."""
+        """Return the largest payload that the motors can carry along a motion, rounded down."""
         robot = arm.robot
         motion = trajectory.one_period(int(trajectory.period * _RATE))
         last = robot.model.getJointId(robot.tip)
@@ -71,7 +71,7 @@ class Load:
 
 
 def _of_last_link(robot: Robot) -> slice:
-    """Return the slice of all rigid-body parameters that belongs to the last link."""
+    """Return the slice of the last link's parameters among all inertial parameters."""
     last = robot.moving.index(robot.tip)
     return slice(10 * last, 10 * last + 10)
 
@@ -87,7 +87,7 @@ def _point_mass(robot: Robot, frame: str) -> FloatArray:
 @dataclass(frozen=True)
 class Separation:
     """
-    Predicted separation of a named effect from a rival by a motion.
+    Predicted separation of a named effect from a rival effect by a motion.
 
     Attributes
     ----------
@@ -116,7 +116,7 @@ def separation(
     load: Load | None = None,
 ) -> Separation:
     """
-    Predict the separation of a named effect from a rival by a motion.
+    Predict as a z-score how well a motion separates a named effect from a rival.
 
     Parameters
     ----------
@@ -157,7 +157,7 @@ def separation(
 
 def informative_weight(motion: Motion, rows: float, sigma: FloatArray) -> FloatArray:
     """
-    Return the weight of each sample: sqrt(rows) / sigma where a joint moves, else zero, (N, n).
+    Return sample weights: sqrt(rows) / sigma where a joint moves, else zero, (N, n).
 
     The noise is white over rows: a higher rate of samples adds no information. Below 2 % of its
     top speed a joint is not informative, as its dry friction is arbitrary.
@@ -170,7 +170,7 @@ def informative_weight(motion: Motion, rows: float, sigma: FloatArray) -> FloatA
 def _nuisance_columns(
     diagnosis: Diagnosis, arm: ArmModel, named: Effect, motion: Motion
 ) -> FloatArray:
-    """Return the columns of the nuisance parameters in a motion, shape (N, n, f)."""
+    """Return the regressor columns of the nuisance parameters in a motion, shape (N, n, f)."""
     assert diagnosis.explanation is not None
     given = diagnosis.explanation.given
     known = zip(given.effects, given.values, strict=True)
@@ -184,7 +184,7 @@ def _nuisance_columns(
 
 
 def basis_of(columns: FloatArray) -> FloatArray:
-    """Return an orthonormal basis of the column space, without axes due to rounding errors."""
+    """Return an orthonormal basis of the column space, without directions of rounding errors."""
     length = np.linalg.norm(columns, axis=0)
     columns = columns[:, length > 0.0] / length[length > 0.0]
     if not columns.shape[1]:

@@ -27,7 +27,7 @@ def next_steps(
     learned: bool = False,
 ) -> list[str]:
     """
-    Return sentences with advice on inspection, recording and use of the model, in order.
+    Return sentences on what to inspect, what to record next, and how to use the model.
 
     Parameters
     ----------
@@ -81,7 +81,7 @@ def next_steps(
 
 
 def _use_of_model(diagnosis: Diagnosis, model: str, worse: Sequence[str]) -> list[str]:
-    """Return sentences on the use of the model, or on steps that have to precede it."""
+    """Return sentences on how to use the model, or on what has to be done before."""
     if diagnosis.not_checked:
         return [f'Move {", ".join(diagnosis.not_checked)} as well, and record again.']
     if worse:
@@ -99,7 +99,7 @@ def _use_of_model(diagnosis: Diagnosis, model: str, worse: Sequence[str]) -> lis
 
 
 def _inspections(finding: Finding, diagnosis: Diagnosis) -> list[str]:
-    """Return sentences on the parts of the robot to inspect for a finding and its rivals."""
+    """Return sentences on robot parts to inspect because of a finding or its rivals."""
     steps = []
     own = Rival(finding.name, finding.joints)
     for one in (own, *finding.other_causes):
@@ -132,7 +132,7 @@ def _centre(finding: Finding) -> str:
 
 def _look_at(name: str, diagnosis: Diagnosis) -> str:
     """
-    Return the part of the robot to inspect for an effect, in words.
+    Return the robot part to inspect for an effect, as text.
 
     It is empty for a usual effect that the given model lacks, such as friction: that is no fault
     of the robot.

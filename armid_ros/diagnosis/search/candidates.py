@@ -46,7 +46,7 @@ _BODY_SIZES = np.array([1.0, *3 * [0.1], *6 * [0.01]])
 @dataclass(frozen=True)
 class Causes:
     """
-    Candidate causes of a diagnosis, with their regression columns.
+    Candidate causes of a residual, with their regressor columns.
 
     Attributes
     ----------
@@ -76,7 +76,7 @@ class Causes:
     )
 
     def causes(self, nuisance: Nuisance, posterior: NuisancePosterior) -> list[Cause]:
-        """Return all causes that are not accepted yet, each at all start values of its shapes."""
+        """Return all candidate causes that are not accepted yet, at all start values of shapes."""
         arm, result, families = nuisance.arm, list[Cause](), list[Cause]()
         there = [one.effect for one in nuisance.accepted]
         taken = {(one.name, place) for one in there for place in (one.joints, *zip(one.joints))}
@@ -104,7 +104,7 @@ class Causes:
         self, singles: Sequence[Cause], nuisance: Nuisance, posterior: NuisancePosterior
     ) -> Iterator[Cause]:
         """
-        Yield a friction law on the set of two or more joints that maximises its Bayes factor.
+        Yield a friction law on the set of at least two joints that fits best (Bayes factor).
 
         Values of joints are independent, with one prior; all numbers of joints are equally likely.
 
@@ -135,12 +135,12 @@ class Causes:
 
     @property
     def effects(self) -> Iterator[Effect]:
-        """Yield the effects of all candidate causes, on each joint, pair or the whole arm."""
+        """Yield the effect of each candidate cause: on a joint, a pair of joints, or the arm."""
         for _, members in candidate_effects(self.nuisance.arm.robot, self.kinds):
             yield from (one for one in members if (one.name, one.joints) not in self.fitted)
 
     def _single_causes(self, effect: Effect, singles: Sequence[Effect]) -> Iterator[Cause]:
-        """Yield a cause for each single-joint effect; `effect` is the same law on all joints."""
+        """Yield a cause for each single-joint effect, from the `effect` on all these joints."""
         robot, start = self.nuisance.arm.robot, 0
         places: list[tuple[Effect, tuple[int, ...], list[int]]] = []
         for one in singles:
@@ -160,16 +160,16 @@ class Causes:
 
     @cached_property
     def _predicted(self) -> list[Trajectory]:
-        """Return the trajectories with the model's torque in place of the measured torque."""
+        """Return the trajectories with modelled instead of measured torque."""
         arm = self.nuisance.arm
         return [without_measurement(part, arm) for part in self.nuisance.rows.data]
 
     def _columns(self, effect: Effect) -> list[FloatArray]:
-        """Return the regression columns of an effect in each trajectory, (M, n, p)."""
+        """Return the regressor columns of an effect in each trajectory, (M, n, p)."""
         return [part.columns(self.nuisance.arm, effect) for part in self._predicted]
 
     def reshaped(self, cause: Cause, shape: FloatArray) -> Cause | None:
-        """Return the cause with other shape values; None if impossible or without any torque."""
+        """Return the cause with other shape values; None if impossible or without torque."""
         try:
             effect = cause.effect.with_shape(shape)
             columns = self._columns(effect)
@@ -184,7 +184,7 @@ class Causes:
         self, effect: Effect, kept: tuple[int, ...], columns: Sequence[FloatArray]
     ) -> Cause | None:
         """
-        Return the cause with given regression columns (M, n, p), or None if these are zero.
+        Return the cause with given regressor columns (M, n, p); None if they are zero.
 
         Columns are zero in diagnosed recordings without any torque of the effect. None as well for
         a strap that is taut in all samples: it equals a spring.
@@ -213,7 +213,7 @@ def value_unit(
     nuisance: Nuisance, effect: Effect, kept: Sequence[int], torque: FloatArray
 ) -> FloatArray:
     """
-    Return the parameter values at which the torque of an effect equals the joint torque, (p,).
+    Return the parameter values (p,) at which an effect's torque equals the joint torque.
 
     A scale is at most the largest plausible value. The torque per unit value is the root mean
     square in the diagnosed recordings, (n, p) [N m].
@@ -241,7 +241,7 @@ def cause_of(
     torque: FloatArray | None = None,
 ) -> Cause:
     """
-    Weight the columns of an effect, and compute their inner products with the nuisance columns.
+    Weight the columns of an effect, and compute their inner products with other columns.
 
     Parameters
     ----------
@@ -288,7 +288,7 @@ def cause_of(
 
 
 def _unexplained(nuisance: Nuisance, posterior: NuisancePosterior) -> Unexplained:
-    """Return motion, residual and nuisance columns, from which effects choose start values."""
+    """Return motion, residual and nuisance columns, with which effects choose start values."""
     rows = nuisance.rows
     values = nuisance.means(posterior)
     motions = [part.motion for part in rows.data]
@@ -315,7 +315,7 @@ def _unexplained(nuisance: Nuisance, posterior: NuisancePosterior) -> Unexplaine
 def candidate_effects(
     robot: Robot, kinds: Sequence[type[Effect]], reference: Mapping[str, float] = _NO_REFERENCE
 ) -> Iterator[tuple[Effect, list[Effect]]]:
-    """Yield each effect on all joints, and its copies on one joint, one pair or the whole arm."""
+    """Yield each effect on all joints, with its copies on one joint, a pair, or the arm."""
     for kind in with_exact_vector(kinds):
         try:
             places = kind.places(robot)
@@ -335,7 +335,7 @@ def candidate_effects(
 def with_starting_shapes(
     effect: Effect, members: list[Effect], arm: ArmModel, unexplained: Unexplained
 ) -> Iterator[tuple[Effect, list[Effect]]]:
-    """Yield an effect and its single-joint copies, once for each start value of its shapes."""
+    """Yield an effect and its single-joint copies for each start value of their shapes."""
     if not effect.shapes:
         yield effect, members
         return
@@ -356,7 +356,7 @@ def with_starting_shapes(
 def line_search(
     gain: Callable[[FloatArray], float], shape: FloatArray, index: int, kind: Shape
 ) -> FloatArray:
-    """Return shape parameters, with one moved to the maximum of `gain` (Brent 1973)."""
+    """Move one shape parameter to the maximum of `gain` by Brent's method (1973)."""
     value = float(shape[index])
     positive = kind.lower > 0.0 and value > 0.0 and kind.near is None and kind.unit != '1/rev'
 
@@ -390,7 +390,7 @@ def line_search(
 
 def without_measurement(part: Trajectory, arm: ArmModel) -> Trajectory:
     """
-    Return a trajectory with the torque of a model in place of the measured torque.
+    Return a trajectory whose measured torque is replaced by that of a model.
 
     Columns that contain the measured torque would explain any residual.
 

@@ -17,7 +17,7 @@ import numpy.typing as npt
 @dataclass(frozen=True)
 class Cause:
     """
-    A candidate cause: an effect with given joints and shape values, and its regressor.
+    Candidate cause of a residual: an effect on given joints with given shapes, and its regressor.
 
     Attributes
     ----------
@@ -64,21 +64,21 @@ class Cause:
 
     @property
     def key(self) -> tuple[str, tuple[str, ...], tuple[int, ...]]:
-        """Key of the cause, equal for all shape values: name, joints, indices of fitted values."""
+        """Name, joints and indices of fitted values, which identify the cause at any shape."""
         return self.effect.name, self.effect.joints, self.kept
 
     def acts(self, diagnosed: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
-        """Return whether the cause acts in each recording; `diagnosed` is a mask of recordings."""
+        """Return for each recording whether the cause acts; `diagnosed` is a recording mask."""
         return np.ones_like(diagnosed) if self.always or self.effect.lasting else diagnosed
 
     def at(self, values: FloatArray, robot: Robot) -> NamedEffect:
-        """Return the effect with these values of its fitted parameters; the others are zero."""
+        """Return the effect with these fitted values; its other parameters are zero."""
         whole = np.zeros(len(self.effect.parameters(robot)))
         whole[list(self.kept)] = values
         return NamedEffect(self.effect, self.kept, whole)
 
     def among(self, effect: Effect, values: npt.NDArray[np.intp], shapes: int) -> Cause:
-        """Return a cause with a subset of the columns, for the same effect on fewer joints."""
+        """Return the cause for the same effect on fewer joints, from a subset of the columns."""
         return replace(
             self,
             effect=effect,
@@ -94,7 +94,7 @@ class Cause:
         )
 
     def products_with(self, other: Cause) -> FloatArray:
-        """Return inner products of the columns with those of another cause, (K, p, p')."""
+        """Return the inner products of the columns of two causes, shape (K, p, p')."""
         total = np.zeros((len(self.columns), len(self.unit), len(other.unit)))
         for k, joint in enumerate(self.joints):
             if joint in other.joints:
@@ -107,7 +107,7 @@ class Cause:
 @dataclass(frozen=True)
 class NamedEffect:
     """
-    An effect with values for its parameters.
+    Effect with a value for each of its parameters.
 
     Attributes
     ----------
@@ -126,7 +126,7 @@ class NamedEffect:
 
 
 def bounds_of_change(effect: Effect, arm: ArmModel) -> tuple[FloatArray, FloatArray]:
-    """Return the smallest and largest change that keeps an effect's values in bounds, (P,)."""
+    """Return the smallest and largest change (P,) that keeps effect values in their bounds."""
     lower, upper = effect.bounds()
     there = {
         name: value

@@ -62,7 +62,7 @@ Accepted: TypeAlias = tuple[list[CauseResult], Nuisance]
 @dataclass(frozen=True)
 class Selection:
     """
-    Causes that the forward selection accepted, and the regression problem with them.
+    Causes accepted by forward selection, and the regression problem that includes them.
 
     Attributes
     ----------
@@ -89,7 +89,7 @@ class Selection:
 @dataclass(frozen=True)
 class CauseComparison:
     """
-    Forward selection of the causes of a residual by their Bayes factors.
+    Forward selection of the causes of a residual by Bayes factors.
 
     Attributes
     ----------
@@ -115,18 +115,18 @@ class CauseComparison:
 
     @cached_property
     def typical_spread(self) -> float:
-        """Return the typical variance of fitted values between baseline recordings."""
+        """Return the typical variance of fitted values from one baseline recording to another."""
         some = self._causes_of(self.nuisance)[::_SAMPLED]
         return typical_spread_of(some, self.nuisance, self._likeliest(self.nuisance))
 
     def initial(self) -> Selection:
-        """Return a selection with a ranking of all causes, and without accepted causes."""
+        """Return the selection before any cause is accepted, with a ranking of all causes."""
         ranking = self.rank_all(self.nuisance)
         effects = tuple(self.catalogue.effects)
         return Selection((), self.nuisance, ranking.posterior, ranking, effects)
 
     def refit_whole_arm_causes(self, before: Selection) -> Selection:
-        """Accept the whole-arm causes of another selection, and refit them to this problem."""
+        """Copy accepted causes that act on the whole arm from another selection; refit them."""
         accepted = tuple(trial for trial in before.accepted if not trial.effect.joints)
         nuisance = self.nuisance
         for one in before.nuisance.accepted:
@@ -139,7 +139,7 @@ class CauseComparison:
 
     def select(self, begun: Selection | None = None) -> Selection:
         """
-        Accept the best cause until none is significant; drop causes that became redundant.
+        Accept the best cause until none is significant, and drop causes made redundant.
 
         Parameters
         ----------
@@ -155,7 +155,7 @@ class CauseComparison:
         return replace(result, accepted=tuple(accepted), nuisance=nuisance, posterior=posterior)
 
     def _add_causes(self, accepted: list[CauseResult], ranking: Ranking) -> Accepted:
-        """Add the best cause to the accepted ones until no further cause is significant."""
+        """Accept the best cause repeatedly until no further cause is significant."""
         nuisance = ranking.nuisance
         while len(accepted) < _MOST:
             best = self.best(ranking, accepted)
@@ -168,7 +168,7 @@ class CauseComparison:
         return accepted, nuisance
 
     def _exchange_causes(self, accepted: list[CauseResult], nuisance: Nuisance) -> Accepted:
-        """Replace a cause that resembles several other causes by those if they are likelier."""
+        """Replace a cause by several others that resemble it, if these are likelier."""
         # the last cause was selected with all others in the model
         for k, one in enumerate(accepted[:-1]):
             ranking = self.rank_all(nuisance.without_cause(k))
@@ -183,7 +183,7 @@ class CauseComparison:
         return accepted, nuisance
 
     def _log_posterior(self, nuisance: Nuisance) -> float:
-        """Return the log posterior probability of the accepted causes, up to a constant."""
+        """Return the log posterior probability of the accepted causes, without normalisation."""
         prior = sum(one.prior for one in nuisance.accepted)
         return self._likeliest(nuisance).evidence + prior
 
@@ -191,7 +191,7 @@ class CauseComparison:
         self, ranking: Ranking, accepted: Sequence[CauseResult]
     ) -> tuple[RankedCause, CauseResult] | None:
         """
-        Return the best cause of a ranking, and its result with probability and rivals.
+        Return the best cause of a ranking, and its test result with rivals.
 
         None if no cause is significant in addition to the accepted ones.
 
@@ -237,24 +237,24 @@ class CauseComparison:
         return winner, found
 
     def _all_posteriors(self, nuisance: Nuisance) -> list[NuisancePosterior]:
-        """Return the posterior of the nuisance parameters for each set of hyperparameters."""
+        """Return the posterior of nuisance parameters for each choice of hyperparameters."""
         if id(nuisance) not in self._posteriors:
             self._posteriors[id(nuisance)] = nuisance, [nuisance.posterior(x) for x in self.grid]
         return self._posteriors[id(nuisance)][1]
 
     def _likeliest(self, nuisance: Nuisance) -> NuisancePosterior:
-        """Return the posterior of the nuisance parameters for the likeliest hyperparameters."""
+        """Return the posterior of nuisance parameters for the likeliest hyperparameters."""
         return max(self._all_posteriors(nuisance), key=lambda one: one.evidence)
 
     def _causes_of(self, nuisance: Nuisance) -> list[Cause]:
-        """Return the causes that are not accepted in a regression problem; cache the result."""
+        """Return the candidate causes that a regression problem does not include yet."""
         if id(nuisance) not in self._causes:
             likeliest = self._likeliest(nuisance)
             self._causes[id(nuisance)] = self.catalogue.causes(nuisance, likeliest)
         return self._causes[id(nuisance)]
 
     def rank_all(self, nuisance: Nuisance) -> Ranking:
-        """Rank the causes that are not accepted yet; optimise shape values of the best causes."""
+        """Rank the causes that are not accepted yet, the best ones with optimised shapes."""
         settings, likeliest = self._all_posteriors(nuisance), self._likeliest(nuisance)
         # for each size of link errors, the likeliest posterior and the one with noise only
         tried: list[NuisancePosterior] = []
@@ -283,7 +283,7 @@ class CauseComparison:
         return Ranking(ranked, others, nuisance, likeliest, self.typical_spread)
 
     def rank(self, cause: Cause, nuisance: Nuisance) -> RankedCause:
-        """Return the Bayes factor of a cause, averaged over the hyperparameters."""
+        """Return a cause with its Bayes factor, averaged over the hyperparameters."""
         settings = self._all_posteriors(nuisance)
         fits = [(fit_cause(cause, nuisance, one), one) for one in settings]
         nothing = np.logaddexp.reduce([posterior.evidence for _, posterior in fits])
@@ -301,7 +301,7 @@ class CauseComparison:
     def _with_best_shape(
         self, cause: Cause, nuisance: Nuisance, posterior: NuisancePosterior
     ) -> Cause:
-        """Return a cause with the shape values that maximise its Bayes factor."""
+        """Return a cause with the shape values that maximise the Bayes factor."""
         best = [(fit_cause(cause, nuisance, posterior).factor, cause)]
 
         def gain(shape: FloatArray) -> float:
@@ -317,7 +317,7 @@ class CauseComparison:
         return max(best, key=lambda one: one[0])[1]
 
     def _drop_redundant(self, accepted: list[CauseResult], nuisance: Nuisance) -> Accepted:
-        """Drop accepted causes with log odds below the alarm threshold, except the last cause."""
+        """Drop accepted causes with too small log odds; the last accepted cause stays."""
         while len(accepted) > 1:
             values, covariance = nuisance.moments(self._likeliest(nuisance))
             log_odds = []
@@ -335,7 +335,7 @@ class CauseComparison:
 
 
 def hyperparameters_of_baseline(nuisance: Nuisance) -> tuple[Hyperparameters, ...]:
-    """Return the one set of hyperparameters that maximises the evidence of the baseline."""
+    """Return the hyperparameters that maximise the evidence of the baseline recordings."""
     before = np.flatnonzero(~nuisance.rows.diagnosed).tolist()
     correlated_rows = 1.0
     for _ in range(2):
@@ -349,7 +349,7 @@ def hyperparameters_of_baseline(nuisance: Nuisance) -> tuple[Hyperparameters, ..
 
 
 def grid_without_baseline() -> tuple[Hyperparameters, ...]:
-    """Return hyperparameters to average over without a baseline, for exact and inexact links."""
+    """Return the hyperparameters over which a diagnosis without baseline averages."""
     return tuple(
         Hyperparameters(body, share, share, factor, CORRELATED_ROWS, odds + more)
         for body in _BODIES

@@ -67,7 +67,7 @@ _ONE_EACH = (
 @dataclass(frozen=True)
 class Explainer:
     """
-    Inputs of the search for causes among the effects of the catalogue.
+    Search for the causes of a residual among the effects of the catalogue.
 
     Attributes
     ----------
@@ -100,7 +100,7 @@ class Explainer:
     held_out: Sequence[Trajectory] = ()
 
     def explanation(self) -> Explanation:
-        """Return the named causes of the residual, by the method for the given inputs."""
+        """Search for the causes of the residual, with the method that the inputs allow."""
         if self.baseline is not None:
             return self._explain_since_baseline(self.baseline)
         return (
@@ -110,7 +110,7 @@ class Explainer:
         )
 
     def _explain_model_alone(self) -> Explanation:
-        """Find the effects that a model without baseline and without known misfit lacks."""
+        """Find the missing effects of a model if there are no recordings for comparison."""
         prepared, settings = self.prepared, self.settings
         self.tell(0.2, 'search for missing effects')
         evidence = Evidence.over_noise(prepared.data, prepared.sigma)
@@ -164,7 +164,7 @@ class Explainer:
 
     def _explain_since_identification(self, written: Misfit) -> Explanation:
         """
-        Find the changes since an identification if only the size of its misfit is known.
+        Find changes since the identification, of which only the residual size is known.
 
         Without its recordings, any cause may explain a part of this misfit; see `fit_causes`.
 
@@ -188,7 +188,7 @@ class Explainer:
         return replace(found, floor=WRITTEN_MISFIT, misfit=misfit, untested=_NO_BASELINE)
 
     def _explain_since_baseline(self, baseline: Baseline) -> Explanation:
-        """Find the changes since the baseline recordings."""
+        """Find the changes since the baseline was recorded."""
         prepared = self.prepared
         now, then = torque_rms(prepared.data), torque_rms(baseline.data)
         misfit = baseline.misfit * growth(now, then)
@@ -219,7 +219,7 @@ class Explainer:
         return replace(found, floor=OWN_MISFIT, misfit=misfit, untested=untested)
 
     def _fit_changes(self, result: Selection, evidence: Evidence, spread: float) -> Explanation:
-        """Fit the accepted causes as changes of the given model."""
+        """Fit the values of the accepted causes, as changes of the given model."""
         nuisance = replace(result.nuisance, accepted=())
         fitted = tuple(range(nuisance.rows.n_baseline + count_recordings(self.prepared.data)))
         hyperparameters = result.posterior.hyperparameters
@@ -236,7 +236,7 @@ class Explainer:
         gravity: FloatArray | None = None,
     ) -> CauseComparison:
         """
-        Return the selection problem: nuisance parameters, candidate causes and hyperparameters.
+        Set up the selection of causes: nuisance parameters, candidates and hyperparameters.
 
         Parameters
         ----------
@@ -270,7 +270,7 @@ class Explainer:
         return CauseComparison(nuisance, catalogue, settings, used)
 
     def _reference(self) -> dict[str, float] | None:
-        """Return reference temperatures by joint [degC]; None if no temperature was measured."""
+        """Return the reference temperature of each joint [degC]; None if none was measured."""
         today = [part.motion for part in (*self.prepared.data, *self.held_out)]
         before = [part.motion for part in self.baseline.data] if self.baseline else today
         if mean_temperatures([*before, *today]) is None:
@@ -289,7 +289,7 @@ def _noise_within(
     misfit: FloatArray, prepared: Prepared, contained: FloatArray
 ) -> tuple[FloatArray, ...]:
     """
-    Return the torque noise of each trajectory, limited by the misfit of each joint, (n,) [N m].
+    Return the torque noise (n,) of each trajectory, limited by the known misfit [N m].
 
     An event in one of two periods increases their difference, but it belongs to the gap. The
     squared noise is at most the squared misfit plus the increase of row-to-row noise.

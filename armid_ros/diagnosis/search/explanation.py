@@ -29,7 +29,7 @@ WRITTEN_MISFIT = 'the error of the model when it was identified'
 @dataclass(frozen=True)
 class Explanation:
     """
-    Named causes of a residual with their fitted values, and the floor of the gap.
+    Named causes of a residual, with their fitted values and the noise level.
 
     Attributes
     ----------
@@ -77,22 +77,22 @@ class Explanation:
 
     @property
     def measured(self) -> bool:
-        """Whether the floor is noise or an estimate of the misfit, rather than a known misfit."""
+        """Whether residuals are compared with noise or an estimated misfit, not a known misfit."""
         return self.floor in (NOISE, ESTIMATED)
 
     @property
     def refitted(self) -> bool:
-        """Whether the rigid body is refitted; see `Diagnosis.refitted` after a diagnosis."""
+        """Whether the rigid body was refitted before the search for causes."""
         problem = self.problem
         return problem is not None and problem.patches_body and problem.hyperparameters.body > 0.0
 
     def without(self, *names: int) -> Explanation:
-        """Move causes with these indices to the minor causes, and refit the other causes."""
+        """Move the causes with these indices to the minor causes, and refit the other causes."""
         fewer = self.only([k for k in range(len(self.steps)) if k not in names])
         return replace(fewer, minor=(*self.minor, *(self.steps[k] for k in names)))
 
     def only(self, keep: Sequence[int]) -> Explanation:
-        """Return the explanation with a subset of its causes, refitted, in the given order."""
+        """Return the explanation with some of its causes, refitted, in the given order."""
         assert self.problem is not None
         fitted = self.problem.fit([self.fitted.named[k] for k in keep])
         return replace(self, fitted=fitted, steps=tuple(self.steps[k] for k in keep))
@@ -110,17 +110,17 @@ class Explanation:
 
     @cached_property
     def residual(self) -> list[FloatArray]:
-        """Residual of the arm with the named effects, (M, n) per trajectory [N m]."""
+        """Residual torque of the arm with the named effects, (M, n) per trajectory [N m]."""
         return self.evidence.residuals(self.fitted.arm)
 
     @property
     def chi2_per_row(self) -> FloatArray:
-        """Mean squared weighted residual of the arm with the named effects, shape (n,)."""
+        """Mean squared weighted residual of each joint with the named effects, shape (n,)."""
         return self.evidence.chi2_per_row(self.residual)
 
 
 def has_no_gap(explanation: Explanation, settings: DiagnosisSettings) -> bool:
-    """Return whether the residual with the named effects is within its limit in all joints."""
+    """Return whether the residual with the named effects is within its limit in each joint."""
     limits = explanation.evidence.limits(explanation.residual, settings)
     return bool(np.all(explanation.chi2_per_row <= limits))
 
@@ -134,7 +134,7 @@ def explain(
     known: tuple[Fitted, Sequence[CauseResult]] | None = None,
 ) -> Explanation:
     """
-    Fit the values of the accepted causes that are material.
+    Fit the values of the accepted causes, and keep the causes that are material.
 
     Parameters
     ----------
@@ -194,7 +194,7 @@ def _unset(
     result: Selection, unknown: Sequence[Effect], settings: DiagnosisSettings
 ) -> Iterator[CauseResult]:
     """
-    Yield the result of each friction and offset that is fitted because the model lacks its value.
+    Yield the results of friction and offsets whose values the given model lacks.
 
     A value has the prior of other effects: a mixture of normal distributions with deviations
     `SIZES`, times the value whose torque is that of the joint; by default, it is 'often' present.
@@ -251,7 +251,7 @@ def survey(
     unset: Sequence[CauseResult] = (),
     named: Collection[Key] = (),
 ) -> tuple[tuple[CauseResult, ...], tuple[tuple[str, tuple[str, ...]], ...]]:
-    """Return results of all visible causes, named causes first, and names of invisible causes."""
+    """Return test results of all visible causes, and the names and joints of invisible causes."""
     ranking, material = result.first, settings.material
     # The likeliest hyperparameters without the accepted causes may hide other causes.
     posterior = ranking.nuisance.posterior(result.posterior.hyperparameters)

@@ -19,7 +19,7 @@ CORRELATED_ROWS = 2.0
 @dataclass(frozen=True)
 class Hyperparameters:
     """
-    Standard deviations of errors of the described links, of the model discrepancy, and of noise.
+    Standard deviations of three errors: of described links, model discrepancy and noise.
 
     Attributes
     ----------
@@ -47,14 +47,14 @@ class Hyperparameters:
 
     @property
     def precision(self) -> float:
-        """Inverse noise variance of a weighted row, divided by `correlated_rows`."""
+        """Inverse noise variance of a weighted row, reduced for the correlation of rows."""
         return 1.0 / (self.correlated_rows * self.noise**2)
 
 
 @dataclass(frozen=True)
 class MotionDiscrepancies:
     """
-    Gaussian model discrepancies d_k of K recordings, given the other parameters.
+    Gaussian posteriors of the model discrepancies d_k of K recordings.
 
     Attributes
     ----------
@@ -75,7 +75,7 @@ class MotionDiscrepancies:
 @dataclass(frozen=True)
 class NuisancePosterior:
     """
-    Gaussian posterior of the nuisance parameters for given hyperparameters.
+    Gaussian posterior of the nuisance parameters at given hyperparameters.
 
     Attributes
     ----------
@@ -106,5 +106,5 @@ class NuisancePosterior:
 
     @cached_property
     def root(self) -> FloatArray:
-        """Return the matrix R whose product R'R is the posterior covariance, (u, u)."""
+        """Return a matrix R (u, u) such that R'R is the posterior covariance."""
         return np.asarray(linalg.solve_triangular(self.lower, np.eye(len(self.lower)), lower=True))

@@ -33,7 +33,7 @@ import numpy as np
 @dataclass(frozen=True)
 class Fitted:
     """
-    Arm model with named effects at their posterior means, and the estimate of their values.
+    Arm model with the named effects at their posterior means, and their estimate.
 
     Attributes
     ----------
@@ -58,7 +58,7 @@ class Fitted:
 @dataclass(frozen=True)
 class JointFit:
     """
-    Least-squares problem of named effects, fitted jointly with the nuisance parameters.
+    Least-squares problem for named effects together with the nuisance parameters.
 
     Attributes
     ----------
@@ -93,7 +93,7 @@ class JointFit:
         known: FloatArray | None = None,
     ) -> JointFit:
         """
-        Return the least-squares problem with a free rigid body and no model discrepancy.
+        Return the least-squares problem with free rigid body and without discrepancy.
 
         Parameters
         ----------
@@ -114,7 +114,7 @@ class JointFit:
 
     def fit(self, named: Sequence[NamedEffect] = ()) -> Fitted:
         """
-        Fit the values and shapes of named effects by Gauss-Newton steps with a line search.
+        Fit values and shapes of the named effects by Gauss-Newton with a line search.
 
         Parameters
         ----------
@@ -162,7 +162,7 @@ class JointFit:
         return Fitted(self.arm_at(named, means), named, estimate, means[:size])
 
     def arm_at(self, named: Sequence[NamedEffect], means: FloatArray) -> ArmModel:
-        """Return the arm with named effects, and with the fitted body if `patches_body`."""
+        """Return the arm with the named effects and, if `patches_body`, the fitted rigid body."""
         change = means[: self.nuisance.rank]
         arm, base, theta = self.arm, self.nuisance.base, self.arm.theta
         if self.patches_body and np.any(change):
@@ -170,12 +170,12 @@ class JointFit:
         return patched_arm(arm, named)
 
     def as_described(self) -> JointFit:
-        """Return the same problem with the rigid body fixed to the description."""
+        """Return the same problem with the rigid body of the robot description."""
         return replace(self, hyperparameters=replace(self.hyperparameters, body=0.0))
 
     def unexplained_residual(self, fitted: Fitted) -> list[FloatArray]:
         """
-        Subtract all fitted torques and the discrepancy from residuals of diagnosed recordings.
+        Return the residual of diagnosed recordings after all fitted torques are subtracted.
 
         Returns
         -------
@@ -198,7 +198,7 @@ class JointFit:
         return found
 
     def with_model(self, model: ArmModel) -> Nuisance:
-        """Return the regression problem with the residual of a model in diagnosed recordings."""
+        """Return the regression problem for the residual of another model."""
         rows = self.nuisance.rows
         unchanged = [np.zeros_like(part.unsure) for part in rows.data]
         return self.nuisance.with_residual(self._weighted_residual(model, unchanged))
@@ -206,7 +206,7 @@ class JointFit:
     def _weighted_residual(
         self, model: ArmModel, torque: Sequence[FloatArray]
     ) -> list[FloatArray]:
-        """Weight residuals; in diagnosed recordings, use `torque` plus residual of `model`."""
+        """Return weighted residuals; in diagnosed recordings, of `model` and plus `torque`."""
         rows, residual = self.nuisance.rows, list(self.nuisance.residual)
         rest = [
             own + part.residual(model) if rows.diagnosed[part.fold] else own
@@ -218,13 +218,13 @@ class JointFit:
         return residual
 
     def _loss(self, named: Sequence[NamedEffect]) -> float:
-        """Return the negative log likelihood of the effects, with fitted nuisance parameters."""
+        """Return the negative log likelihood of effects; nuisance parameters are fitted."""
         nuisance = self.with_model(patched_arm(self.arm, named))
         return nuisance.posterior(self.hyperparameters, self.recordings).loss
 
     def _change_by_first_day(self, linear: Nuisance, means: FloatArray) -> FloatArray:
         """
-        Return how much the values change if the causes also acted in the baseline.
+        Return how the values change if the causes may act in the baseline as well.
 
         The prior of a value in the baseline has zero mean, and the present value as standard
         deviation.
@@ -242,7 +242,7 @@ class JointFit:
         return both.means(posterior)[size : len(means)] - means[size:]
 
     def linear(self, named: Sequence[NamedEffect]) -> Nuisance:
-        """Return the regression problem with the named effects, linearised at their values."""
+        """Return the regression problem, linearised at the values of the named effects."""
         if not named:
             return self.nuisance
         model = patched_arm(self.arm, named)
@@ -272,7 +272,7 @@ class JointFit:
 
 
 def patched_arm(arm: ArmModel, named: Sequence[NamedEffect]) -> ArmModel:
-    """Return the arm with named effects added at their values."""
+    """Add effects with their values to an arm model."""
     for own in named:
         arm = add_effect(arm, own.effect, own.values)
     return arm
@@ -281,7 +281,7 @@ def patched_arm(arm: ArmModel, named: Sequence[NamedEffect]) -> ArmModel:
 def step_within_bounds(
     arm: ArmModel, named: Sequence[NamedEffect], change: FloatArray
 ) -> tuple[NamedEffect, ...]:
-    """Return the named effects after a step of their fitted parameters, within bounds."""
+    """Change the fitted parameters of named effects by a step, within their bounds."""
     found = []
     for own, (place, shapes) in zip(named, parameter_ranges(named), strict=True):
         effect = own.effect
@@ -300,7 +300,7 @@ def step_within_bounds(
 
 
 def parameter_ranges(named: Sequence[NamedEffect]) -> list[tuple[range, range]]:
-    """Return the index ranges of the values and of the shapes of each effect in the estimate."""
+    """Return for each effect the index ranges of its values and shapes in the estimate."""
     found, start = [], 0
     for own in named:
         shapes = start + len(own.kept)
@@ -311,7 +311,7 @@ def parameter_ranges(named: Sequence[NamedEffect]) -> list[tuple[range, range]]:
 
 
 def _shape_bounds(effect: Effect) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return lower bound, upper bound and finite-difference step of each shape value."""
+    """Return lower bound, upper bound and finite-difference step of each shape."""
     owners = len(effect.owners)
     low = np.tile([s.lower for s in effect.shapes], owners)
     high = np.tile([s.upper for s in effect.shapes], owners)
@@ -322,7 +322,7 @@ def _shape_bounds(effect: Effect) -> tuple[FloatArray, FloatArray, FloatArray]:
 def patch_columns(
     arm: ArmModel, named: Sequence[NamedEffect], part: Trajectory
 ) -> list[FloatArray]:
-    """Return each effect's Jacobian of the torque by its values and shapes, (M, n, p)."""
+    """Return the Jacobian of the torque by values and shapes of each effect, (M, n, p)."""
     model, blocks = memoized_arm(patched_arm(arm, named)), []
     for own in named:
         columns = [model.columns_of(own.effect, part.motion)[:, :, list(own.kept)]]
@@ -333,13 +333,12 @@ def patch_columns(
 
 
 def _shape_columns(model: ArmModel, effect: Effect, motion: Motion) -> FloatArray:
-    """Return the finite-difference Jacobian of the torque by the shape values, (N, n, S)."""
+    """Return the Jacobian of the torque by the shapes, by finite differences, (N, n, S)."""
     place = len(model.effects) - 1 - model.effects[::-1].index(effect)
     low, high, step = _shape_bounds(effect)
     shape = np.array(effect.shape)
 
     def torque(index: int, value: float) -> FloatArray:
-        """Return the torque for another shape value, up to a part that does not depend on it."""
         moved = shape.copy()
         moved[index] = value
         other = effect.with_shape(moved)

@@ -47,7 +47,7 @@ _RELATIVE_PRIOR_STD = 0.25
 @dataclass(frozen=True)
 class Nuisance:
     """
-    Regression problem of the nuisance parameters: rigid body, friction and model discrepancy.
+    Linear regression of the nuisance parameters: rigid body, friction, model discrepancy.
 
     Attributes
     ----------
@@ -93,7 +93,7 @@ class Nuisance:
         gravity: FloatArray | None = None,
     ) -> Nuisance:
         """
-        Compute the regression columns of the nuisance parameters.
+        Compute the weighted regressor and residual of each recording.
 
         Parameters
         ----------
@@ -141,18 +141,18 @@ class Nuisance:
 
     @property
     def rank(self) -> int:
-        """Return the number of base parameters of rigid body and friction."""
+        """Number of base parameters of rigid body and friction."""
         return self.base.rank
 
     @cached_property
     def discrepancy(self) -> npt.NDArray[np.intp]:
-        """Indices of the f discrepancy columns of each joint, shape (n, f)."""
+        """Indices (n, f) of the f columns for the model discrepancy of each joint."""
         size = self.columns[0].shape[2]
         return np.arange(self.rank, size).reshape(len(self.columns[0]), -1)
 
     @cached_property
     def acting(self) -> list[list[tuple[npt.NDArray[np.intp], FloatArray]]]:
-        """Nonzero columns of each joint in each recording: their indices, and values (M, c)."""
+        """Nonzero columns of each joint in each recording: indices and values (M, c)."""
         body = np.arange(self.rank)
         places = [np.concatenate([body, own]) for own in self.discrepancy]
         return [
@@ -162,13 +162,13 @@ class Nuisance:
 
     @cached_property
     def count(self) -> npt.NDArray[np.intp]:
-        """Return the number of informative rows of each recording, summed over joints, (K,)."""
+        """Number of informative rows of each recording, summed over joints, shape (K,)."""
         folds = [part.fold for part in self.rows.data]
         return np.bincount(folds, [np.count_nonzero(w) for w in self.rows.weight]).astype(int)
 
     @cached_property
     def square(self) -> FloatArray:
-        """Gram matrix of nuisance columns and accepted causes, (K, q + a, q + a)."""
+        """Gram matrix of nuisance columns and accepted causes, shape (K, q + a, q + a)."""
         if not self.accepted:
             return self.column_products[0]
         border = np.concatenate([self._acting(x) * x.products for x in self.accepted], axis=2)
@@ -178,40 +178,40 @@ class Nuisance:
 
     @cached_property
     def cross(self) -> FloatArray:
-        """Inner products of the residual with nuisance columns and accepted causes, (K, q + a)."""
+        """Inner products of these columns with the residual, shape (K, q + a)."""
         aims = [one.aim * self._acting(one)[:, :, 0] for one in self.accepted]
         return np.concatenate([self.column_products[1], *aims], axis=1)
 
     @cached_property
     def power(self) -> FloatArray:
-        """Sum of squares of the weighted residual, for each recording, (K,)."""
+        """Sum of squares of the weighted residual of each recording, shape (K,)."""
         return np.array([np.sum(own**2) for own in self.residual])
 
     def _among_accepted(self, cause: Cause) -> FloatArray:
-        """Return the inner products of accepted causes with another cause, (K, a, p)."""
+        """Return inner products of the accepted causes with another cause, (K, a, p)."""
         parts = [self._acting(one) * one.products_with(cause) for one in self.accepted]
         return np.concatenate(parts, axis=1)
 
     def _acting(self, cause: Cause) -> FloatArray:
-        """Return 1 for each recording in which an accepted cause acts, otherwise 0, (K, 1, 1)."""
+        """Return a mask (K, 1, 1) of the recordings in which an accepted cause acts."""
         return cause.acts(self.rows.diagnosed).astype(float)[:, np.newaxis, np.newaxis]
 
     def products(self, cause: Cause) -> FloatArray:
-        """Return the inner products of all columns with those of a cause, (K, q + a, p)."""
+        """Return the inner products of all columns with the columns of a cause, (K, q + a, p)."""
         if not self.accepted:
             return cause.products
         return np.concatenate([cause.products, self._among_accepted(cause)], axis=1)
 
     def and_cause(self, cause: Cause, size: float = 1.0) -> Nuisance:
-        """Add an accepted cause; `size` is its values' prior standard deviation over `unit`."""
+        """Add a cause whose values have the prior standard deviation `size` times their `unit`."""
         return replace(self, accepted=(*self.accepted, replace(cause, size=size)))
 
     def without_cause(self, index: int) -> Nuisance:
-        """Return the regression problem without the accepted cause of this index."""
+        """Return the regression problem without the accepted cause at this index."""
         return replace(self, accepted=(*self.accepted[:index], *self.accepted[index + 1 :]))
 
     def with_residual(self, residual: Sequence[FloatArray]) -> Nuisance:
-        """Return the regression problem of another weighted residual, (n, M) per recording."""
+        """Return the regression problem for another weighted residual, (n, M) per recording."""
         pairs = zip(self.columns, residual, strict=True)
         aims = np.array([x.reshape(-1, x.shape[2]).T @ y.ravel() for x, y in pairs])
         accepted = []
@@ -228,7 +228,7 @@ class Nuisance:
 
     @property
     def value_slices(self) -> list[slice]:
-        """Return the slice of each accepted cause's values among all parameters."""
+        """Return for each accepted cause the slice of its values among all parameters."""
         size = self.columns[0].shape[2]
         counts = [len(one.unit) for one in self.accepted]
         stops = size + np.cumsum(counts, dtype=int)
@@ -237,7 +237,7 @@ class Nuisance:
     @cached_property
     def unvisited_factor(self) -> FloatArray:
         """
-        Return the factor by which states outside the baseline widen the discrepancy prior, (n, f).
+        Return factors (n, f) that widen the discrepancy prior in states without baseline data.
 
         The misfit of the baseline limits the discrepancy in visited states only. In other states,
         the discrepancy may be a share of the torque.
@@ -256,7 +256,7 @@ class Nuisance:
         return np.asarray(np.clip(more, 1.0, most[:, np.newaxis]))
 
     def prior(self, hyperparameters: Hyperparameters) -> tuple[npt.NDArray[np.intp], FloatArray]:
-        """Return the indices of the fitted parameters, and their prior precision matrix."""
+        """Return the indices of the fitted parameters and their prior precision matrix."""
         unit = self.rows.amplitude[0]
         rigid = self.base.independent < len(self.arm.robot.rigid_parameters)
         scale = np.where(rigid, hyperparameters.body or 1.0, 1.0)
@@ -278,7 +278,7 @@ class Nuisance:
         return used, whole[np.ix_(used, used)]
 
     def rows_of(self, k: int) -> FloatArray:
-        """Return the weighted columns of all parameters in recording k, (M, n, q + a)."""
+        """Return the weighted columns of recording k, shape (M, n, q + a)."""
         joints, rows, _ = self.columns[k].shape
         blocks = [self.columns[k]]
         for one in self.accepted:
@@ -294,7 +294,7 @@ class Nuisance:
         among: Sequence[int] | None = None,
         less: tuple[int, FloatArray, FloatArray] | None = None,
     ) -> NuisancePosterior:
-        """Return the posterior of all parameters for a set of hyperparameters."""
+        """Return the posterior of all parameters at given hyperparameters."""
         return self.posteriors([hyperparameters], among, less)[0]
 
     def posteriors(
@@ -304,7 +304,7 @@ class Nuisance:
         less: tuple[int, FloatArray, FloatArray] | None = None,
     ) -> list[NuisancePosterior]:
         """
-        Return the posterior for each set of hyperparameters; all sets share `own` and `noise`.
+        Return posteriors for several hyperparameters, which differ neither in `own` nor `noise`.
 
         The discrepancies d_k of single recordings are integrated out once, by their Schur
         complement.
@@ -374,13 +374,13 @@ class Nuisance:
         return self.means(posterior), covariance
 
     def means(self, posterior: NuisancePosterior) -> FloatArray:
-        """Return the posterior means of all parameters; zero for those that are not fitted."""
+        """Return posterior means of all parameters; zero for parameters that are not fitted."""
         values = np.zeros(self.cross.shape[1])
         values[posterior.used] = posterior.values
         return values
 
     def residual_at(self, values: FloatArray, k: int) -> FloatArray:
-        """Return the weighted residual of recording k for given parameters and d_k = 0, (n, M)."""
+        """Return the weighted residual (n, M) of recording k, without its own discrepancy d_k."""
         columns = self.columns[k]
         residual = self.residual[k] - columns @ values[: columns.shape[2]]
         for one, span in zip(self.accepted, self.value_slices, strict=True):
@@ -394,7 +394,7 @@ class Nuisance:
         return float(sum(np.sum(self.residual_at(values, k) ** 2) for k in diagnosed))
 
     def noise_at(self, values: FloatArray, hyperparameters: Hyperparameters, k: int) -> FloatArray:
-        """Return weighted residual of recording k for given parameters and fitted d_k, (n, M)."""
+        """Return the weighted residual (n, M) of recording k, with fitted discrepancy d_k."""
         residual = self.residual_at(values, k)
         if not hyperparameters.own:
             return residual
@@ -411,7 +411,7 @@ class Nuisance:
         self, posterior: NuisancePosterior, recordings: Sequence[int], least: float
     ) -> float:
         """
-        Return the number of correlated residual rows that equal one independent row, at least 1.
+        Return how many correlated residual rows equal one independent row, at least 1.
 
         It is one plus twice the sum of the autocorrelations up to the first one below 0.05, as the
         median over joints and recordings.

@@ -40,7 +40,7 @@ _ROUNDING = 1e-7
 @dataclass(frozen=True)
 class CauseFit:
     """
-    Log Bayes factor of a cause against the model without it, and posterior of its values.
+    Posterior of the values of a cause, and the log Bayes factor of its presence.
 
     Attributes
     ----------
@@ -70,7 +70,7 @@ class CauseFit:
 @dataclass(frozen=True)
 class CauseInformation:
     """
-    Fisher information on the p values of causes in G groups of recordings.
+    Fisher information on the p values of a cause in each of G groups of recordings.
 
     The nuisance parameters are integrated out. Values are in the units of their cause.
 
@@ -101,7 +101,7 @@ class CauseInformation:
         pooled: bool = False,
     ) -> CauseInformation:
         """
-        Return the Fisher information on causes that have equal numbers of values.
+        Compute the Fisher information on causes that have equally many values.
 
         Each recording is a group; with `pooled`, the baseline and the diagnosed recordings are.
 
@@ -147,17 +147,17 @@ class CauseInformation:
 
     @property
     def size(self) -> int:
-        """Return the number p of values of a cause."""
+        """Number p of values of a cause."""
         return int(self.vector.shape[-1]) // len(self.diagnosed)
 
     def only(self, diagnosed: bool) -> CauseInformation:
-        """Return the information from diagnosed recordings only, or from the baseline only."""
+        """Return the information from the diagnosed recordings, or from the baseline."""
         of_it = self.diagnosed == diagnosed
         found = self._at(np.flatnonzero(np.repeat(of_it, self.size)))
         return replace(found, diagnosed=self.diagnosed[of_it])
 
     def among(self, values: npt.NDArray[np.intp]) -> CauseInformation:
-        """Return the information on a subset of the values, if the other values are zero."""
+        """Return the information on some of the values, if all others are zero."""
         return self._at(np.add.outer(self.size * np.arange(len(self.diagnosed)), values).ravel())
 
     def _at(self, kept: npt.NDArray[np.intp]) -> CauseInformation:
@@ -165,7 +165,7 @@ class CauseInformation:
         return replace(self, matrix=matrix, vector=self.vector[..., kept])
 
     def difference_root(self, spread: float) -> list[FloatArray]:
-        """Return [R], with RR' the prior covariance of differences u_k; [] without spread."""
+        """Return a root of the prior covariance of differences between groups; [] if zero."""
         if not spread:
             return []
         p, groups = self.size, len(self.diagnosed)
@@ -176,12 +176,12 @@ class CauseInformation:
         return [_block_diagonal(np.stack([root] * groups, axis=-3))]
 
     def baseline_root(self) -> FloatArray:
-        """Return R, with RR' the prior covariance of baseline values g0, equal in all groups."""
+        """Return a root of the prior covariance of the values in the baseline."""
         return np.tile(THERE * np.eye(self.size), (len(self.diagnosed), 1))
 
 
 def _block_diagonal(blocks: FloatArray) -> FloatArray:
-    """Return block-diagonal matrices (..., G p, G p) of blocks (..., G, p, p)."""
+    """Arrange blocks (..., G, p, p) as block-diagonal matrices (..., G p, G p)."""
     *shape, groups, p, _ = blocks.shape
     whole = np.zeros((*shape, groups, p, groups, p))
     for k in range(groups):
@@ -196,7 +196,7 @@ def fit_cause(
     typical_spread: float = 0.0,
     spreads: FloatArray = NO_SPREAD,
 ) -> CauseFit:
-    """Return the log Bayes factor of a cause and the posterior of its values."""
+    """Fit a cause; return its log Bayes factor and the posterior of its values."""
     information = CauseInformation.of([cause], nuisance, posterior, pooled=not spreads.any())
     return fit_causes([cause], nuisance, information, typical_spread, spreads)[0]
 
@@ -209,7 +209,7 @@ def fit_causes(
     spreads: FloatArray = NO_SPREAD,
 ) -> list[CauseFit]:
     """
-    Return the log Bayes factors of causes and the posteriors of their values.
+    Fit causes one by one; return their log Bayes factors and posteriors.
 
     Physically impossible values reduce the factor; see `log_probability_in_bounds`.
 
@@ -282,7 +282,7 @@ def fit_causes(
 
 
 def log_probability_in_bounds(cause: Cause, fit: CauseFit, nuisance: Nuisance) -> float:
-    """Return the log ratio of posterior to prior probability that all values are in bounds."""
+    """Return the log ratio of the posterior and prior probabilities that values are in bounds."""
     arm, kept = nuisance.arm, list(cause.kept)
     whole, std = np.zeros((2, len(cause.effect.parameters(arm.robot))))
     whole[kept], std[kept] = fit.values, fit.std
@@ -301,7 +301,7 @@ def typical_spread_of(
     causes: Sequence[Cause], nuisance: Nuisance, posterior: NuisancePosterior
 ) -> float:
     """
-    Return the typical spread of fitted values between baseline recordings: a mean over causes.
+    Return the typical spread of fitted values between baseline recordings.
 
     The mean is geometric. With fewer than two recordings it is `POPULATION_SPREAD`.
 

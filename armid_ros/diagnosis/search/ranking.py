@@ -24,7 +24,7 @@ Key: TypeAlias = tuple[str, tuple[str, ...], tuple[int, ...]]
 @dataclass(frozen=True)
 class CauseResult:
     """
-    Result for one candidate cause: fitted values, log odds, probability and rivals.
+    Test result of a candidate cause: fitted values, log odds, probability and rivals.
 
     Attributes
     ----------
@@ -71,7 +71,7 @@ class CauseResult:
 
     @property
     def key(self) -> Key:
-        """Key of the cause, equal for all shape values: name, joints, indices of fitted values."""
+        """Name, joints and indices of fitted values, which identify the cause at any shape."""
         return self.effect.name, self.effect.joints, self.kept
 
     @property
@@ -83,7 +83,7 @@ class CauseResult:
 @dataclass(frozen=True)
 class RankedCause:
     """
-    A candidate cause with its log Bayes factor against the model without this cause.
+    Candidate cause with its log Bayes factor against the model without it.
 
     Attributes
     ----------
@@ -108,7 +108,7 @@ class RankedCause:
 
     @property
     def log_posterior(self) -> float:
-        """Log posterior probability of the cause, up to a constant."""
+        """Log posterior probability of the cause, without normalisation."""
         return self.log_bayes_factor + self.cause.prior
 
     @property
@@ -118,7 +118,7 @@ class RankedCause:
 
     def log_odds_over(self, other: RankedCause, levels: Thresholds) -> float:
         """
-        Return the log odds of this cause over another cause; positive if this cause is likelier.
+        Return the log odds of this cause over another; positive if this one is likelier.
 
         As torque laws are inexact, a difference of the explained squares is ignored below the
         share `inexact` of them, or below the share `same_fit` - 1 of the smaller residual. The
@@ -141,7 +141,7 @@ class RankedCause:
 @dataclass(frozen=True)
 class Ranking:
     """
-    All candidate causes in the order of their log posterior odds, given the accepted causes.
+    All candidate causes, sorted by log posterior odds.
 
     Attributes
     ----------
@@ -166,7 +166,7 @@ class Ranking:
 
     def tested(self, one: RankedCause | Cause, material: float) -> CauseResult:
         """
-        Fit the values of a cause; return them with visibility, log odds and share.
+        Fit the values of a cause; return its test result.
 
         Parameters
         ----------

@@ -36,7 +36,7 @@ Spans: TypeAlias = Mapping[int, tuple[int, int]]
 @dataclass(frozen=True)
 class Span:
     """
-    Time span of a recording in which a cause acts.
+    Time interval of a recording in which a cause acts.
 
     Attributes
     ----------
@@ -57,7 +57,7 @@ class Span:
 
 @dataclass(frozen=True)
 class _TimedCause:
-    """A cause with candidate change points (edges) in each diagnosed recording."""
+    """Cause with candidate start and end times (edges) in each diagnosed recording."""
 
     ranked: RankedCause
     ranking: Ranking
@@ -73,7 +73,7 @@ class _TimedCause:
 
     @cached_property
     def edges(self) -> dict[int, npt.NDArray[np.intp]]:
-        """Row indices of each diagnosed recording at which a span may start or end."""
+        """Row indices at which a time interval may start or end, in each recording."""
         found = {}
         for k, t in self.times.items():
             points = np.linspace(t[0], t[-1], max(int((t[-1] - t[0]) / _STEP), 1) + 1)
@@ -83,7 +83,7 @@ class _TimedCause:
 
     @cached_property
     def _sums(self) -> dict[int, list[FloatArray]]:
-        """The sums `products`, `own` and `aim` of the cause, accumulated up to each edge."""
+        """Cumulative sums of `products`, `own` and `aim` of the cause, up to each edge."""
         nuisance, cause = self.ranking.nuisance, self.ranked.cause
         joints = list(cause.joints)
         found = dict[int, list[FloatArray]]()
@@ -100,7 +100,7 @@ class _TimedCause:
         return found
 
     def within(self, tried: Sequence[Spans]) -> list[RankedCause]:
-        """Return the cause with columns that are zero outside the spans, for each set of spans."""
+        """Return the cause with columns set to zero outside the intervals, for each set."""
         nuisance, cause = self.ranking.nuisance, self.ranked.cause
         causes, choices = list[Cause](), list[float]()
         for spans in tried:
@@ -122,7 +122,7 @@ class _TimedCause:
 
     @cached_property
     def throughout(self) -> RankedCause:
-        """The cause, acting throughout all diagnosed recordings."""
+        """The cause, assumed to act throughout all diagnosed recordings."""
         return self.within([self._whole])[0]
 
     @property
@@ -130,7 +130,7 @@ class _TimedCause:
         return {k: (0, len(edges) - 1) for k, edges in self.edges.items()}
 
     def coarse(self) -> tuple[RankedCause, Spans]:
-        """Return the cause with its likeliest spans, on a coarse grid of change points."""
+        """Return the cause with its likeliest time intervals on a coarse grid."""
         found, spans = self.throughout, self._whole
         for k, edges in self.edges.items():
             coarse = np.unique(np.linspace(0, len(edges) - 1, _COARSE).astype(int)).tolist()
@@ -139,7 +139,7 @@ class _TimedCause:
         return found, spans
 
     def refined(self, found: RankedCause, spans: Spans) -> tuple[RankedCause, Spans]:
-        """Move each end of each span to its likeliest place, in two passes; return the cause."""
+        """Move the ends of each time interval to their likeliest places; return the cause."""
         for _ in range(2):
             for k, edges in self.edges.items():
                 near = (len(edges) - 1) // (_COARSE - 1)
@@ -157,7 +157,7 @@ class _TimedCause:
         recording: int,
         tried: Iterable[tuple[int, int]],
     ) -> tuple[RankedCause, Spans]:
-        """Return the cause with the likeliest of several candidate spans of one recording."""
+        """Return the cause with the likeliest of several time intervals in one recording."""
         last, least = len(self.edges[recording]) - 1, round(_SHORTEST / _STEP)
         others = [
             {**spans, recording: (a, b)}
@@ -174,7 +174,7 @@ class _TimedCause:
 
 def acting_spans(ranking: Ranking, thresholds: Thresholds) -> tuple[Span, ...]:
     """
-    Return the time spans in which the likeliest cause acts.
+    Return the time intervals in which the likeliest cause acts.
 
     Parameters
     ----------

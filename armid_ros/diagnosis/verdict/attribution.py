@@ -27,7 +27,7 @@ import numpy as np
 @dataclass(frozen=True)
 class Attribution:
     """
-    Squared held-out residual per time block, and its reduction by each named cause.
+    Squared held-out residual of each time block, and its reduction by each named cause.
 
     Attributes
     ----------
@@ -45,7 +45,7 @@ class Attribution:
     gains: FloatArray
 
     def share(self, names: Sequence[int]) -> float:
-        """Return the share of the gap that these causes explain together, at most 1."""
+        """Return the share of the squared residual that these causes explain, at most 1."""
         share = self.gains[list(names)].sum() / max(float(self.gap.sum()), 1e-300)
         return min(float(share), 1.0)
 
@@ -63,7 +63,7 @@ def headline(
     explanation: Explanation, unseen: Evidence | None, least: float, settings: DiagnosisSettings
 ) -> tuple[Explanation, Attribution]:
     """
-    Move causes with a small share to the minor causes; return the shares of the other causes.
+    Move causes that explain little to the minor causes; return the shares of the others.
 
     Shares are cross-validated, and also measured on held-out recordings if there are any. A cause
     is minor if its larger share is below `least`, and no joint has a gap without it: a cause may
@@ -106,7 +106,7 @@ def headline(
 def held_out_gains(
     explanation: Explanation, order: Sequence[int], unseen: Evidence
 ) -> Attribution:
-    """Add causes in the given order; return by how much each cause reduces the held-out gap."""
+    """Add causes in order; return how much each one reduces the squared held-out residual."""
     fewer = [explanation.only(order[:count]) for count in range(1, len(order))]
     every = [explanation.reference, *(one.fitted for one in fewer), explanation.fitted]
     arms = [one.arm for one in every[: len(order) + 1]]
@@ -117,7 +117,7 @@ def held_out_gains(
 
 
 def cross_validated(explanation: Explanation) -> Attribution:
-    """Add causes in order of gain; return the cross-validated gap reduction by each cause."""
+    """Add causes, best first; return the reduction of the cross-validated residual by each."""
     assert explanation.problem is not None
     problem, named = explanation.problem, explanation.fitted.named
     linear = problem.linear(named)
@@ -125,7 +125,7 @@ def cross_validated(explanation: Explanation) -> Attribution:
     remaining, order = list(range(len(named))), list[int]()
 
     def squared_residual(causes: Sequence[int]) -> FloatArray:
-        """Return the squared held-out residual of each block with only these causes, (B,)."""
+        """Return the squared held-out residual (B,) of each block, with only these causes."""
         others = [spans[n] for n in range(len(named)) if n not in causes]
         absent = [k for span in others for k in range(span.start, span.stop)]
         squares = []
@@ -153,7 +153,7 @@ def _folds(
     problem: JointFit, linear: Nuisance
 ) -> Iterator[tuple[list[FloatArray], list[FloatArray], FloatArray, FloatArray]]:
     """
-    Yield each held-out fold of the diagnosed recordings, with the fit to all other rows.
+    Yield each held-out fold of the diagnosed recordings, and a fit to the other rows.
 
     A fold has weighted columns (m, p) and residual (m,) of its blocks, and mean and covariance of
     all parameters, fitted to the other rows. Columns of parameters that the patched arm does not

@@ -29,7 +29,7 @@ _MAX_LOSS_RATIO = 1.05
 
 def is_same_body(one: CauseResult, other: CauseResult, robot: Robot) -> bool:
     """
-    Return whether two causes are the same load on either link of a revolute joint.
+    Return whether two causes are one load, described on either link of a revolute joint.
 
     Both have the same mass, and the centre of the load on the outer link is on the joint axis,
     within three standard deviations.
@@ -51,7 +51,7 @@ def is_same_body(one: CauseResult, other: CauseResult, robot: Robot) -> bool:
 
 
 def _values(trial: CauseResult) -> tuple[FloatArray, FloatArray]:
-    """Return values and standard deviations of a load, zero where they are not fitted, (10,)."""
+    """Return inertial values (10,) and standard deviations of a load; zero if not fitted."""
     values, std = np.zeros((2, len(LINK_PARAMETERS)))
     kept = list(trial.kept)
     values[kept], std[kept] = trial.values, trial.std
@@ -59,7 +59,7 @@ def _values(trial: CauseResult) -> tuple[FloatArray, FloatArray]:
 
 
 def on_outer_link(explanation: Explanation) -> Explanation:
-    """Move each load that two links may carry to the outer link, and refit the explanation."""
+    """Move each load that two links could carry to the outer link, and refit."""
     if explanation.problem is None:
         return explanation
     robot, steps, fitted = explanation.given.robot, explanation.steps, explanation.fitted
@@ -80,7 +80,7 @@ def on_outer_link(explanation: Explanation) -> Explanation:
 
 def as_bodies(explanation: Explanation) -> tuple[Explanation, tuple[str, ...]]:
     """
-    Replace impossible inertias by physically consistent inertias near the description.
+    Replace physically impossible inertias by possible ones near the description.
 
     The links have to fit the data as well as before. If this is impossible, the explanation is
     unchanged.
@@ -122,7 +122,7 @@ def as_bodies(explanation: Explanation) -> tuple[Explanation, tuple[str, ...]]:
 
 
 def _products(problem: JointFit, fitted: Fitted) -> tuple[FloatArray, float]:
-    """Return inner products of base columns and their torque, and the number of rows."""
+    """Return inner products of the base parameters' columns and torque, and the row count."""
     nuisance, base = problem.nuisance, problem.nuisance.base
     rank = nuisance.rank
     then, now = (base.values(x.theta[: len(base.standard)]) for x in (problem.arm, fitted.arm))

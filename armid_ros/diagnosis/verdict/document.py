@@ -31,7 +31,7 @@ DETECTABLE_Z = 5.0
 
 def diagnosis_document(diagnosis: Diagnosis, model: str = 'model.yaml') -> dict[str, Any]:
     """
-    Return a diagnosis as the content of diagnosis.json, schema armid/diagnosis/1.
+    Return the content of diagnosis.json, schema armid/diagnosis/1.
 
     Parameters
     ----------
@@ -146,7 +146,7 @@ def _gap(diagnosis: Diagnosis) -> dict[str, Any]:
 
 
 def _candidates(explanation: Explanation) -> list[dict[str, Any]]:
-    """Return the first 20 visible causes: named causes, then the likeliest other causes."""
+    """Return the first 20 causes for diagnosis.json: named ones, then the likeliest others."""
     return [
         {
             'name': trial.effect.name,
@@ -169,7 +169,7 @@ def _finite(value: float) -> float | None:
 @dataclass(frozen=True)
 class Detectable:
     """
-    Smallest size of an effect that the data would show.
+    Smallest size of an effect that the data would reveal.
 
     Attributes
     ----------
@@ -195,7 +195,7 @@ class Detectable:
 
 def _detectable_size(trial: CauseResult, arm: ArmModel) -> tuple[ParameterName, float]:
     """
-    Return the first identifiable parameter of a cause, and its smallest detectable size.
+    Return a cause's first identifiable parameter, and its smallest detectable size.
 
     A detectable size is significant and material. It is inf if no possible size is detectable.
 
@@ -219,7 +219,7 @@ def _detectable_size(trial: CauseResult, arm: ArmModel) -> tuple[ParameterName, 
 
 def is_possible(effect: Effect, index: int, size: float, robot: Robot) -> bool:
     """
-    Return whether a value of an effect parameter is physically possible on a robot.
+    Return whether a robot can physically have this value of an effect parameter.
 
     It must not exceed the largest value of its quantity. A detectable size of a million typical
     values means that the motion excites the effect less than rounding errors do.
@@ -232,7 +232,7 @@ def is_possible(effect: Effect, index: int, size: float, robot: Robot) -> bool:
 
 
 def detectable(explanation: Explanation | None) -> tuple[Detectable, ...]:
-    """Return the smallest detectable size of each effect on each joint, in catalogue order."""
+    """Return the smallest detectable size of each effect on each joint."""
     if explanation is None:
         return ()
     rows = []

@@ -49,7 +49,7 @@ class Rival:
 @dataclass(frozen=True)
 class Finding:
     """
-    One effect that a diagnosis names, with values, share of the gap and rivals.
+    Effect that a diagnosis names, with values, rivals and the share that it explains.
 
     Attributes
     ----------
@@ -107,7 +107,7 @@ class Finding:
 
     @property
     def rows(self) -> list[tuple[ParameterName, float, float, float]]:
-        """Each parameter with value, standard deviation, and value in the given model."""
+        """Each parameter with its value, standard deviation, and value in the given model."""
         given = (0.0,) * len(self.values) if self.weighs or not self.added_to else self.added_to
         return [
             (name, value, std, before if abs(before) > HALF_WIDTH * std else 0.0)
@@ -118,18 +118,18 @@ class Finding:
 
     @property
     def other_causes(self) -> tuple[Rival, ...]:
-        """Rivals other than the same load on another link."""
+        """Rivals, without the same load described on another link."""
         return tuple(rival for rival in self.rivals if not rival.same_body)
 
     @property
     def ambiguous_with(self) -> tuple[str, ...]:
-        """Names of the rivals other than the same load on another link."""
+        """Names of the rivals, without the same load described on another link."""
         return tuple(rival.name for rival in self.other_causes)
 
     @property
     def experiment(self) -> str:
         """
-        Return advice on the recording that separates the effect from its likeliest rival.
+        Return which recording would separate the effect from its likeliest rival.
 
         It is empty without rival. No motion separates a payload from its link, so the payload has
         to be weighed.
@@ -158,14 +158,14 @@ class Finding:
         return f'To separate {names}, record {best}.'
 
     def place_of(self, joint: str) -> str:
-        """Return the segment name of the tie on a joint, or the joint itself if it has no tie."""
+        """Return the body segment of a tie on this joint; without tie, the joint itself."""
         return next((tie.name for tie in self.ties if tie.joint == joint), joint)
 
 
 @dataclass(frozen=True)
 class Overlay:
     """
-    Measured and predicted torques of one trajectory, with the same filter.
+    Measured and predicted torque of one trajectory, filtered alike.
 
     Attributes
     ----------
@@ -191,7 +191,7 @@ class Overlay:
 @dataclass(frozen=True)
 class Gap:
     """
-    Root mean square residual of each joint without and with the named effects.
+    Root mean square residual of each joint, without and with the named effects.
 
     Attributes
     ----------
@@ -220,7 +220,7 @@ class Gap:
     @classmethod
     def of(cls, explanation: Explanation, unseen: Evidence | None) -> Gap:
         """
-        Measure the residuals in held-out recordings, or in fitted ones if none is held out.
+        Measure the residuals in held-out recordings, else in the fitted recordings.
 
         Parameters
         ----------
@@ -258,14 +258,14 @@ class Gap:
 
     @property
     def data(self) -> str:
-        """Kind of the recordings in which the residual was measured: held-out or fitted."""
+        """Which recordings the residual is measured in: held-out or fitted."""
         return 'held-out' if self.predicted else 'the data it was found in'
 
 
 @dataclass(frozen=True)
 class Diagnosis:
     """
-    Result of a diagnosis.
+    Result of a diagnosis: verdict, named effects, remaining residual and advice.
 
     Attributes
     ----------
@@ -327,7 +327,7 @@ class Diagnosis:
 
     @property
     def estimate(self) -> Estimate | None:
-        """Estimate of the fitted parameters, followed by the values of the findings."""
+        """Estimate of all fitted parameters; the values of the findings come last."""
         if self.explanation is None:
             return None
         fit = self.explanation.fitted.estimate
@@ -345,14 +345,14 @@ class Diagnosis:
 
     @property
     def overlays(self) -> tuple[Overlay, ...]:
-        """Measured and predicted torques of each trajectory; raises if the data are bad."""
+        """Measured and predicted torque of each trajectory; raises an error for bad data."""
         if self.gap is None:
             raise IdentificationError(f'no residual: {self.summary}')
         return self.gap.overlays
 
     @property
     def not_checked(self) -> tuple[str, ...]:
-        """Joints that rest in all recordings, or reverse in every row."""
+        """Joints without usable data: at rest, or in reversal in each row."""
         return unchecked_joints(self.data, self.arm.robot.joints)
 
     def __repr__(self) -> str:

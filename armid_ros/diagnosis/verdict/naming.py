@@ -24,7 +24,7 @@ import numpy as np
 
 
 class _Translation(NamedTuple):
-    """Effect of the catalogue that a fitted cause stands for, with its parameters and values."""
+    """Catalogue effect that is equivalent to a fitted cause, with its parameters and values."""
 
     effect: Effect
     parameters: tuple[ParameterName, ...]
@@ -39,7 +39,7 @@ def findings(
     rng: np.random.Generator,
 ) -> tuple[Finding, ...]:
     """
-    Return a finding for each effect name, the finding with the largest share first.
+    Return a finding for each named effect, the largest explained share first.
 
     Findings that stand for the same cause have a common share.
 
@@ -94,7 +94,7 @@ def findings(
 
 def minor_findings(explanation: Explanation) -> tuple[Finding, ...]:
     """
-    Return findings of significant but immaterial causes, the likeliest first.
+    Return findings of significant but negligible causes, the likeliest first.
 
     Causes with a value significantly outside its bounds are left out.
 
@@ -126,7 +126,7 @@ def minor_findings(explanation: Explanation) -> tuple[Finding, ...]:
 
 
 def _in_catalogue(explanation: Explanation, arm: ArmModel) -> list[list[_Translation]]:
-    """Return for each fitted cause the effects of the catalogue that it stands for."""
+    """Return for each fitted cause the equivalent effects of the catalogue."""
     fitted, estimate = explanation.fitted, explanation.fitted.estimate
     result = []
     for own, (kept, shapes) in zip(fitted.named, parameter_ranges(fitted.named), strict=True):
@@ -186,7 +186,7 @@ def _rivals(
     trials: Sequence[CauseResult], own: Rival, others: set[str], arm: ArmModel
 ) -> tuple[Rival, ...]:
     """
-    Return the two likeliest rivals of a finding (`own`), with their joints.
+    Return the two likeliest rivals of a finding, with their joints.
 
     The same effect in another joint is a rival as well; effects of other findings are not.
 
@@ -213,7 +213,7 @@ def _rivals(
 
 
 def _joints(groups: Sequence[tuple[str, ...]], arm: ArmModel) -> tuple[str, ...]:
-    """Return the joints of several effects without repetition, in the order of the arm."""
+    """Return the joints of several effects, each once, in the arm's order."""
     joints = [joint for group in groups for joint in group]
     if any(len(group) > 1 for group in groups):
         return tuple(dict.fromkeys(joints))

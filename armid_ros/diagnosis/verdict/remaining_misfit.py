@@ -54,7 +54,7 @@ _SPEED_KNOTS = np.array([0.03, 0.1, 0.25, 0.5, 0.75, 1.0])
 @dataclass(frozen=True)
 class RemainingMisfit:
     """
-    Inputs of the checks whether named effects explain the residual of all recordings.
+    Data for the check whether the named effects explain the whole residual.
 
     Attributes
     ----------
@@ -79,7 +79,7 @@ class RemainingMisfit:
 
     def residual_over_limit(self) -> list[Excess]:
         """
-        Return the ratio of the patched model's squared residual to its limit, per data set.
+        Return the patched model's squared residual divided by its limit, for each data set.
 
         If the misfit is known, fitted changes of body, friction and discrepancy are subtracted:
         in other motions the arm visits other states, where the misfit differs.
@@ -94,7 +94,7 @@ class RemainingMisfit:
         return list(self._over_limits(residuals))
 
     def given_body_over_limit(self) -> Excess | None:
-        """Compare residual and limit with the given rigid body; None if it was not refitted."""
+        """Return the ratio of residual to limit with the given rigid body; None if no refit."""
         if not self.explanation.refitted:
             return None
         given, fitted = self.given.theta, self.explanation.fitted.arm
@@ -103,7 +103,7 @@ class RemainingMisfit:
 
     def worse_joints(self) -> tuple[str, ...]:
         """
-        Return the joints in which the patched model has a larger error than the given model.
+        Return the joints in which the patched model predicts worse than the given model.
 
         A joint is worse if its residual, in fitted or held-out data, grows by more than blocks of
         the data differ, and is a gap.
@@ -126,13 +126,13 @@ class RemainingMisfit:
 
     @property
     def _parts(self) -> list[Evidence]:
-        """Return fitted and held-out data, weighted by noise if the misfit is only estimated."""
+        """Return fitted and held-out data, weighted for the comparison with the limit."""
         if self.explanation.floor != ESTIMATED:
             return list(self.data)
         return [replace(part, sigma=part.noise) for part in self.data]
 
     def _over_limits(self, residuals: Sequence[Sequence[FloatArray]]) -> Iterator[Excess]:
-        """Yield the ratio of squared residual to limit: of fitted data, then of held-out data."""
+        """Yield squared residual divided by its limit: for fitted data, then for held-out data."""
         usual = 1.0 if self.explanation.measured else self.settings.thresholds.predicted
         more = usual, self.settings.thresholds.predicted
         where = 'in the recordings', 'in held-out recordings'
@@ -141,7 +141,7 @@ class RemainingMisfit:
             yield Excess(part.chi2_per_row(own) / limits, words)
 
     def at_rest(self) -> list[Excess]:
-        """Return squared ratios of residual to friction at rest, in fitted and held-out data."""
+        """Return squared ratios of residual to friction at rest, for each data set."""
         if self.settings.partner is not None:
             return []
         thresholds, before = self.settings.thresholds, self.before
@@ -158,7 +158,7 @@ class RemainingMisfit:
 
 
 def locate_blocked_joints(arm: ArmModel, excesses: Sequence[Excess]) -> tuple[Where, ...]:
-    """Return the joints whose residual at rest exceeds friction, the largest ratio first."""
+    """Return the joints whose residual at rest exceeds friction, the largest excess first."""
     excess = np.max([np.zeros(arm.robot.n_joints), *(one.ratio for one in excesses)], axis=0)
     beyond = np.where(excess > 1.0, excess, 0.0)
     order = np.argsort(-beyond)[: np.count_nonzero(beyond)]
@@ -173,7 +173,7 @@ def blocking_excess(
     arm: ArmModel, evidence: Evidence, residual: Sequence[FloatArray], surely: float
 ) -> FloatArray:
     """
-    Return the squared ratio of residual to friction of each joint at rest and in reversals, (n,).
+    Return each joint's squared ratio of residual to friction at rest and in reversals, (n,).
 
     `surely` standard deviations of noise and misfit are added to friction, scaled by the predicted
     torque over its rms: the error of a model grows with its torque, which is large in a reversal.
@@ -203,7 +203,7 @@ def blocking_excess(
 
 @dataclass(frozen=True)
 class UnlistedLaw(Effect):
-    """Joint torque as a function of velocity or position that no effect of the catalogue has."""
+    """Joint torque that is a free function of velocity or position, not in the catalogue."""
 
     of: str = 'velocity'
     knots: tuple[float, ...] = ()
@@ -213,7 +213,7 @@ class UnlistedLaw(Effect):
     quantities = (Quantity('knot_torque', 'N m'),)
 
     def columns(self, motion: Motion, arm: Arm) -> FloatArray:
-        """Return the torque per unit torque at each knot (hat functions), (N, n, knots)."""
+        """Return hat functions of velocity or position as regressor columns, (N, n, knots)."""
         link, (joint,) = arm.link_motion(motion), self.indices(motion.joints)
         x = (link.dq if self.of == 'velocity' else link.q)[:, joint]
         columns = np.zeros((len(x), motion.n_joints, len(self.knots)))
@@ -223,7 +223,7 @@ class UnlistedLaw(Effect):
 
 def unlisted_laws(explanation: Explanation, settings: DiagnosisSettings) -> list[Excess]:
     """
-    Return the ratio of squared torque to limit of unlisted laws of velocity and position.
+    Test for free functions of velocity and position; return squared torque over its limit.
 
     The limit is the squared floor of the gap plus that of the largest immaterial torque. The ratio
     is zero in joints whose log odds of an unlisted law are below the alarm odds. If several causes
@@ -268,7 +268,7 @@ def unlisted_laws(explanation: Explanation, settings: DiagnosisSettings) -> list
 
 def _one_law_instead(problem: JointFit, linear: Nuisance, law: Cause, levels: Thresholds) -> float:
     """
-    Fit an unlisted law in place of its joint's causes; return the ratio of improvement to limit.
+    Fit a free function instead of a joint's causes; return improvement over its limit.
 
     The law is fitted in place of these causes. At the limit, it is as likely as the causes, apart
     from the relative error of the laws of the catalogue.

@@ -81,7 +81,7 @@ def with_doubt(
     baseline: Baseline | None,
 ) -> tuple[Verdict, str]:
     """
-    Combine a verdict with the warning about the given model; return both.
+    Adapt a verdict to a warning about the given model; return verdict and warning.
 
     A model with a large residual in the baseline is consistent with any data, so the verdict is
     `bad_data`. With a smaller residual, the warning precedes the sentence of the verdict. A link
@@ -111,7 +111,7 @@ def _increased_residual(
     misfit: Misfit,
     thresholds: Thresholds,
 ) -> str:
-    """Return a warning if the baseline residual is much larger than at identification."""
+    """Return a warning if the baseline residual is much larger than after identification."""
 
     def compared(known: Baseline) -> tuple[FloatArray, FloatArray]:
         times = known.misfit / np.maximum(misfit.of(arm.robot, torque_rms(known.data)), 1e-300)
@@ -244,7 +244,7 @@ def _friction_changes(
     now: Sequence[Trajectory],
     warmer: dict[str, float],
 ) -> dict[str, float]:
-    """Return the relative change of friction that temperature laws predict at mean speed."""
+    """Return the relative friction changes that temperature laws predict, at mean speed."""
     action, joints = arm.action(), arm.robot.joints
     speed = np.concatenate([np.abs(part.at_rows.dq) for part in now]).mean(axis=0)
     size = np.zeros(len(joints))

@@ -20,7 +20,7 @@ import numpy.typing as npt
 @dataclass(frozen=True)
 class Axis:
     """
-    Mean residual of a joint as a function of one quantity, such as its velocity.
+    Mean residual of a joint in bins of one quantity, such as its velocity.
 
     Attributes
     ----------
@@ -43,7 +43,7 @@ class Axis:
 @dataclass(frozen=True)
 class Where:
     """
-    The residual of one joint, and the quantities with which it varies.
+    Residual of one joint, and the quantities on which it depends.
 
     Attributes
     ----------
@@ -76,7 +76,7 @@ class Where:
 @dataclass(frozen=True)
 class Excess:
     """
-    Ratio of each joint's squared residual to the limit that noise and misfit explain.
+    Squared residual of each joint, divided by the limit that noise and misfit explain.
 
     Attributes
     ----------
@@ -97,7 +97,7 @@ class Excess:
 def locate_explained(
     explanation: Explanation, evidence: Evidence, settings: DiagnosisSettings
 ) -> tuple[Where, ...]:
-    """Describe the residual without named causes, in the joints in which these reduce it."""
+    """Describe the residual that the named causes explain, in the joints in which they act."""
     before, after = (
         evidence.residuals(one.arm) for one in (explanation.reference, explanation.fitted)
     )
@@ -113,7 +113,7 @@ def locate_remaining_gap(
     settings: DiagnosisSettings,
     new: npt.NDArray[np.bool_],
 ) -> tuple[Where, ...]:
-    """Describe the patched model's residual in joints above the limit or with an unlisted law."""
+    """Describe the remaining residual of joints in which it exceeds the limit."""
     residual = evidence.residuals(explanation.fitted.arm)
     losses, limits = evidence.chi2_per_row(residual), evidence.limits(residual, settings)
     gap = np.where(new, losses, np.where(losses > limits, losses - 1.0, 0.0))
@@ -124,7 +124,7 @@ def locate(
     arm: ArmModel, evidence: Evidence, residual: Sequence[FloatArray], gap: FloatArray
 ) -> tuple[Where, ...]:
     """
-    Describe the residual of each joint with a gap as a function of single quantities.
+    Describe on which quantity the residual of each joint depends.
 
     Parameters
     ----------
@@ -185,7 +185,7 @@ def _quantities(arm: ArmModel, part: Trajectory) -> dict[str, FloatArray]:
 
 
 def _axis(name: str, unit: str, x: FloatArray, residual: FloatArray) -> Axis:
-    """Return the mean residual in bins of a quantity x, with equally many rows in each bin."""
+    """Return the mean residual in bins of a quantity x with equally many rows."""
     bins = 16
     edges = np.quantile(x, np.linspace(0.0, 1.0, bins + 1))
     index = np.clip(np.searchsorted(edges, x, side='right') - 1, 0, bins - 1)
@@ -201,7 +201,7 @@ def _axis(name: str, unit: str, x: FloatArray, residual: FloatArray) -> Axis:
 
 def _in_words(axes: Sequence[Axis], unit: str, residual: FloatArray) -> str:
     """
-    Describe the residual of a joint as a function of the quantity that explains most of it.
+    Describe a joint's residual by the quantity that explains most of it.
 
     If its bin means explain less than 15 % of the mean square residual, the residual depends on
     no single quantity.

@@ -27,7 +27,7 @@ _MAX_JOINTS = 3
 
 
 class Verdict(NamedTuple):
-    """Verdict of a diagnosis as one word, and its sentences."""
+    """Verdict of a diagnosis: one word, and sentences that explain it."""
 
     word: Word
     summary: str
@@ -44,7 +44,7 @@ def decide(
     gap: Gap | None = None,
 ) -> Verdict:
     """
-    Return the verdict and its sentences, from the findings and the remaining residual.
+    Decide the verdict from the findings and the remaining residual.
 
     Parameters
     ----------
@@ -106,7 +106,7 @@ def decide(
 
 
 def _refit(given_body: Excess | None, robot: Robot, floor: str) -> str:
-    """Return a sentence on refitted body and friction, if their given values leave a gap."""
+    """Return a sentence on the refit of body and friction, if their given values fit badly."""
     if given_body is None or given_body.ratio.max() <= 1.0:
         return ''
     worst = int(np.argmax(given_body.ratio))
@@ -119,14 +119,14 @@ def _refit(given_body: Excess | None, robot: Robot, floor: str) -> str:
 
 
 def larger(ratio: float) -> str:
-    """Return the ratio of two errors in words, such as '2.5 times as large as'."""
+    """Return the ratio of two errors as text, such as '2.5 times as large as'."""
     if ratio < 1.05:
         return 'a little larger than'
     return f'{ratio:.0f} times as large as' if ratio >= 100.0 else f'{ratio:.1f} times as large as'
 
 
 def sentence(finding: Finding, of: str = DIFFERENCE) -> str:
-    """Return a sentence with a cause, its values, and the share of the gap that it explains."""
+    """Return a sentence with a cause, its values, and the share that it explains."""
     text = f'{_subject(finding)} explains {percent(finding.share)} of {of}.'
     return text[:1].upper() + text[1:]
 
@@ -138,13 +138,13 @@ def share_interval_in_words(finding: Finding) -> str:
 
 
 def percent(share: float) -> str:
-    """Format a share as a percentage, with a decimal below 2 %: '96 %', '0.4 %'."""
+    """Format a share as a percentage, such as '96 %' or '0.4 %'."""
     size = abs(100.0 * share)
     return f'{100.0 * share:z.0f} %' if size >= 2.0 or size < 0.05 else f'{100.0 * share:.1f} %'
 
 
 def _sentences(findings: Sequence[Finding]) -> str:
-    """Return sentences on the causes, the two largest in one sentence, with their rivals."""
+    """Return sentences on all causes and their rivals, the two largest causes together."""
     clauses: list[str] = []
     assumed: list[str] = []
     for group in by_cause(findings):
@@ -171,7 +171,7 @@ def _sentences(findings: Sequence[Finding]) -> str:
 
 
 def names_and_places(group: Sequence[Finding | Rival]) -> str:
-    """Return names and joints of findings in words, such as 'payload of wrist_3'."""
+    """Return effect names and joints of findings as text, such as 'payload of wrist_3'."""
     joints = dict.fromkeys(joint for one in group for joint in one.joints)
     names = ' and '.join(name_in_words(one.name) for one in group)
     where = ', '.join(joints) if len(joints) <= _MAX_JOINTS else f'{len(joints)} joints'
@@ -179,7 +179,7 @@ def names_and_places(group: Sequence[Finding | Rival]) -> str:
 
 
 def by_cause(findings: Sequence[Finding]) -> list[list[Finding]]:
-    """Group findings that stand for the same cause, and have a common share of the gap."""
+    """Group the findings that stand for the same cause."""
     groups: list[list[Finding]] = []
     done: set[str] = set()
     for one in findings:
@@ -217,7 +217,7 @@ def _subject(finding: Finding) -> str:
 
 
 def _change(finding: Finding) -> str:
-    """Return old and new value of an effect of the given model, such as 'rose from 2 to 3'."""
+    """Return old and new value of a known effect as text, such as 'rose from 2 to 3'."""
     rows = _rows(finding)
     if len(finding.joints) != 1 or len(rows) != 1 or not rows[0][3]:
         return ''
@@ -225,13 +225,13 @@ def _change(finding: Finding) -> str:
 
 
 def _rows(finding: Finding) -> list[tuple[ParameterName, float, float, float]]:
-    """Return the parameter rows whose interval excludes zero; all rows if no interval does."""
+    """Return the parameters whose interval excludes zero; all parameters if there are none."""
     every = [row for row in finding.rows if not vague(finding, *row[:3])]
     return [row for row in every if excludes_zero(row[1], row[2])] or every
 
 
 def vague(finding: Finding, parameter: ParameterName, value: float, std: float) -> bool:
-    """Return whether a value of a finding is too uncertain to be written."""
+    """Return whether a fitted value is too uncertain to be written."""
     shapes = CATALOGUE[finding.name].shapes if finding.name in CATALOGUE else ()
     for shape in shapes:
         if shape.name == parameter.name:
@@ -240,7 +240,7 @@ def vague(finding: Finding, parameter: ParameterName, value: float, std: float) 
 
 
 def _with_degrees(parameter: ParameterName, value: float, std: float, had: float) -> str:
-    """Format a value with interval, unit and any old value; angles also in degrees."""
+    """Format a value with interval, unit and old value; angles also in degrees."""
     start = f'from {with_half_width(had, std).split(" ")[0]} to ' if had else ''
     text = f'{start}{with_half_width(had + value, std)} {parameter.unit}'.strip()
     degrees, *_ = with_half_width(np.rad2deg(had + value), np.rad2deg(std)).split(' ')
@@ -248,7 +248,7 @@ def _with_degrees(parameter: ParameterName, value: float, std: float, had: float
 
 
 def _alternatives(finding: Finding) -> str:
-    """Return a finding and its rivals in words, with probabilities that add up to one."""
+    """Return a finding and its rivals as text, with probabilities that sum to one."""
     every = [Rival(finding.name, finding.joints, finding.probability), *finding.other_causes]
     rest = 1.0 - finding.probability - sum(rival.probability for rival in finding.rivals)
     causes = [(names_and_places([one]), one.probability) for one in every]
