@@ -37,7 +37,7 @@ _COMPRESSED = ('.zstd', '.zst')
 
 
 class Bag(Source):
-    """Reader of all storage files of one bag; a context manager."""
+    """Reader for all storage files of one bag, to be used in a `with` statement."""
 
     def __init__(self, path: str | Path, settings: ReadSettings = DEFAULT) -> None:
         """
@@ -168,7 +168,7 @@ class Bag(Source):
                 yield message if cdr is message.cdr else message._replace(cdr=cdr)
 
     def _content(self, message: bytes) -> bytes:
-        """Return the bytes of a message, decompressed if rosbag2 compressed single messages."""
+        """Return the content of a message, decompressed if rosbag2 compressed each message."""
         if not (self._by_message or message[:4] == ZSTD):
             return message
         return b''.join(unpacked(io.BytesIO(message), self._settings, 'a compressed message'))
@@ -208,7 +208,7 @@ def is_bag_file(path: Path) -> bool:
 
 
 def _files_of(path: Path) -> BagMetadata:
-    """Return the metadata of a bag; without metadata.yaml only its storage files, in order."""
+    """Return the metadata of a bag; without metadata.yaml, only the list of its storage files."""
     if not os.path.lexists(path):
         raise RecordingError(f'{path}: there is no bag or file at this path')
     if not path.is_dir():

@@ -40,7 +40,7 @@ _OPTIONS = {'rate_hz': '--rate', 'effort_scale': '--effort-scale or --current-ga
 @dataclass(frozen=True)
 class ColumnSettings:
     """
-    Columns and units of the recorded quantities; a setting of None is guessed from the file.
+    Columns and units of recorded quantities; each one that is None is guessed from the file.
 
     Attributes
     ----------
@@ -100,7 +100,7 @@ class ColumnSettings:
 
 
 def renamed(name: str, rules: Rules) -> str:
-    """Rename a joint by a rule (old, new), where old is its name or the beginning of its name."""
+    """Rename a joint by rules (old, new); `old` is the complete old name or its beginning."""
     for old, new in sorted(rules, key=lambda rule: rule[0] != name):
         if name.startswith(old):
             return new + name[len(old) :]
@@ -108,7 +108,7 @@ def renamed(name: str, rules: Rules) -> str:
 
 
 def name_in_file(name: str, rules: Rules) -> str:
-    """Return the name of a joint in the file, before rules apply; the inverse of ``renamed``."""
+    """Undo ``renamed``: return the name that a joint has in the file."""
     for old, new in sorted(rules, key=lambda rule: rule[1] != name):
         before = old + name[len(new) :]
         if name.startswith(new) and renamed(before, rules) == name:
@@ -117,7 +117,7 @@ def name_in_file(name: str, rules: Rules) -> str:
 
 
 def renaming(joints: Sequence[str], names: Sequence[str]) -> str:
-    """Return a rule OLD:NEW that renames joints of a file to all given joints; '' if none fits."""
+    """Return a rule OLD:NEW that turns the joint names of a file into the given ones, or ''."""
     ends = [(name[:end], name[end:]) for name in names for end in range(len(name))]
     # first try rules that replace complete words of a name
     for old, rest in sorted(ends, key=lambda end: not end[0].endswith(('_', '/'))):
@@ -130,7 +130,7 @@ def renaming(joints: Sequence[str], names: Sequence[str]) -> str:
 
 def number(text: str) -> float:
     """
-    Convert the text of a number, ratio or angle to a float: '1798/7', '-pi/2', '0.5'.
+    Convert text to a float; the text may be a ratio or a multiple of pi: '1798/7', '-pi/2'.
 
     Raises
     ------
@@ -156,7 +156,7 @@ def numbers(text: str | None) -> tuple[float, ...]:
 
 
 def per_joint(values: Sequence[float], joints: Sequence[str], setting: str) -> FloatArray:
-    """Return a value for each joint, shape (n,), from a single value for all or from n values."""
+    """Return one value per joint, shape (n,), from n values or from one value for all."""
     if len(values) not in (1, len(joints)):
         raise RecordingError(
             f'{setting} has {len(values)} values; give one value for all joints, or '
@@ -199,7 +199,7 @@ def in_si(
     recording: Recording, settings: ColumnSettings, slides: Collection[bool] | None = None
 ) -> Recording:
     """
-    Return a recording converted to SI units, and from the motor side to the joint side.
+    Convert a recording to SI units, and from motor side to joint side.
 
     Parameters
     ----------
@@ -240,7 +240,7 @@ def in_si(
 
 
 def _position(joint: str, joints: Sequence[str]) -> int:
-    """Return the index of a joint in a motor coupling, given by its name or its number from 1."""
+    """Return the index of a joint that is given by its name, or by its number from 1 on."""
     if joint in joints:
         return list(joints).index(joint)
     if joint.isdigit() and 1 <= int(joint) <= len(joints):

@@ -74,7 +74,7 @@ def decompressed(stored: _Buffer, compression: str, size: int, settings: ReadSet
 
 
 class _Zstd(threading.local):
-    """A zstd decompressor, kept in each thread because its creation takes long."""
+    """Decompressor for zstd, kept by each thread because creating it takes long."""
 
     def __init__(self) -> None:
         self.decompressor = zstandard.ZstdDecompressor()
@@ -84,7 +84,7 @@ _ZSTD = _Zstd()
 
 
 def partly_decompressed(stored: _Buffer, compression: str, size: int) -> bytes:
-    """Decompress a truncated zstd or lz4 frame as far as possible, to at most ``size`` bytes."""
+    """Decompress a truncated zstd or lz4 frame as far as possible, up to ``size`` bytes."""
     if compression == 'zstd':
         decompressor = zstandard.ZstdDecompressor().decompressobj()
     else:

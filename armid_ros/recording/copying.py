@@ -16,7 +16,7 @@ from armid_ros.recording.writer import atomic_bag
 @dataclass(frozen=True)
 class Copied:
     """
-    Report on a copied bag: the two paths, the copied topics, and the damage of the source.
+    Report on the copy of a bag: paths, copied topics, and damage of the original.
 
     Attributes
     ----------
@@ -46,7 +46,7 @@ class Copied:
         return sum(topic.count for topic in self.topics)
 
     def describe(self) -> str:
-        """Return the report as a text of a few sentences."""
+        """Return the report as a few sentences."""
         listed = ', '.join(f'{topic.name} ({topic.count})' for topic in self.topics)
         return (
             f'{self.source}: {self.damage or "the bag is not damaged"}. {self.messages} messages '

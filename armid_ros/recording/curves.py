@@ -15,7 +15,7 @@ def draw_joints(
     joints: Sequence[str], curves: Mapping[str, tuple[FloatArray, FloatArray]], quantity: str
 ) -> npt.NDArray[np.object_]:
     """
-    Draw curves over time in a column of axes, with separate axes for each joint.
+    Plot curves over time, each joint in axes of its own, one below the other.
 
     Parameters
     ----------

@@ -30,7 +30,7 @@ _ACCELERATION = slice(25, 28)
 
 def write_runs(path: str | Path, runs: Sequence[ElasticRun], robot: Robot) -> None:
     """
-    Write experiments with an elastic arm to one bag, with a pause of 1 s between them.
+    Write experiments with an elastic arm to one bag, with pauses of 1 s in between.
 
     Raises
     ------
@@ -111,18 +111,18 @@ def read_accelerations(
 
 
 def _length(frame_length: int) -> int:
-    """Return the size of an Imu message from that of its frame_id with final zero, in bytes."""
+    """Return the size of an Imu message [bytes], for a given size of its frame_id."""
     return 4 + -(-(12 + frame_length) // 8) * 8 + 37 * 8
 
 
 def _fields(length: int, order: str) -> np.dtype[np.void]:
-    """Return the numpy record type of an Imu message: its stamp and its 37 numbers."""
+    """Return the numpy record type of an Imu message: stamp and 37 numbers."""
     formats = [order + 'i4', order + 'u4', (order + 'f8', (37,))]
     names, offsets = ['sec', 'nanosec', 'numbers'], [4, 8, length - 37 * 8]
     return np.dtype({'names': names, 'formats': formats, 'offsets': offsets, 'itemsize': length})
 
 
 def imu_topic(link: str) -> str:
-    """Return the topic of the accelerometer on a link, in characters that ROS permits."""
+    """Return a valid topic name for the accelerometer on a link."""
     name = re.sub('[^A-Za-z0-9_]', '_', link)
     return f'/{"_" if name[:1].isdigit() else ""}{name}/imu'

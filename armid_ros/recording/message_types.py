@@ -62,7 +62,7 @@ class MessageType:
 
 def message_type(name: str, definition: str | None = None) -> MessageType:
     """
-    Return a message type with its hash, and the definitions of it and of types it contains.
+    Return a message type with its hash and the definitions of all types that it contains.
 
     Parameters
     ----------
@@ -87,7 +87,7 @@ def message_type(name: str, definition: str | None = None) -> MessageType:
 
 
 def store_for(described: MessageType) -> Typestore:
-    """Return a type store that decodes messages of a type by the definition in their bag."""
+    """Return a type store that decodes messages as the definition in their bag states."""
     if not described.definition:
         store = get_typestore(Stores.ROS2_JAZZY)
         if described.name not in store.fielddefs:
@@ -129,7 +129,7 @@ def _register(store: Typestore, name: str, definition: str | None) -> None:
 
 
 def _installed(name: str) -> str:
-    """Find the .msg file of a type in the sourced ROS workspaces, and return its text."""
+    """Return the text of a .msg file in the sourced ROS workspaces, by its type name."""
     listed = os.environ.get('AMENT_PREFIX_PATH', '').split(os.pathsep)
     prefixes = [prefix for prefix in (*listed, sys.prefix) if prefix]
     package, _, rest = name.partition('/')
@@ -150,6 +150,6 @@ def header_stamp(data: bytes) -> int:
 
 
 def string_cdr(text: str) -> bytes:
-    """Return a text serialised as a std_msgs/String message."""
+    """Serialise a text as a std_msgs/String message."""
     content = text.encode() + b'\0'
     return b'\x00\x01\x00\x00' + struct.pack('<I', len(content)) + content

@@ -68,7 +68,7 @@ def bag_information(
     topics: Sequence[Topic], file_name: str | None, start_ns: int, end_ns: int
 ) -> dict[str, Any]:
     """
-    Return the content of metadata.yaml below its top-level key, as a dictionary.
+    Return the content of metadata.yaml, without its top-level key, as a dictionary.
 
     Parameters
     ----------
@@ -122,7 +122,7 @@ def bag_information(
 
 
 def yaml_text(information: Mapping[str, Any] | Sequence[Mapping[str, Any]]) -> str:
-    """Return a dictionary, or a list of dictionaries, as YAML text."""
+    """Format a dictionary, or a list of dictionaries, as YAML text."""
     # The C dumper takes 1 ms and may be missing; the Python dumper takes 10 ms.
     dumper = getattr(yaml, 'CSafeDumper', yaml.SafeDumper)
     return str(yaml.dump(information, Dumper=dumper, sort_keys=False, allow_unicode=True))
@@ -173,7 +173,7 @@ def read_metadata(bag: Path) -> BagMetadata:
 
 
 def parse_qos(text: str | None) -> tuple[Qos, ...]:
-    """Return the QoS profiles in a YAML text of any rosbag2 version; empty if it is not valid."""
+    """Parse QoS profiles from a YAML text of any rosbag2 version; empty if it is invalid."""
     default: dict[str, Any] = dict(metadata.dump_qos_v9([VOLATILE])[0])
     default |= dict.fromkeys(('reliability', 'durability', 'liveliness'), 'unknown')
     try:

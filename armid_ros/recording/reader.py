@@ -132,7 +132,7 @@ def read_recording(
 
 
 def is_table(path: Path) -> bool:
-    """Return whether a path is a table; without the plug-in `tables`, any file except a bag."""
+    """Return whether a path is a table; without the plug-in `tables`, whether it is no bag."""
     if find_spec(_TABLES) is None:
         return path.is_file() and not is_bag_file(path)
     from armid_ros.recording import tables
@@ -148,7 +148,7 @@ def read_tables(
     show: Show | None = None,
 ) -> Recording:
     """
-    Read joint measurements from one table, or from several tables of the same samples.
+    Read joint measurements from one table, or from several tables with the same rows.
 
     Parameters
     ----------
@@ -191,7 +191,7 @@ def assembled(
     decoder: JointStateDecoder,
     damage: str,
 ) -> Recording:
-    """Make a recording of decoded samples, and empty the list of samples to free memory."""
+    """Build a recording from decoded samples; empty the list of samples to free memory."""
     where = f'{path}: {topic}'
     if not decoder.messages:
         raise RecordingError(f'{where}: the topic has no messages; record again')
@@ -244,7 +244,7 @@ def read_pieces(
     settings: ReadSettings = DEFAULT,
 ) -> Iterator[tuple[Recording, bool]]:
     """
-    Yield a recording of some joints in consecutive pieces, to limit the memory.
+    Read some joints of a bag as successive short recordings, to limit the memory.
 
     Parameters
     ----------
@@ -304,14 +304,14 @@ def read_pieces(
 
 
 def _decoded(bag: Bag, topic: Topic, decoder: JointStateDecoder) -> Iterator[JointSamples]:
-    """Yield the decoded joint samples of a topic; errors name the bag."""
+    """Yield the decoded joint samples of a topic; each error message names the bag."""
     with reading(bag.path, RecordingError):
         for block in joint_state_blocks(bag, topic):
             yield from decoder.decode(block)
 
 
 def choose_topics(bag: Bag, joints: Sequence[str] | None, wanted: str | None) -> tuple[Topic, ...]:
-    """Return the JointState topic to read, or several topics that together have all joints."""
+    """Return the JointState topic to read, or several topics that together contain all joints."""
     there = [topic for topic in bag.topics() if holds_joint_state(topic)]
     candidates = [topic for topic in there if topic.type_name == JOINT_STATE] or there
     if wanted is not None or not candidates:
@@ -368,7 +368,7 @@ def topics(path: str | Path, settings: ReadSettings = DEFAULT) -> tuple[Topic, .
 
 def read_robot_description(path: str | Path, settings: ReadSettings = DEFAULT) -> str | None:
     """
-    Return the URDF in a bag: the last message of its topic '.../robot_description'.
+    Return the URDF in the last message of a bag's topic '.../robot_description'.
 
     Parameters
     ----------

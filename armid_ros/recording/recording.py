@@ -55,7 +55,7 @@ class TimeGap:
 @dataclass(frozen=True)
 class PositionRange:
     """
-    Range of the recorded positions of a joint that was not requested, such as a gripper.
+    Recorded position range of a joint that was not requested, such as a gripper.
 
     Attributes
     ----------
@@ -74,7 +74,7 @@ class PositionRange:
 @dataclass(frozen=True, eq=False)
 class PartnerMotion:
     """
-    Positions of another machine, tied to the arm, at the samples of a recording.
+    Positions of a machine that is connected to the arm, at the samples of a recording.
 
     Attributes
     ----------
@@ -160,16 +160,16 @@ class ReadReport:
 
     @property
     def clean(self) -> bool:
-        """Whether every message became a sample, and no quantity is missing."""
+        """Whether every message became a sample and every quantity was recorded."""
         return self == ReadReport(messages=self.messages, samples=self.samples)
 
     @property
     def unharmed(self) -> bool:
-        """Whether no sample was dropped or repaired; quantities may be missing."""
+        """Whether no sample was dropped or repaired, even if quantities are missing."""
         return replace(self, absent=(), unwrapped=()).clean
 
     def describe(self) -> str:
-        """Return the report as a text of a few sentences."""
+        """Return the report as a few sentences."""
         whose = f' ({", ".join(self.not_finite)})' if self.not_finite else ''
         sentences = [f'{self.samples} samples from {self.messages} messages']
         counted = (
@@ -263,7 +263,7 @@ class Recording:
     temperature: Temperatures | None = None
 
     def __post_init__(self) -> None:
-        """Make the arrays read-only, and check their shapes and the order of times."""
+        """Make the arrays read-only; check their shapes and that times increase."""
         object.__setattr__(self, 'joints', tuple(self.joints))
         freeze_samples(self.source or 'recording', self, 'q', 'dq', 'tau')
         backwards = np.flatnonzero(np.diff(self.t) <= 0.0)
@@ -309,7 +309,7 @@ class Recording:
 
     def plot(self, quantity: Literal['q', 'dq', 'tau'] = 'tau') -> npt.NDArray[np.object_]:
         """
-        Draw a quantity, such as torque, over time, with separate axes for each joint.
+        Plot a quantity, such as torque, over time, each joint in axes of its own.
 
         Parameters
         ----------
@@ -340,7 +340,7 @@ class Recording:
 
     def motion(self, cutoff: float | None = None) -> Motion:
         """
-        Return the filtered motion of the longest stretch without a gap, with unfiltered torque.
+        Return the filtered motion of the longest gap-free section, with unfiltered torque.
 
         Parameters
         ----------
@@ -365,7 +365,7 @@ class Recording:
         return filtered
 
     def select(self, samples: Samples) -> Recording:
-        """Return the recording at selected samples, on the same time base."""
+        """Return the recording with selected samples only; times are unchanged."""
         partner = self.partner and replace(self.partner, q=self.partner.q[samples])
         return replace(self, **selected(self, samples, 't', 'q', 'dq', 'tau'), partner=partner)
 
@@ -374,7 +374,7 @@ def recorded_together(
     recording: Recording, other: Recording, robot: Robot, ties: Sequence[Tie] = ()
 ) -> Recording:
     """
-    Add the positions of another machine to a recording, interpolated at the recording's stamps.
+    Add the positions of a connected machine to a recording, at the recording's times.
 
     Parameters
     ----------
@@ -414,7 +414,7 @@ def recorded_together(
 
 def given_twice(fitted: Sequence[Recording], held_out: Sequence[Recording] = ()) -> str:
     """
-    Return the names of recordings that are given more than once; empty if there are none.
+    Return the names of recordings that were given more than once; empty if there are none.
 
     A recording given twice would have twice the weight, and a fitted recording cannot be held
     out. Recordings are equal if their positions and torques are equal, since two simulated runs

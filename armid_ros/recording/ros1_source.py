@@ -32,10 +32,10 @@ from rosbags.typesys.base import TypesysError
 
 
 class Ros1Source(Source):
-    """Reader of one ROS 1 bag file; messages of types that ROS 2 lacks are left out."""
+    """Reader of a ROS 1 bag file; messages whose type ROS 2 does not have are skipped."""
 
     def __init__(self, path: Path, settings: ReadSettings = DEFAULT) -> None:
-        """Open a ROS 1 bag; a single chunk is in memory at a time, and no checksum is compared."""
+        """Open a ROS 1 bag; checksums are not compared, and one chunk at a time is in memory."""
         super().__init__(path, settings)
         self._old = get_typestore(Stores.ROS1_NOETIC)
         self._new = get_typestore(Stores.ROS2_JAZZY)
@@ -89,11 +89,11 @@ class Ros1Source(Source):
             self._damage.add(f'the bag is damaged: {error}')
 
     def _is_known(self, one: Connection) -> bool:
-        """Return whether both ROS 1 and ROS 2 have the message type of a connection."""
+        """Return whether ROS 1 and ROS 2 both have the message type of a connection."""
         return one.msgtype in self._new.fielddefs and one.msgtype in self._old.fielddefs
 
     def _make_converter(self, kind: str) -> Callable[[bytes | memoryview], memoryview]:
-        """Return the function that converts messages of a type from ROS 1 to ROS 2."""
+        """Return a function that converts messages of one type from ROS 1 to ROS 2."""
         old, new = self._old, self._new
         if is_same_wireformat(old, new, kind, kind):
             return partial(new.ros1_to_cdr, typename=kind)

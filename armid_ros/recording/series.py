@@ -35,7 +35,7 @@ MAX_NOT_FINITE = 0.2
 
 
 def gather(pieces: Sequence[JointSamples]) -> list[JointSamples]:
-    """Concatenate samples with the same joints, in the order of storage."""
+    """Concatenate all samples that have the same joints."""
     by_joints: dict[tuple[str, ...], list[JointSamples]] = {}
     for piece in pieces:
         by_joints.setdefault(piece.joints, []).append(piece)
@@ -52,7 +52,7 @@ def gather(pieces: Sequence[JointSamples]) -> list[JointSamples]:
 def clock_problem(
     stamps: IntArray, position: FloatArray | None, receive: IntArray | None = None
 ) -> str:
-    """Return why time stamps cannot be used, such as 'do not advance'; empty if they can."""
+    """Return why time stamps are unusable, such as 'do not advance'; empty if they are usable."""
     first = int(np.argmax(stamps != 0))
     if first and np.count_nonzero(stamps[first:] == 0) <= 0.01 * len(stamps):
         stamps = stamps[first:]  # simulated time is zero until the first /clock
@@ -82,7 +82,7 @@ def clock_problem(
 
 
 def ordered(series: JointSamples, clock: Clock, counts: Counter[str]) -> JointSamples:
-    """Return the longest stretch of samples between clock restarts, sorted by time."""
+    """Return the longest section of samples without a clock restart, sorted by time."""
     if clock == 'receive':
         assert series.receive is not None
         series = replace(series, stamps=series.receive)
@@ -106,7 +106,7 @@ def ordered(series: JointSamples, clock: Clock, counts: Counter[str]) -> JointSa
 def merged(
     series: Sequence[JointSamples], joints: Sequence[str], counts: Counter[str]
 ) -> JointSamples:
-    """Merge series, each with some of the joints, into samples of all joints at common times."""
+    """Merge samples of different joints into samples of all joints at common times."""
     holders: dict[tuple[int, ...], list[str]] = {}
     for joint in joints:
         key = tuple(i for i, one in enumerate(series) if joint in one.joints)
@@ -158,7 +158,7 @@ def _concatenated(parts: Sequence[JointSamples]) -> JointSamples:
 def _stacked(
     arrays: Sequence[FloatArray | None], parts: Sequence[JointSamples], axis: int = 0
 ) -> FloatArray | None:
-    """Concatenate arrays of a quantity along time or joints; a missing array becomes NaN."""
+    """Concatenate arrays of a quantity along time or joints; NaN replaces a missing array."""
     if all(values is None for values in arrays):
         return None
     filled = [
@@ -170,7 +170,7 @@ def _stacked(
 
 
 def _adjacent(arrays: Sequence[FloatArray]) -> FloatArray | None:
-    """Return arrays as a single view if they are consecutive rows of the same array, else None."""
+    """Return arrays as one view if they are successive rows of one array, else None."""
     base = arrays[0].base
     if not isinstance(base, np.ndarray) or base.ndim != 2:
         return None
@@ -185,7 +185,7 @@ def _adjacent(arrays: Sequence[FloatArray]) -> FloatArray | None:
 
 
 def longest_run(stamps: IntArray) -> slice | None:
-    """Return the slice of the longest stretch between clock restarts; None without a restart."""
+    """Return the slice of the longest section without a clock restart; None if no restart."""
     if len(stamps) < 3:
         return None
     steps = np.diff(stamps)
@@ -208,7 +208,7 @@ def longest_run(stamps: IntArray) -> slice | None:
 
 
 def _sorted(series: JointSamples, counts: Counter[str]) -> JointSamples:
-    """Return samples sorted by time; of samples with equal stamps, the first is kept."""
+    """Sort samples by time; keep the first of samples with equal stamps."""
     steps = np.diff(series.stamps)
     if (steps > 0).all():
         return series
@@ -225,7 +225,7 @@ def _sorted(series: JointSamples, counts: Counter[str]) -> JointSamples:
 def _resampled(
     series: JointSamples, stamps: IntArray
 ) -> tuple[JointSamples, npt.NDArray[np.bool_], npt.NDArray[np.bool_]]:
-    """Interpolate samples at other stamps; also return masks of valid and of measured samples."""
+    """Interpolate samples at other times; return them, and masks of valid and measured ones."""
     if len(series) == len(stamps) and np.array_equal(series.stamps, stamps):
         everywhere = np.ones(len(stamps), np.bool_)
         return series, everywhere, everywhere
@@ -247,7 +247,7 @@ def _resampled(
 def _finite(
     where: str, joints: tuple[str, ...], series: JointSamples, counts: Counter[str]
 ) -> tuple[JointSamples, tuple[str, ...], tuple[str, ...]]:
-    """Return the samples with finite values, and names of missing and of non-finite quantities."""
+    """Return the samples with finite values, with names of missing and non-finite quantities."""
     absent: list[str] = []
     quantities: list[FloatArray | None] = []
     for name, values in zip(QUANTITIES, series.values, strict=True):
@@ -286,7 +286,7 @@ def _finite(
 
 def unwrapped(q: FloatArray) -> tuple[FloatArray, list[int]]:
     """
-    Return positions without the jumps by a full turn of joints that wrap around.
+    Remove jumps by full turns from the positions of joints that wrap around.
 
     A joint is wrapped if its positions stay within one turn, and if each step above half a turn
     is about a full turn. The tolerance depends on the other steps of the joint.
@@ -339,7 +339,7 @@ def assemble(
     **attributes: Any,
 ) -> Recording:
     """
-    Make a recording from samples that may be late, repeated, split by joints or not finite.
+    Build a recording from samples that may be late, repeated, non-finite or split by joints.
 
     Parameters
     ----------

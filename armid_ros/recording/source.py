@@ -28,7 +28,7 @@ BLOCK_MESSAGES = 4096
 @dataclass(frozen=True)
 class ReadSettings:
     """
-    Checks and memory limit for reading a bag.
+    Memory limit and checks for reading a bag.
 
     Attributes
     ----------
@@ -56,7 +56,7 @@ class ReadSettings:
 
     def require(self, size: int, content_name: str) -> None:
         """
-        Raise RecordingError if content of a file would exceed the memory limit.
+        Raise RecordingError if content of the given size would exceed the memory limit.
 
         Parameters
         ----------
@@ -118,7 +118,7 @@ class Topic:
 
 
 def listed(topics: Sequence[Topic]) -> str:
-    """Return the names of topics with types and message counts, for error messages."""
+    """Return the topics as text with types and message counts, for error messages."""
     known = (f'{one.name} ({one.type_name}, {one.count} messages)' for one in topics)
     return ', '.join(known) or 'none'
 
@@ -174,24 +174,24 @@ class RawMessage(NamedTuple):
 
 
 class Damage:
-    """List of the problems found in a file, each problem once."""
+    """List of problems found in a file, without repetition."""
 
     def __init__(self) -> None:
         self._problems: dict[str, None] = {}
 
     def __str__(self) -> str:
-        """Return the first eight problems as a text; empty without problems."""
+        """Return the first eight problems as text; empty if there are none."""
         shown = list(self._problems)[:8]
         more = len(self._problems) - len(shown)
         return '; '.join([*shown, *([f'and {more} more'] if more else [])])
 
     def add(self, problem: str) -> None:
-        """Add a problem to the list, unless the list has it."""
+        """Add a problem, unless the list contains it already."""
         self._problems[problem] = None
 
 
 class Source(ABC):
-    """Reader of the topics and messages of one storage file, or of all files of one bag."""
+    """Reader for the topics and messages of one storage file, or of a complete bag."""
 
     def __init__(self, path: Path, settings: ReadSettings = DEFAULT) -> None:
         """
@@ -237,7 +237,7 @@ class Source(ABC):
 
 def records_at(data: bytes | mmap.mmap, start: IntArray, length: int) -> npt.NDArray[np.void]:
     """
-    Return equally long pieces of a buffer; without a copy if they are evenly spaced.
+    Return pieces of equal length from a buffer, at given byte positions.
 
     Parameters
     ----------

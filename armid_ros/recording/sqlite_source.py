@@ -114,7 +114,7 @@ class SqliteSource(Source):
                 yield RawMessage(_text(name), time, time, data)
 
     def _opened(self) -> dict[str, set[str]]:
-        """Return the column names of rosbag2 tables; RecordingError if a column is missing."""
+        """Return the column names of the rosbag2 tables; RecordingError if one is missing."""
         database = self._database
         database.text_factory = lambda text: text.decode('utf-8', 'replace')
         database.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, min(self._settings.memory_limit, 2**31 - 1))
@@ -146,7 +146,7 @@ class SqliteSource(Source):
         return columns
 
     def _check(self) -> None:
-        """Check the pages and rows of the database, and add their problems to the damage."""
+        """Check pages and rows of the database, and report problems as damage."""
         (verdict,) = self._database.execute('PRAGMA quick_check(1)').fetchone()
         if verdict != 'ok':
             self._damage.add(f'the database is damaged: {" ".join(_text(verdict).split())}')
@@ -164,7 +164,7 @@ class SqliteSource(Source):
             self._damage.add(f'{lost} rows of messages have no topic; they are left out')
 
     def _fetch(self, query: str, parameters: tuple[str, ...]) -> Iterator[list[tuple[Any, ...]]]:
-        """Yield the result rows of a query in batches, up to the first damaged row."""
+        """Yield the rows of a query in batches, up to the first damaged row."""
         rows: list[tuple[Any, ...]] = []
         size = 0
         try:
@@ -181,5 +181,4 @@ class SqliteSource(Source):
 
 
 def _text(value: object) -> str:
-    """Return a database value if it is a text, else an empty text."""
     return value if isinstance(value, str) else ''

@@ -35,7 +35,7 @@ def temperatures(
     where: Sequence[str], times: Sequence[FloatArray], values: Sequence[FloatArray]
 ) -> Temperatures:
     """
-    Combine temperature readings of joints, measured at different times, on a common time base.
+    Interpolate temperature readings, taken at different times, on a common time base.
 
     Parameters
     ----------

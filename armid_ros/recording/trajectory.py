@@ -24,7 +24,7 @@ from rosbags.typesys import get_typestore, Stores
 
 def joint_trajectory_cdr(motion: Motion | Reference) -> bytes:
     """
-    Return a motion serialised as one trajectory_msgs/JointTrajectory message.
+    Serialise a motion as one trajectory_msgs/JointTrajectory message.
 
     Parameters
     ----------
@@ -147,7 +147,7 @@ def read_waypoints(
 
 def waypoints_of(message: Any) -> Reference:
     """
-    Return the waypoints of a JointTrajectory message that ROS or rosbags decoded.
+    Return the waypoints of a decoded JointTrajectory message as a reference motion.
 
     Raises
     ------

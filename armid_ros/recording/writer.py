@@ -87,7 +87,7 @@ def require_new(path: Path) -> None:
 
 class BagWriter:
     """
-    Writer of one bag with MCAP storage; a context manager.
+    Writer for one bag with MCAP storage, to be used in a `with` statement.
 
     The end of the context completes the bag, also after an exception. Messages recorded before
     the exception are kept.
@@ -156,7 +156,7 @@ class BagWriter:
 
     @property
     def topics(self) -> tuple[Topic, ...]:
-        """Return the topics of the bag, with the number of messages in the file."""
+        """Return the topics of the bag with the numbers of written messages."""
         counts = self._mcap.committed.counts
         return tuple(
             replace(topic, count=counts.get(self._channels[name], 0))
@@ -287,7 +287,7 @@ class BagWriter:
             self.flush()
 
     def write_description(self, urdf: str, log_time_ns: int) -> None:
-        """Write a URDF as a latched message to the topic /robot_description."""
+        """Write a URDF to the topic /robot_description, latched for late subscribers."""
         self.add_topic('/robot_description', STRING, qos=[LATCHED])
         self.write('/robot_description', string_cdr(urdf), log_time_ns)
 
@@ -295,7 +295,7 @@ class BagWriter:
         self, topic: str, messages: npt.NDArray[np.void], log_times_ns: IntArray
     ) -> None:
         """
-        Write serialised messages of equal length from one array.
+        Write serialised messages of equal length, which are the elements of an array.
 
         Parameters
         ----------
@@ -358,7 +358,7 @@ class BagWriter:
             self.write(message.topic, message.cdr, message.log_time_ns, message.publish_time_ns)
 
     def flush(self) -> None:
-        """Write messages in memory to the file, as a chunk; a recorder calls this by a timer."""
+        """Write the messages in memory to the file as a chunk; recorders call this regularly."""
         self._check_open()
         content, offsets = _joined(self._open_records())
         # A chunk without messages need not be written.
@@ -377,7 +377,7 @@ class BagWriter:
 
     def save(self) -> str:
         """
-        Complete the bag after a write error, without the messages in memory.
+        Complete the bag after a write error; messages in memory are lost.
 
         Returns
         -------
@@ -397,7 +397,7 @@ class BagWriter:
         return ''
 
     def _open_records(self) -> list[bytes]:
-        """Return the list of records for the next chunk."""
+        """Return the list that collects records for the next chunk."""
         # flush() does not empty the list, because it may be interrupted after writing. Records
         # have the number of their chunk, and are removed when that chunk is in the file.
         if self._open[0] != self._mcap.committed.chunks:
@@ -434,7 +434,7 @@ class BagWriter:
 
 
 def _joined(records: list[bytes]) -> tuple[bytes, IntArray]:
-    """Return joined records, and the byte position of each message record in the result."""
+    """Join records; return their bytes, and the byte position of each message record."""
     lengths = np.array([len(record) for record in records], np.int64)
     is_message = np.array([record[0] == Opcode.MESSAGE for record in records], np.bool_)
     return b''.join(records), (np.cumsum(lengths) - lengths)[is_message]

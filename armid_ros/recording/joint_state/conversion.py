@@ -17,13 +17,13 @@ _JOINT_STATE_FIELD = re.compile(r'^\s*sensor_msgs/(?:msg/)?JointState\s+(\w+)', 
 
 
 def holds_joint_state(topic: Topic) -> bool:
-    """Return whether the message type of a topic is JointState or has a JointState field."""
+    """Return whether a topic has JointState messages, or messages with a JointState field."""
     return topic.type_name == JOINT_STATE or bool(_inside(topic.message_type))
 
 
 def joint_state_blocks(bag: Bag, topic: Topic) -> Iterator[MessageBlock]:
     """
-    Yield the messages of a topic as JointState in CDR, in the order of storage.
+    Yield the messages of a topic, converted to serialised JointState messages.
 
     Raises
     ------
@@ -60,7 +60,7 @@ def joint_state_blocks(bag: Bag, topic: Topic) -> Iterator[MessageBlock]:
 
 
 def _inside(described: MessageType) -> str:
-    """Return the name of a type's JointState field, preferably of measured states; '' if none."""
+    """Return the name of the JointState field of a message type; '' if there is none."""
     own = described.definition.split('\n===', 1)[0]
     found = _JOINT_STATE_FIELD.findall(own)
     return next((name for name in found if 'measured' in name), found[0] if found else '')
@@ -68,7 +68,7 @@ def _inside(described: MessageType) -> str:
 
 @cache
 def _standard(described: MessageType) -> bool:
-    """Return whether the definition of JointState in a bag is that of ROS 2."""
+    """Return whether a bag defines the type JointState as ROS 2 does."""
     if not described.definition:
         return True
     return bool(store_for(described).hash_rihs01(JOINT_STATE) == JOINT_STATE_HASH)

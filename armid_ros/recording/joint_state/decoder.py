@@ -20,7 +20,7 @@ import numpy.typing as npt
 @dataclass(frozen=True)
 class JointSamples:
     """
-    Samples of some joints: stamps, positions, velocities and efforts.
+    Time stamps, positions, velocities and efforts of some joints in N samples.
 
     Attributes
     ----------
@@ -47,7 +47,7 @@ class JointSamples:
         return len(self.stamps)
 
     def select(self, samples: Samples) -> JointSamples:
-        """Return stamps, positions, velocities and efforts of selected samples."""
+        """Return the samples that a slice, mask or index array selects."""
         values = tuple(None if v is None else v[samples] for v in self.values)
         receive, number = (
             None if one is None else one[samples] for one in (self.receive, self.number)
@@ -55,7 +55,7 @@ class JointSamples:
         return JointSamples(self.joints, self.stamps[samples], values, receive, number)
 
     def columns(self, joints: Sequence[str]) -> JointSamples:
-        """Return positions, velocities and efforts of selected joints, in the given order."""
+        """Return the samples of selected joints, in the given order."""
         if tuple(joints) == self.joints:
             return self
         chosen = [self.joints.index(joint) for joint in joints]
@@ -64,14 +64,14 @@ class JointSamples:
 
     @property
     def nbytes(self) -> int:
-        """Return the memory of the arrays [bytes]."""
+        """Memory that the arrays use [bytes]."""
         arrays = (self.stamps, self.receive, self.number, *self.values)
         return sum(array.nbytes for array in arrays if array is not None)
 
 
 class JointStateDecoder:
     """
-    Decoder of the JointState messages of one topic; it caches message layouts.
+    Decoder of the JointState messages of one topic; it caches the message layouts.
 
     Attributes
     ----------
@@ -90,7 +90,7 @@ class JointStateDecoder:
 
     def __init__(self, joints: Sequence[str], expected: int = 0) -> None:
         """
-        Make a decoder of the values of some joints.
+        Create a decoder that extracts the values of the given joints.
 
         Parameters
         ----------
@@ -111,7 +111,7 @@ class JointStateDecoder:
         self.first_problem = ''
 
     def decode(self, block: MessageBlock) -> Iterator[JointSamples]:
-        """Yield samples of the requested joints in a block of messages, grouped by layout."""
+        """Yield samples of the requested joints from a block of messages."""
         numbers = np.arange(self.messages, self.messages + len(block), dtype=np.int64)
         self.messages += len(block)
         lengths = block.length
@@ -127,7 +127,7 @@ class JointStateDecoder:
     def _decode_equal(
         self, raw: npt.NDArray[np.void], numbers: IntArray, receive: IntArray
     ) -> Iterator[JointSamples]:
-        """Yield the samples of messages of equal length."""
+        """Yield the samples in messages of equal length."""
         while len(raw):
             plan = self._plan_for(raw[:1])
             if plan is None:
@@ -147,7 +147,7 @@ class JointStateDecoder:
     def _read(
         self, plan: _Plan, rows: npt.NDArray[np.void], numbers: IntArray, receive: IntArray
     ) -> Iterator[JointSamples]:
-        """Yield samples of requested joints, and update the position ranges of other joints."""
+        """Yield samples of the requested joints; update the position ranges of other joints."""
         if plan.others and plan.layout.counts[0] and len(rows):
             positions = rows[QUANTITIES[0]][:, list(plan.others.values())]
             lowest, highest = np.fmin.reduce(positions), np.fmax.reduce(positions)
@@ -171,7 +171,7 @@ class JointStateDecoder:
         yield JointSamples(plan.joints, stamps, tuple(values), receive, numbers)
 
     def _reserved(self, name: str, count: int, joints: int) -> FloatArray:
-        """Return an array (count, joints) for a quantity, taken from the reserved memory."""
+        """Return an array (count, joints) from the memory reserved for a quantity."""
         free = self._free.get((name, joints))
         if free is None:
             # counts in damaged files are unreliable, so at most 1 GiB is reserved for a quantity
@@ -182,7 +182,7 @@ class JointStateDecoder:
         return free[:count]
 
     def _plan_for(self, first: npt.NDArray[np.void]) -> _Plan | None:
-        """Return the decoding plan for a message's layout; None if the message is malformed."""
+        """Return how to decode messages with the layout of the first; None if it is malformed."""
         length = first.dtype.itemsize
         known = self._plans.setdefault(length, [])
         for plan in known:
@@ -214,7 +214,7 @@ class JointStateDecoder:
 
 @dataclass(frozen=True)
 class _Plan:
-    """Decoding plan: indices of requested joints, and of other joints, in arrays of a message."""
+    """Array indices of the requested and of the other joints in messages of one layout."""
 
     layout: JointStateLayout
     dtype: np.dtype[np.void]

@@ -84,7 +84,7 @@ def write_joint_states(
     tau: npt.ArrayLike | None = None,
 ) -> None:
     """
-    Write joint measurements to a topic of a bag, with log times equal to the stamps.
+    Write joint measurements to a topic of a bag; log times equal the time stamps.
 
     See ``joint_state_cdr`` for the parameters.
 

@@ -28,13 +28,13 @@ _FRAME_OFFSET = 12
 
 
 class MalformedMessage(ValueError):
-    """Error of bytes that are not a valid sensor_msgs/JointState message."""
+    """Error raised for bytes that are not a valid sensor_msgs/JointState message."""
 
 
 @dataclass(frozen=True)
 class JointStateLayout:
     """
-    Layout of a serialised JointState message: byte order, names and number of values.
+    Layout of a serialised JointState message: byte order, names, lengths of the arrays.
 
     Attributes
     ----------
@@ -125,7 +125,7 @@ class JointStateLayout:
 
     @cached_property
     def places(self) -> tuple[tuple[int, int], ...]:
-        """Return the byte positions of the value count and of the first value of each quantity."""
+        """Return for each quantity the byte positions of its length field and first value."""
         places, position = [], self.names_end
         for count in self.counts:
             at = _align(position, 4)
@@ -142,7 +142,7 @@ class JointStateLayout:
 
     @cached_property
     def spare(self) -> int:
-        """Return the largest number of padding bytes after the last value."""
+        """Return the largest possible number of padding bytes after the last value."""
         # Writers add padding to align the next field, also for empty sequences.
         return 7 + 4 * self.counts.count(0)
 
@@ -181,17 +181,17 @@ class JointStateLayout:
 
     @cached_property
     def number(self) -> np.dtype[np.float64]:
-        """Return the numpy type of one value in a message."""
+        """Return the numpy type of a value in the message."""
         return np.dtype(self.order + 'f8')
 
     @cached_property
     def values(self) -> tuple[tuple[int, int], ...]:
-        """Return the number of values and the byte position of the first value, by quantity."""
+        """Return for each quantity the number of values and the byte position of the first."""
         return tuple((n, begin) for n, (_, begin) in zip(self.counts, self.places, strict=True))
 
     @cached_property
     def fixed(self) -> tuple[npt.NDArray[np.void], npt.NDArray[np.void]]:
-        """Return the bytes that all messages of this layout share, and a mask of these bits."""
+        """Return the bytes that all messages of this layout have in common, and their bit mask."""
         expected, mask = np.zeros((2, 1), self.record)
         numbers = {'encapsulation': int(self.order == '<'), 'frame_length': self.frame_length}
         numbers |= {f'n_{name}': n for name, n in zip(QUANTITIES, self.counts, strict=True)}
@@ -212,12 +212,12 @@ class JointStateLayout:
 
     @cached_property
     def _fixed_bits(self) -> tuple[int, int]:
-        """Return bytes and mask of `fixed` as integers, since integers are compared faster."""
+        """Return bytes and mask of `fixed` as integers, which are compared faster."""
         fixed, mask = (int.from_bytes(record.tobytes(), 'little') for record in self.fixed)
         return fixed, mask
 
     def is_of(self, data: bytes) -> bool:
-        """Return whether one serialised message has this layout; padding is ignored."""
+        """Return whether a serialised message has this layout; padding is ignored."""
         fixed, mask = self._fixed_bits
         complete = self.end <= len(data) <= self.end + self.spare
         return complete and int.from_bytes(data[: self.end], 'little') & mask == fixed
@@ -243,5 +243,5 @@ class JointStateLayout:
 
 
 def _align(position: int, size: int) -> int:
-    """Return the next byte position that is a multiple of a field size, counted from byte 4."""
+    """Round a byte position up to a multiple of a field size, counted from byte 4."""
     return ((position - 4 + size - 1) & -size) + 4

@@ -23,7 +23,7 @@ import numpy.typing as npt
 
 
 class Contents(NamedTuple):
-    """Contents of some chunks in a shared buffer, with the byte range of each chunk's content."""
+    """Decompressed chunks in a common buffer, with the byte range of each chunk."""
 
     data: bytes | mmap.mmap
     parts: list[tuple[Chunk, int, int]]
@@ -33,7 +33,7 @@ def read_chunks(
     found: FileMap, chunks: Iterable[Chunk], settings: ReadSettings
 ) -> Iterator[Contents]:
     """
-    Yield the contents of undamaged chunks of an MCAP file, in the given order.
+    Yield the decompressed content of the undamaged chunks of an MCAP file.
 
     Damaged chunks are left out, and added to the damage of the file.
 
@@ -73,7 +73,7 @@ def read_chunks(
 def _read_ahead(
     found: FileMap, groups: Sequence[Sequence[Chunk]], settings: ReadSettings
 ) -> Iterator[tuple[Contents, list[str]]]:
-    """Yield contents and damage of groups of chunks, which threads read in advance."""
+    """Yield contents and damage of groups of chunks; threads read the next groups in advance."""
     begun: deque[tuple[int, Future[tuple[Contents, list[str]]]]] = deque()
     # Decompression and checksums release the GIL.
     count = min(2, os.cpu_count() or 1)
@@ -91,7 +91,7 @@ def _read_ahead(
 def _read_group(
     found: FileMap, group: Sequence[Chunk], settings: ReadSettings
 ) -> tuple[Contents, list[str]]:
-    """Return the contents of the undamaged chunks of a group, and the damage of other chunks."""
+    """Return the contents of undamaged chunks of a group, and messages on damaged chunks."""
     packed = any(chunk.compression for chunk in group)
     contents: list[bytes | memoryview] = []
     parts: list[tuple[Chunk, int, int]] = []
@@ -119,7 +119,7 @@ def _read_group(
 
 
 def _content(found: FileMap, chunk: Chunk, settings: ReadSettings) -> bytes | memoryview:
-    """Return the content of a chunk; raise an exception of CORRUPT if the chunk is damaged."""
+    """Return the decompressed content of a chunk; raise one of CORRUPT if it is damaged."""
     stored = memoryview(found.data)[chunk.begin : chunk.end]
     if chunk.compression not in ('', 'zstd', 'lz4'):
         raise ValueError(
@@ -142,12 +142,12 @@ def _content(found: FileMap, chunk: Chunk, settings: ReadSettings) -> bytes | me
 
 
 def heads(data: bytes | mmap.mmap, offsets: IntArray) -> npt.NDArray[np.void]:
-    """Return opcode, length, channel and times of the messages at given byte positions."""
+    """Return the header fields of the messages at given byte positions."""
     return records_at(data, offsets, MESSAGE.itemsize).view(MESSAGE)
 
 
 def message_block(data: bytes | mmap.mmap, offsets: IntArray) -> MessageBlock:
-    """Return the messages at given byte positions in a buffer as a block."""
+    """Return the messages at given byte positions of a buffer as a block."""
     rows = heads(data, offsets)
     return MessageBlock(
         data,
@@ -159,7 +159,7 @@ def message_block(data: bytes | mmap.mmap, offsets: IntArray) -> MessageBlock:
 
 
 def messages_in(found: FileMap, contents: Contents) -> tuple[IntArray, npt.NDArray[np.void]]:
-    """Return the byte positions in the buffer, and the heads, of all messages in some chunks."""
+    """Return byte positions and header fields of all messages in the given contents."""
     data, parts = contents  # a correct index is faster than a walk over the records
     ranges = np.array([(begin, end) for _, begin, end in parts], np.int64)
     if all(chunk.indexes and chunk.complete for chunk, _, _ in parts):
@@ -195,7 +195,7 @@ def heads_by_index(
     data: bytes | mmap.mmap, offsets: IntArray, ranges: IntArray
 ) -> npt.NDArray[np.void] | None:
     """
-    Read message heads at the byte positions that an MCAP index states; None if an index is wrong.
+    Read message headers at the byte positions in an MCAP index; None if these are wrong.
 
     An index is correct if messages and definitions fill the chunk without gaps: each record
     begins at the end of the previous record.
@@ -243,7 +243,7 @@ def walk(
     content: bytes | mmap.mmap, begin: int = 0, end: int | None = None
 ) -> tuple[IntArray, list[tuple[int, int, int]], int]:
     """
-    Find the records in the content of a chunk, by the length of each record.
+    Find messages and definitions in a chunk, by the length that each record states.
 
     Parameters
     ----------

@@ -48,7 +48,7 @@ _DEFINITIONS = (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.STATISTICS)
 @dataclass(frozen=True)
 class Chunk:
     """
-    Position, size, times and checksum of one chunk of an MCAP file.
+    Position, size, time range and checksum of one chunk of an MCAP file.
 
     Attributes
     ----------
@@ -83,7 +83,7 @@ class Chunk:
 @dataclass
 class FileMap:
     """
-    Chunks, messages outside chunks, and definitions of an MCAP file, with its damage.
+    Table of contents of an MCAP file: chunks, other messages, definitions and damage.
 
     Attributes
     ----------
@@ -114,7 +114,7 @@ class FileMap:
     damage: Damage = field(default_factory=Damage)
 
     def span(self, chunk: Chunk) -> str:
-        """Return the time range of a chunk's messages as a text, for descriptions of damage."""
+        """Return the time range of a chunk's messages as text, for reports of damage."""
         begin = min((c.start_time for c in self.chunks if c.end_time), default=0)
         start, end = (1e-9 * (time - begin) for time in (chunk.start_time, chunk.end_time))
         return f'from {start:.3f} to {end:.3f} s after the beginning'
@@ -122,7 +122,7 @@ class FileMap:
 
 def map_file(data: bytes | mmap.mmap, path: Path, *, check: bool = True) -> FileMap:
     """
-    Return the chunks, messages outside chunks, definitions and damage of an MCAP file.
+    Scan an MCAP file; return its chunks, other messages, definitions and damage.
 
     Parameters
     ----------
@@ -171,7 +171,7 @@ def map_file(data: bytes | mmap.mmap, path: Path, *, check: bool = True) -> File
 
 
 def _walk(found: FileMap) -> tuple[list[tuple[int, int, int]], int | None, int | None, int]:
-    """Fill a file map; return definitions, and positions of data end, footer and last record."""
+    """Scan a file into its map; return definitions, and the ends of data, footer and records."""
     data = found.data
     definitions: list[tuple[int, int, int]] = []
     data_end = footer = None
@@ -228,7 +228,7 @@ def add_definition(found: FileMap, opcode: int, content: bytes) -> None:
 
 
 def _add_chunk(found: FileMap, begin: int, end: int, *, complete: bool = True) -> None:
-    """Add a chunk to the map of a file, unless the file ends inside the head of the chunk."""
+    """Add a chunk to the map of a file, unless the file ends within the chunk's header."""
     data = found.data
     if end - begin < _CHUNK_HEADER.size:
         return

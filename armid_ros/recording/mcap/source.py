@@ -43,7 +43,7 @@ class McapSource(Source):
     """Reader of one MCAP file."""
 
     def __init__(self, path: Path, settings: ReadSettings = DEFAULT) -> None:
-        """Open an MCAP file, and find its chunks."""
+        """Open an MCAP file, and locate its chunks."""
         super().__init__(path, settings)
         with open_regular(path, RecordingError) as stream:
             if not stream.seek(0, 2):
@@ -128,7 +128,7 @@ class McapSource(Source):
     def _pieces(
         self, chunks: Sequence[Chunk], channels: Sequence[int]
     ) -> Iterator[tuple[int, bytes | mmap.mmap, IntArray]]:
-        """Yield groups of messages of some channels: first log time, buffer and byte positions."""
+        """Yield messages of some channels in groups: first log time, buffer and byte positions."""
         data, loose = self._found.data, np.array(self._found.loose, np.int64)
         for contents in read_chunks(self._found, chunks, self._settings):
             offsets = self._possible(*messages_in(self._found, contents), channels)
@@ -140,7 +140,7 @@ class McapSource(Source):
             yield first, data, loose[at : at + BLOCK_MESSAGES]
 
     def _survey(self) -> dict[int, int]:
-        """Find all channels of the file, and return the number of messages of each."""
+        """Find all channels of the file; return the number of messages in each channel."""
         if self._counts is not None:
             return self._counts
         found, summary = self._found, self._found.statistics
@@ -160,7 +160,7 @@ class McapSource(Source):
         return self._counts
 
     def _possible(self, offsets: IntArray, rows: _Rows, wanted: Sequence[int]) -> IntArray:
-        """Return the byte positions of the messages of some channels that have valid times."""
+        """Return the byte positions of messages that are of some channels and have valid times."""
         channels = rows['channel']
         chosen = np.isin(channels, wanted) if len(wanted) != 1 else channels == wanted[0]
         late = (rows['log_time'] < 0) | (rows['publish_time'] < 0)
@@ -173,7 +173,7 @@ class McapSource(Source):
         return offsets if chosen.all() else offsets[chosen]
 
     def _compare_count(self, topic: str, channels: Collection[int], count: int) -> None:
-        """Add damage if the number of read messages differs from the count of the writer."""
+        """Record damage if fewer or more messages were read than the writer has counted."""
         summary = self._found.statistics
         if not (self._found.finished and summary and summary.channel_message_counts):
             return

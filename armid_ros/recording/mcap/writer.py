@@ -58,7 +58,7 @@ _MESSAGE_HEAD = struct.Struct('<BQHIQQ')
 
 
 class Committed(NamedTuple):
-    """State of an MCAP file after its last complete write: sizes [bytes], counts, times [ns]."""
+    """File sizes [bytes], counts and times [ns] of an MCAP file after its last complete write."""
 
     position: int = 0
     chunks: int = 0
@@ -111,7 +111,7 @@ class McapWriter:
 
     @property
     def finished(self) -> bool:
-        """Whether the file has its summary and is closed."""
+        """Whether the summary has been written and the file is closed."""
         return self._stream.closed
 
     @property
@@ -124,7 +124,7 @@ class McapWriter:
         return os.path.samestat(there, here)
 
     def add_schema(self, name: str, encoding: str, data: bytes) -> tuple[int, bytes]:
-        """Add a schema; return its number, and its record for the next chunk."""
+        """Add a message schema; return its number, and its record for the next chunk."""
         schema = Schema(id=len(self._schemas) + 1, name=name, encoding=encoding, data=data)
         self._schemas.append(schema)
         return schema.id, _record(schema)
@@ -205,7 +205,7 @@ class McapWriter:
         )
 
     def write_metadata(self, name: str, values: dict[str, str]) -> None:
-        """Write a metadata record with a name and values."""
+        """Write named values as a metadata record."""
         record = _record(Metadata(name, values))
         del self._metadata[self.committed.metadata :]
         self._metadata.append(MetadataIndex(self.committed.position, len(record), name))
@@ -213,7 +213,7 @@ class McapWriter:
         self.committed = self.committed._replace(position=end, metadata=len(self._metadata))
 
     def finish(self) -> None:
-        """Write the summary and close the file; may be repeated after an interruption."""
+        """Write the summary and close the file; can be repeated if it was interrupted."""
         if not self._stream.closed:
             self._append(self._summary())
             self._stream.close()
@@ -257,12 +257,12 @@ class McapWriter:
         return data_end + summary + offsets + _record(Footer(begin, offsets_begin, crc)) + MAGIC
 
     def give_up(self) -> None:
-        """Close the file without a summary; all written chunks can be read."""
+        """Close the file without a summary; readers can still read all written chunks."""
         self._stream.close()
         self._index.close()
 
     def _append_index(self, record: bytes) -> int:
-        """Append the index of a chunk to the temporary index file; return the new size."""
+        """Append a chunk's index to the temporary index file; return the new size of that file."""
         position, rest = self.committed.index_size, memoryview(record)
         try:
             while len(rest):
@@ -273,7 +273,7 @@ class McapWriter:
         return position
 
     def _append(self, data: bytes) -> int:
-        """Write data after the committed data; return the new size of the file [bytes]."""
+        """Write data at the end of the file; return the new size of the file [bytes]."""
         position = self.committed.position
         try:
             if self._stream.tell() != position:
@@ -307,7 +307,6 @@ def message_record(
 
 
 def _records(records: Sequence[McapRecord]) -> bytes:
-    """Return MCAP records as bytes, one after the other."""
     return b''.join(_record(record) for record in records)
 
 

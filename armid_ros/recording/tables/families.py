@@ -119,7 +119,7 @@ def choose(
     rename: Rules = (),
 ) -> QuantityColumns:
     """
-    Return the columns of a quantity that match a pattern given by the user.
+    Return the columns of a quantity whose names match the user's pattern.
 
     Parameters
     ----------
@@ -176,7 +176,7 @@ def guess(
     table: Table, quantity: QuantityName, joints: Sequence[str] | None, rename: Rules = ()
 ) -> QuantityColumns:
     """
-    Find the columns whose names fit a quantity best; the result has no columns if none fit.
+    Find the columns whose names fit a quantity best; empty if no column fits.
 
     Parameters
     ----------
@@ -220,7 +220,7 @@ def guess(
 
 
 def guess_time(table: Table) -> TableColumn | None:
-    """Return the column of time by its name, preferably one with increasing values."""
+    """Find the time column by its name; prefer one whose values increase."""
     scores = {}
     for column in table.columns:
         words = words_of(column.bare_name)
@@ -240,7 +240,7 @@ def _family(
     joints: Sequence[str] | None,
     rename: Rules,
 ) -> QuantityColumns | None:
-    """Return the columns of all joints, by joint name or number; None if a joint has no column."""
+    """Return a column for each joint, by joint name or number; None if a column is missing."""
     labels = list(members)
     numbered = all(label.isdigit() for label in labels)
     if numbered:
@@ -257,13 +257,13 @@ def _family(
 
 
 def _by_number(label: str) -> tuple[int, str]:
-    """Return a key that sorts labels of digits by their numbers."""
+    """Return a sort key with which labels of digits are sorted as numbers."""
     digits = label.lstrip('0')
     return len(digits), digits
 
 
 def _matching(table: Table, pattern: str) -> list[tuple[str, TableColumn]]:
-    """Return the columns that match a pattern, each with the label of its joint."""
+    """Return the columns that match a pattern, each with the joint's part of its name."""
     exact = table.column(pattern)
     if exact is not None:
         return [('1', exact)]
@@ -303,7 +303,7 @@ def _matching(table: Table, pattern: str) -> list[tuple[str, TableColumn]]:
 def _patterns(
     column: TableColumn, joints: Sequence[str] | None, rename: Rules
 ) -> Iterator[tuple[str, str]]:
-    """Yield the ways to split a column name into a pattern and the label of a joint."""
+    """Yield all splits of a column name into a pattern and the joint's part."""
     name = column.bare_name
     if column.array and name.endswith(']'):
         element = name[len(column.array) + 1 : -1]
@@ -333,7 +333,7 @@ def _patterns(
 
 
 def _score(pattern: str, quantity: QuantityName) -> float:
-    """Return a score of how well the words of a column pattern fit a quantity; zero if not."""
+    """Return how well a column pattern fits a quantity, by its words; zero if it does not fit."""
     words = words_of(pattern)
     scores = {
         name: max((table.get(word, 0.0) for word in words), default=0.0)

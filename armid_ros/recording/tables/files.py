@@ -85,12 +85,12 @@ def open_table(path: Path, *, episode: int | None = None) -> Table:
 
 
 def _suffix(path: Path) -> str:
-    """Return the suffix of a file in lower case; a suffix .gz of compression is ignored."""
+    """Return the suffix of a file in lower case, without a final .gz."""
     return Path(path.stem).suffix.lower() if path.suffix == '.gz' else path.suffix.lower()
 
 
 def _with_names(table: Table) -> Table:
-    """Replace numbered columns by columns of joints, whose names are in text columns."""
+    """Replace numbered columns by columns named after joints that text columns list."""
     names: dict[str, dict[str, npt.NDArray[np.str_]]] = {}  # by the text before 'name', and number
     for name, cells in table.words.items():
         match = _NAME.fullmatch(name)
@@ -134,7 +134,7 @@ def _with_dates(table: Table) -> Table:
 
 
 def _with_stamps(table: Table) -> Table:
-    """Combine the columns of seconds and nanoseconds of a stamp in a single column [s]."""
+    """Combine separate columns of seconds and nanoseconds into one time column [s]."""
     pairs = []
     starts = {
         match[1]: column for column in table.columns if (match := _SECONDS.fullmatch(column.name))
@@ -155,7 +155,7 @@ def _with_stamps(table: Table) -> Table:
 
 
 def read_numpy(path: Path) -> Table:
-    """Read the arrays of a .npy or .npz file, also compressed by gzip."""
+    """Read the arrays of a .npy or .npz file, which gzip may have compressed."""
     raw = read_content(path)
     if zipfile.is_zipfile(io.BytesIO(raw)):
         with zipfile.ZipFile(io.BytesIO(raw)) as archive:
@@ -212,7 +212,7 @@ def read_hdf5(path: Path) -> Table:
 
 
 def _require_possible(array: str, size: int, stored: int) -> None:
-    """Raise RecordingError if an array's stated size is impossible or over the memory limit."""
+    """Raise RecordingError if the size that an array states is impossible or too large."""
     # deflate compresses by 1:1032 at most
     if size > 1100 * stored:
         raise RecordingError(
@@ -225,7 +225,7 @@ def _require_possible(array: str, size: int, stored: int) -> None:
 def _flattened(
     content: Mapping[str, Any], prefix: str
 ) -> Iterator[tuple[str, npt.NDArray[np.generic]]]:
-    """Yield the numeric arrays of nested MATLAB structures, with names such as 'log.arm.q'."""
+    """Yield the numeric arrays in nested MATLAB structures, with names such as 'log.arm.q'."""
     for name, value in content.items():
         if isinstance(value, Mapping):
             yield from _flattened(value, f'{prefix}{name}.')

@@ -86,14 +86,14 @@ class TablePlan:
 
     @property
     def absent(self) -> tuple[str, ...]:
-        """Return the missing quantities, such as 'effort' or 'effort of wrist'."""
+        """Return the quantities that the table lacks, such as 'effort' or 'effort of wrist'."""
         return tuple(
             f'{one.quantity} of {", ".join(one.missing)}' if one.pattern else one.quantity
             for one in self.missing
         )
 
     def lines(self) -> list[str]:
-        """Return the plan as lines of text, one line per quantity."""
+        """Return the plan as text, one line per quantity."""
         table = self.table
         lines = [f'{table.source}: {table.described}, {len(table)} rows of {len(table.columns)}']
         if self.time is None:
@@ -192,7 +192,7 @@ def _source(
     settings: ColumnSettings,
     joints: Sequence[str] | None,
 ) -> QuantityColumns:
-    """Return a quantity's columns, given by the user or guessed; no columns if it is missing."""
+    """Return the columns of a quantity as the user chose them, or as guessed; empty if missing."""
     given = getattr(settings, quantity)
     if given is not None and given.lower() == 'none':
         return QuantityColumns(quantity, '')
@@ -219,7 +219,7 @@ def _scaled(
     joints: Sequence[str],
     slides: npt.NDArray[np.bool_],
 ) -> QuantityColumns:
-    """Apply the user's unit settings to columns; degrees apply to revolute joints only."""
+    """Apply the user's units to columns of a quantity; degrees apply to revolute joints only."""
     if source.quantity == 'temperature':
         return source
     if source.quantity == 'effort':
@@ -246,7 +246,6 @@ def _scaled(
 
 
 def _text(values: FloatArray) -> str:
-    """Return the different values of an array as a text."""
     return ', '.join(dict.fromkeys(f'{value:.6g}' for value in values))
 
 
@@ -267,7 +266,7 @@ def _position_notes(
 
 
 def _time(table: Table, settings: ColumnSettings) -> tuple[TableColumn | None, str, float | None]:
-    """Return the time column and its unit, or the sampling rate [Hz] without a time column."""
+    """Return the time column with its unit, or else the sampling rate [Hz]."""
     given = settings.time
     column: TableColumn | None = None
     if given is not None and given.lower() != 'none':
@@ -292,7 +291,7 @@ def _time(table: Table, settings: ColumnSettings) -> tuple[TableColumn | None, s
 
 
 def _time_unit(table: Table, column: TableColumn, given: str | None) -> str:
-    """Return the unit of a time column: given by the user, in its name, or from time steps."""
+    """Return the unit of the time column: from the user, its name, or its time steps."""
     where = f'{table.source}: column {column.name}'
     steps = np.diff(column.finite)
     if len(steps) and np.mean(steps < 0.0) > 0.5:  # sorting would reverse the motion
@@ -320,7 +319,7 @@ def _time_unit(table: Table, column: TableColumn, given: str | None) -> str:
 
 def converted(plan: TablePlan) -> Recording:
     """
-    Convert a table to a recording, by the columns and units of a plan.
+    Convert a table to a recording as a plan states.
 
     Raises
     ------
@@ -389,7 +388,7 @@ def _temperatures(
 
 
 def _times(plan: TablePlan) -> tuple[FloatArray, int]:
-    """Return the times of rows [s] since a stamp, and the stamp [ns], which is 1 s if unknown."""
+    """Return row times [s] relative to a stamp, and this stamp [ns], by default 1 s."""
     if plan.time is None:
         assert plan.rate_hz is not None
         return np.arange(len(plan.table)) / plan.rate_hz, 10**9

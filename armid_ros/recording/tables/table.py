@@ -63,7 +63,7 @@ class TableColumn:
     unit: str = ''
 
     def __post_init__(self) -> None:
-        """Make the values read-only, and take a missing unit from the name."""
+        """Make the values read-only; take a missing unit from the column name."""
         with np.errstate(invalid='ignore'):  # ignore warnings for signalling NaN
             values = np.where(np.abs(self.values) <= LARGEST, self.values, np.nan)
         object.__setattr__(self, 'values', read_only(values))
@@ -121,7 +121,7 @@ class Table:
     words: Mapping[str, Sequence[str]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        """Move columns without numbers to ``words``; RecordingError if column lengths differ."""
+        """Move columns of text to ``words``; RecordingError if columns differ in length."""
         there = tuple(one for one in self.columns if len(one.finite))
         empty = {one.name: () for one in self.columns if one not in there}
         object.__setattr__(self, 'columns', there)
@@ -138,7 +138,7 @@ class Table:
 
     def column(self, name: str) -> TableColumn | None:
         """
-        Return the column with a name, given with or without unit; None if there is none.
+        Return the column with this name, with or without unit; None if there is none.
 
         Raises
         ------
@@ -159,11 +159,11 @@ class Table:
         return named[0] if named else None
 
     def where(self, row: int) -> str:
-        """Return the position of a row as a text, 'row 3' or 'line 5', for error messages."""
+        """Return the place of a row as text, 'row 3' or 'line 5', for error messages."""
         return f'row {row}' if self.first_line is None else f'line {self.first_line + row}'
 
     def listed(self) -> str:
-        """Return the names of the columns as a text, with arrays shortened, for error messages."""
+        """Return all column names as text, arrays abbreviated, for error messages."""
         arrays = Counter(column.array for column in self.columns)
         shown = dict.fromkeys(
             f'{c.array.removeprefix("[]")}[0..{arrays[c.array] - 1}]' if c.array else c.name
@@ -183,7 +183,7 @@ class Table:
 
 
 def _at_most(names: Sequence[str]) -> str:
-    """Return the first forty names as a text, with the number of further names."""
+    """Return the first forty names as text, and how many more there are."""
     most = 40
     more = f' and {len(names) - most} more' if len(names) > most else ''
     return ', '.join(names[:most]) + more
@@ -202,7 +202,7 @@ def table_of_arrays(
     labels: Mapping[str, Sequence[str]] = MappingProxyType({}),
 ) -> Table:
     """
-    Return a table of named arrays; the most common axis length is the number of samples.
+    Return a table of named arrays; their most frequent length is the number of rows.
 
     Parameters
     ----------
@@ -246,7 +246,7 @@ def table_of_arrays(
 
 def side_by_side(tables: Sequence[Table]) -> Table:
     """
-    Join the columns of several tables of the same samples in one table.
+    Join the columns of several tables with the same rows.
 
     Column names that occur in several files get the file name as a prefix: 'currents:Joint_1'.
 

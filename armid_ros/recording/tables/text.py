@@ -24,7 +24,7 @@ _DECIMAL_COMMA = re.compile(r'[-+]?\d+,\d+([eE][-+]?\d+)?')
 
 def read_text(path: Path) -> Table:
     """
-    Read a table in a text file, compressed by gzip or not.
+    Read a table from a text file, which gzip may have compressed.
 
     Raises
     ------
@@ -117,7 +117,7 @@ def _same_width(header: str, row: str) -> bool:
 
 
 def _separator(lines: list[str]) -> str:
-    """Return the separator of cells: the first candidate that occurs in every line."""
+    """Return the cell separator: the first candidate that occurs in every line."""
     there = [line for line in lines if line.strip()]
     return next((s for s in _SEPARATORS if all(s in line for line in there)), ' ')
 
@@ -130,7 +130,7 @@ def _split(line: str, separator: str) -> list[str]:
 
 
 def _number(cell: str, separator: str) -> float:
-    """Return the number in a cell, NaN if it is empty; raise ValueError for text."""
+    """Convert a cell to a number, an empty one to NaN; raise ValueError for text."""
     if cell.lower() in _EMPTY:
         return np.nan
     if separator != ',' and _DECIMAL_COMMA.fullmatch(cell):
@@ -145,7 +145,7 @@ def _numbers(
     names: list[str],
     first_line: int,
 ) -> tuple[FloatArray, dict[str, Sequence[str]], tuple[str, ...], tuple[str, ...]]:
-    """Return values (N, columns), text cells by column, and notes on content and damage."""
+    """Return values (N, columns), text cells, and notes on content and damage."""
     with suppress(ValueError):  # fast path if every cell is a number
         delimiter = None if separator == ' ' else separator
         values = np.loadtxt(io.StringIO('\n'.join(rows)), delimiter=delimiter, ndmin=2)
