@@ -28,7 +28,7 @@ NO_FRICTION = 1e-12
 
 
 class Displacement(NamedTuple):
-    """Changes of joint positions, velocities and accelerations, each of shape (N, n, ...)."""
+    """Small changes of joint positions, velocities and accelerations, (N, n, ...) each."""
 
     q: FloatArray
     dq: FloatArray
@@ -58,7 +58,7 @@ class DryFriction:
 
     def torque(self, dq: FloatArray, load: FloatArray | None = None) -> FloatArray:
         """
-        Return the joints' friction torques; an element at rest has the mean of its two levels.
+        Return the friction torque of each joint; at rest it is the mean of both levels.
 
         Parameters
         ----------
@@ -74,12 +74,12 @@ class DryFriction:
         return np.asarray((half * np.sign(dq @ self.directions.T) + middle) @ self.directions)
 
     def largest(self, load: FloatArray) -> FloatArray:
-        """Return the largest possible friction torque of each joint under a load, (..., n)."""
+        """Return the largest friction torque (..., n) that each joint can have under a load."""
         half = (self.upper - self.lower) / 2 + self.widening(load)
         return np.asarray(half @ np.abs(self.directions))
 
     def widening(self, load: FloatArray) -> FloatArray:
-        """Return the increase of each element's friction levels under a load, (..., m) [N m]."""
+        """Return how much a load increases the friction levels of each element, (..., m) [N m]."""
         if self.load_share is None:
             return np.zeros((*load.shape[:-1], len(self.lower)))
         return np.asarray(self.load_share * np.abs(load @ self.directions.T))
@@ -87,7 +87,7 @@ class DryFriction:
 
 def direction(motion: Motion, joints: Sequence[int] | None = None) -> FloatArray:
     """
-    Return the direction of motion of each joint, or of a shaft that several joints turn.
+    Return the direction of motion (-1 to 1) of joints, or of a shaft that they share.
 
     Parameters
     ----------
@@ -137,7 +137,7 @@ class Transmission:
 @dataclass(frozen=True)
 class Action:
     """
-    Terms that effects with given values add to plant and sensors; an absent term is None.
+    Physical terms that effects add to plant and sensors in a simulation; None if absent.
 
     On the motor side, the actuators have to supply damping @ dq + inertia @ ddq + dry friction +
     hysteresis + torque(t, q, dq). On the link side, they have to supply the torque of the rigid
@@ -186,7 +186,7 @@ class Action:
 
     def effort(self, motors: Motion, links: Motion, load: FloatArray) -> FloatArray:
         """
-        Return the actuator torque in addition to the torque of the rigid body, (N, n) [N m].
+        Return the motor torque needed in addition to that of the rigid body, (N, n) [N m].
 
         Parameters
         ----------
@@ -213,7 +213,7 @@ class Action:
 
 
 def law_derivatives(law: TorqueLaw, motion: Motion) -> tuple[FloatArray, FloatArray]:
-    """Return the derivatives of a torque function by q and dq, each of shape (N, n, n)."""
+    """Return the derivatives (N, n, n) of a torque function by q, and those by dq."""
     n = motion.n_joints
     size = 1e-6  # of the differences [rad, m, rad/s or m/s]
     slopes = np.empty((2, len(motion), n, n))
@@ -229,7 +229,7 @@ def law_derivatives(law: TorqueLaw, motion: Motion) -> tuple[FloatArray, FloatAr
 
 def merge_actions(robot: Robot, actions: Sequence[Action]) -> Action:
     """
-    Return the combined action of several effects on the same robot.
+    Combine the actions of several effects on one robot.
 
     Matrices and torques are summed. Dry friction along one direction becomes one element.
     Actions on readings are applied in the given order.
@@ -288,7 +288,7 @@ def merge_actions(robot: Robot, actions: Sequence[Action]) -> Action:
 
 
 def sum_laws(laws: Sequence[TorqueLaw]) -> TorqueLaw | None:
-    """Return the sum of torque functions of time and motion; None for an empty sequence."""
+    """Return the sum of several torque functions of time and motion; None if there are none."""
 
     def torque(t: FloatArray, q: FloatArray, dq: FloatArray) -> FloatArray:
         return np.asarray(sum(law(t, q, dq) for law in laws))
@@ -299,7 +299,7 @@ def sum_laws(laws: Sequence[TorqueLaw]) -> TorqueLaw | None:
 
 
 def _merge_friction(elements: list[DryFriction]) -> DryFriction | None:
-    """Merge friction elements that act along the same direction, and sum their levels."""
+    """Merge dry friction elements with equal direction: add their levels."""
     if not elements:
         return None
     directions = np.vstack([e.directions for e in elements])

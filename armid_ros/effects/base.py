@@ -36,7 +36,7 @@ import numpy.typing as npt
 @dataclass(frozen=True)
 class Effect(ABC):
     """
-    Base class of physical effects on some joints of an arm, or on the whole arm.
+    Base class of physical effects, which act on some joints of an arm or on the whole arm.
 
     Attributes
     ----------
@@ -86,7 +86,7 @@ class Effect(ABC):
     lasting: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
-        """Set default shape parameters, or check number and range of given shape parameters."""
+        """Set default shape parameters, or check the number and range of given ones."""
         defaults = tuple(s.default for s in self.shapes) * len(self.owners)
         values = tuple(float(value) for value in self.shape) or defaults
         if len(values) != len(defaults):
@@ -106,7 +106,7 @@ class Effect(ABC):
     @classmethod
     def on(cls, robot: Robot, joints: tuple[str, ...] | None = None) -> Effect:
         """
-        Make the effect for a robot, on the given joints or on its default joints.
+        Create the effect for a robot, on the given joints or on its default joints.
 
         Raises
         ------
@@ -129,7 +129,7 @@ class Effect(ABC):
 
     @classmethod
     def _possible_joints(cls, robot: Robot) -> tuple[str, ...]:
-        """Return the joints with an actuator, on which the effect can act."""
+        """Return the joints on which the effect can act: those with an actuator."""
         return robot.joints
 
     @classmethod
@@ -137,14 +137,14 @@ class Effect(ABC):
         return cls._possible_joints(robot)
 
     def in_usual_place(self, robot: Robot) -> bool:
-        """Return whether the effect acts on its default joints only; see `on`."""
+        """Return whether the effect acts on its default joints and no others."""
         default = self._default_joints(robot)
         return bool(self.joints) == bool(default) and set(self.joints) <= set(default)
 
     @classmethod
     def places(cls, robot: Robot) -> tuple[tuple[str, ...], ...]:
         """
-        Return the sets of joints on which the effect can act: joints, pairs or the whole arm.
+        Return all sets of joints on which the effect can act: joints, pairs, or the whole arm.
 
         Raises
         ------
@@ -157,33 +157,33 @@ class Effect(ABC):
 
     @classmethod
     def as_change(cls) -> type[Effect]:
-        """Return the class that describes a change of this effect since the baseline."""
+        """Return the effect class for changes of this effect since the baseline recordings."""
         return cls
 
     def particulars(self) -> dict[str, Any]:
-        """Return entries for model.yaml beyond values and shapes: reference temperatures, ties."""
+        """Return further entries for model.yaml, such as reference temperatures and ties."""
         return {}
 
     def with_particulars(self, entry: Mapping[str, Any]) -> Self:
-        """Return the effect with those entries of model.yaml that `particulars` wrote."""
+        """Return the effect with the entries of model.yaml that `particulars` wrote."""
         return self
 
     def named_as(self, values: FloatArray, arm: Arm) -> tuple[tuple[Effect, FloatArray], ...]:
-        """Return equivalent effects of the catalogue and their values, for a report."""
+        """Return the equivalent effects of the catalogue with their values, for a report."""
         return ((self, values),)
 
     def _default_shape(self, robot: Robot) -> FloatArray:
-        """Return default shape parameters for this robot, with a row for each of the `owners`."""
+        """Return default shape parameters for a robot, one row for each of the `owners`."""
         return self.shape_values
 
     @property
     def shape_values(self) -> FloatArray:
-        """Array of the S shape parameters, with a row for each of the `owners`."""
+        """Array of the S shape parameters, one row for each of the `owners`."""
         return np.array(self.shape).reshape(len(self.owners), len(self.shapes))
 
     def with_shape(self, values: npt.ArrayLike) -> Effect:
         """
-        Return the effect with other values of its shape parameters.
+        Return the effect with other shape parameters.
 
         Parameters
         ----------
@@ -207,11 +207,11 @@ class Effect(ABC):
         return replace(self, shape=tuple(spread.ravel().tolist()))
 
     def spread(self, robot: Robot) -> FloatArray:
-        """Return the largest expected absolute value of each parameter, shape (P,)."""
+        """Return the largest expected absolute value of each of the P parameters, shape (P,)."""
         return np.full(len(self.parameters(robot)), np.inf)
 
     def shape_parameters(self, robot: Robot) -> tuple[ParameterName, ...]:
-        """Return the names of the shape parameters of the effect, joint by joint."""
+        """Return names and units of the shape parameters of the effect, joint by joint."""
         return tuple(
             ParameterName(s.name, owner, joint_unit(s.unit, owner, robot))
             for owner in self.owners
@@ -220,7 +220,7 @@ class Effect(ABC):
 
     def shape_starts(self, unexplained: Unexplained, arm: Arm) -> tuple[FloatArray, ...]:
         """
-        Return G start values for the search of each shape parameter, arrays (owners, G).
+        Return G start values of each shape parameter for a search, as arrays (owners, G).
 
         Parameters
         ----------
@@ -234,11 +234,11 @@ class Effect(ABC):
 
     @property
     def owners(self) -> tuple[str, ...]:
-        """Names of joints with own parameters; an empty name for an effect on the whole arm."""
+        """Joints that have their own parameters; an empty name stands for the whole arm."""
         return self.joints or ('',)
 
     def parameters(self, robot: Robot) -> tuple[ParameterName, ...]:
-        """Return the names of the P parameters of the effect, joint by joint."""
+        """Return names and units of the P parameters of the effect, joint by joint."""
         return tuple(
             ParameterName(q.name, owner, joint_unit(q.unit, owner, robot), self.name)
             for owner in self.owners
@@ -252,7 +252,7 @@ class Effect(ABC):
         return lower, upper
 
     def adds_to(self, robot: Robot) -> tuple[int, ...]:
-        """Return the indices of rigid-body parameters to which effect values are added, if any."""
+        """Return the indices of the rigid-body parameters to which values are added, if any."""
         return ()
 
     @property
@@ -262,21 +262,21 @@ class Effect(ABC):
 
     @property
     def points(self) -> tuple[str, ...]:
-        """Names of the points outside the arm to which springs of the effect are attached."""
+        """Names of the points outside the arm at which springs of the effect end."""
         return ()
 
     def along(self, motion: Motion) -> Self:
-        """Return the effect with the recorded signals that its torque depends on, if any."""
+        """Return the effect with the recorded signals that it depends on, such as temperatures."""
         return self
 
     def referred_to(self, temperatures: Mapping[str, float]) -> Self:
-        """Return the effect with given reference temperatures [degC], if it depends on them."""
+        """Return the effect with given reference temperatures [degC], if it has any."""
         return self
 
     @abstractmethod
     def columns(self, motion: Motion, arm: Arm) -> FloatArray:
         """
-        Return the derivatives of the joint torques by the parameters of the effect.
+        Return the derivatives of the joint torques by the parameters of the effect (regressor).
 
         Parameters
         ----------
@@ -294,7 +294,7 @@ class Effect(ABC):
         """
 
     def checked_columns(self, motion: Motion, arm: Arm) -> FloatArray:
-        """Return `columns`; raise a ModelError if their array is not of shape (N, n, P)."""
+        """Return `columns`; raise a ModelError if their shape is not (N, n, P)."""
         columns = self.columns(motion, arm)
         wanted = (*motion.q.shape, len(self.owners) * len(self.quantities))
         if np.shape(columns) != wanted:
@@ -306,7 +306,7 @@ class Effect(ABC):
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
         """
-        Return the terms that the effect adds to plant and sensors for given parameter values.
+        Return the terms that the effect with given values adds to plant and sensors.
 
         By default, the torque on the link side is columns @ values. This is correct for a torque
         that is linear in the values and depends on time, position and velocity only.
@@ -331,7 +331,7 @@ class Effect(ABC):
 
     def plausible(self, values: FloatArray, std: FloatArray, arm: Arm) -> bool:
         """
-        Return whether fitted values within the bounds are physically plausible.
+        Return whether fitted values are physically plausible, in addition to their bounds.
 
         ``std``, shape (P,), has standard deviations for white noise. The arm does not contain
         the effect.
@@ -340,14 +340,14 @@ class Effect(ABC):
         return True
 
     def indices(self, motion_joints: tuple[str, ...]) -> list[int]:
-        """Return the indices of the effect's joints among the joints of a motion or robot."""
+        """Return the indices of the effect's joints among the given joints."""
         return list(places_among(self.joints, motion_joints))
 
 
 @dataclass(frozen=True)
 class Unexplained:
     """
-    Torque residual of a model in all recordings, which a new effect should explain.
+    Residual torque of a model in all recordings, which a new effect should explain.
 
     Attributes
     ----------
@@ -372,30 +372,30 @@ class Unexplained:
 
 
 class Arm(Protocol):
-    """Protocol of a rigid body with effects, such as `armid_ros.arm.ArmModel`."""
+    """Protocol of an arm model: rigid body with effects, such as `armid_ros.arm.ArmModel`."""
 
     @property
     def robot(self) -> Robot:
-        """Robot as in its description, without effects."""
+        """Robot of the description, without effects."""
 
     @property
     def body(self) -> Robot:
-        """Return the rigid body with the effects that change it, such as a payload."""
+        """Return the rigid body including effects that change it, such as a payload."""
 
     def values_of(self, effect: Effect) -> FloatArray:
         """Return the parameter values of an effect, shape (P_e,)."""
 
     def action(self) -> Action:
-        """Return the combined action of all effects on plant and sensors."""
+        """Return the terms that all effects together add to plant and sensors."""
 
     def link_motion(self, motion: Motion) -> Motion:
-        """Return the true motion of the links for a recorded motion."""
+        """Return the true motion of the links for a motion that sensors recorded."""
 
     def link_frames(self, motion: Motion) -> LinkFrames:
-        """Return the frames of all links along a recorded motion."""
+        """Return the frames of all links in each sample of a recorded motion."""
 
     def smoothed(self, motion: Motion) -> Motion:
-        """Return a recorded motion without frequencies above its band (`band_hz`)."""
+        """Return a recorded motion without frequencies above its band limit `band_hz`."""
 
     def load(self, motion: Motion) -> FloatArray:
         """Return the torque of the rigid body along a motion of the links, (N, n) [N m]."""
@@ -413,10 +413,10 @@ class Arm(Protocol):
         """Return the true joint torques along a recorded motion, (N, n) [N m]."""
 
     def torque_before(self, effect: Effect, motion: Motion) -> FloatArray:
-        """Return the torque that a sensor effect converts to a reading, shape (N, n) [N m]."""
+        """Return the torque that a sensor effect turns into a reading, shape (N, n) [N m]."""
 
     def torque_change(self, motion: Motion, change: Displacement) -> FloatArray:
-        """Return the change of the joint torques due to changes of the links' motion."""
+        """Return how the joint torques change with a small change of the links' motion."""
 
     def columns_of(self, effect: Effect, motion: Motion) -> FloatArray:
         """Return the derivatives of the torque readings by the parameters of an effect."""

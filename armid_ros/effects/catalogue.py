@@ -93,7 +93,7 @@ for _kind in _EFFECTS:
 
 class Catalogue(Mapping[str, type[Effect]]):
     """
-    Mapping from names to effect classes, the shipped effects first.
+    Mapping from effect names to effect classes, the shipped effects first.
 
     Attributes
     ----------
@@ -109,7 +109,7 @@ class Catalogue(Mapping[str, type[Effect]]):
         self.broken: dict[str, str] = {}
 
     def __getitem__(self, name: str) -> type[Effect]:
-        """Return the effect class with this name; load effects of installed packages if needed."""
+        """Return the effect class with this name; also search installed packages."""
         if name not in self._kinds:
             self._complete_once()
         return self._kinds[name]
@@ -120,13 +120,13 @@ class Catalogue(Mapping[str, type[Effect]]):
         return iter(tuple(self._kinds))
 
     def __len__(self) -> int:
-        """Return the number of all effects."""
+        """Return the number of effects in the catalogue."""
         self._complete_once()
         return len(self._kinds)
 
     def find(self, name: str) -> type[Effect]:
         """
-        Return the effect class with this name; the error message suggests a similar name.
+        Return the effect class with this name; raise an error that suggests a similar name.
 
         Raises
         ------
@@ -152,7 +152,7 @@ class Catalogue(Mapping[str, type[Effect]]):
 
     def add(self, kind: type[Effect]) -> None:
         """
-        Add an effect class to the catalogue, or replace an old version of the class.
+        Add an effect class to the catalogue, or replace its old version.
 
         Raises
         ------
@@ -187,7 +187,7 @@ class Catalogue(Mapping[str, type[Effect]]):
             self._kinds.pop(name, None)
 
     def _complete_once(self) -> None:
-        """Load the effects of all installed packages at the first call."""
+        """Load the effects of all installed packages, once."""
         if self._complete:
             return
         self._complete = True
@@ -208,7 +208,7 @@ class Catalogue(Mapping[str, type[Effect]]):
 
 def check_kind(kind: type[Effect]) -> None:
     """
-    Check that a class has the required attributes of an effect.
+    Raise an error unless a class has the required attributes of an effect.
 
     Raises
     ------
@@ -261,7 +261,7 @@ _Kind = TypeVar('_Kind', bound=type[Effect])
 
 def register(kind: _Kind) -> _Kind:
     """
-    Add a user-defined effect to the catalogue; a decorator for its class.
+    Class decorator that adds a user-defined effect to the catalogue.
 
     The effect can then be named like a shipped effect: in ``make_effect``, in model.yaml and in
     ``effects='...'``. The diagnosis searches for it. A new definition of a class, as in a
@@ -305,7 +305,7 @@ def register(kind: _Kind) -> _Kind:
 
 def make_effect(text: str, robot: Robot) -> Effect:
     """
-    Make an effect from a text that contains its name and, optionally, its joints.
+    Create an effect from a text with its name and, optionally, its joints.
 
     Parameters
     ----------
@@ -342,7 +342,7 @@ EXAMPLES = 'viscous_friction:viscous_coefficient=0.1 or payload@wrist:payload_m=
 
 def parse_effect(text: str, robot: Robot) -> tuple[Effect, FloatArray]:
     """
-    Make an effect and its values from one line of text.
+    Create an effect with its values from one line of text.
 
     Parameters
     ----------
@@ -386,7 +386,7 @@ def parse_effect(text: str, robot: Robot) -> tuple[Effect, FloatArray]:
 
 
 def _number(text: str, effect: Effect, key: str, number: str) -> float:
-    """Parse the value of a quantity or shape parameter; raise a ModelError if it is no number."""
+    """Convert the text of a value to a number; raise a ModelError if it is none."""
     try:
         value = float(number)
     except ValueError:

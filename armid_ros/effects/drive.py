@@ -36,7 +36,7 @@ class RotorInertia(Effect):
         return joint_columns(self, motion, motion.ddq)
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
-        """Return rotor inertias as a diagonal inertia matrix that is added to the plant."""
+        """Return the rotor inertias as inertia that is added to the plant."""
         (inertia,) = scatter(self, values, arm.robot)
         return Action(inertia=np.diag(inertia))
 
@@ -89,7 +89,7 @@ class TorqueRipple(JointLaw):
         return (np.array(orders),)
 
     def plausible(self, values: FloatArray, std: FloatArray, arm: Arm) -> bool:
-        """Return whether the ripple order is above the orders that gravity and springs explain."""
+        """Return whether gravity and springs cannot explain a ripple of this order."""
         return bool(np.all(self.shape_values > 1.05 * _MIN_RIPPLE_ORDER))
 
     def law(self, x: JointStates) -> tuple[FloatArray, ...]:
@@ -100,7 +100,7 @@ class TorqueRipple(JointLaw):
 
 def wave_orders(unexplained: Unexplained, joint: int, between: tuple[float, float]) -> FloatArray:
     """
-    Return the K ripple orders of a joint that explain most of the residual, (K,).
+    Return K ripple orders of a joint that explain most of its residual, shape (K,).
 
     All recordings are used together, because a ripple has the same order and phase in each.
 
@@ -138,7 +138,7 @@ def wave_gains(
     angle: FloatArray, rest: FloatArray, weight: FloatArray, orders: FloatArray
 ) -> FloatArray:
     """
-    Return the reduction of the squared residual by a sine and cosine of each order, (K,).
+    Return by how much a sine and cosine of each order reduce the squared residual, (K,).
 
     With few cycles, orders leak into each other; least squares separate them better than a
     spectrum.
@@ -194,7 +194,7 @@ class ActuatorSaturation(TorqueReading):
         return (np.outer(highest, [0.3, 0.4, *np.linspace(0.5, 0.95, 10)]),)
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
-        """Return the lost and the unreported torque of saturated drives, as an action."""
+        """Return the functions by which saturation limits the supplied and the reported torque."""
         lost = scatter(self, values, arm.robot)[0]
         (level,) = scatter(self, self.shape_values, arm.robot)
 
@@ -228,7 +228,7 @@ class ActuatorSaturation(TorqueReading):
         return joint_columns(self, motion, asked, -beyond)
 
     def _spread(self, values: FloatArray, motion: Motion) -> tuple[FloatArray, ...]:
-        """Return lost share, clipped share and saturation level of each joint, shape (n,)."""
+        """Return lost share, clipped share and saturation level of all joints, (n,) each."""
         spread = np.zeros((3, motion.n_joints))
         spread[2] = np.inf
         columns = self.indices(motion.joints)

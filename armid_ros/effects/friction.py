@@ -35,7 +35,7 @@ class ViscousFriction(Effect):
     quantities = (Quantity('viscous_coefficient', 'N m s/rad', lower=0.0, typical=(0.004, 10.0)),)
 
     def columns(self, motion: Motion, arm: Arm) -> FloatArray:
-        """Return the viscous torque per coefficient, dtau/dFv = dq [rad/s], shape (N, n, P)."""
+        """Return the friction torque per unit of Fv: dq [rad/s], shape (N, n, P)."""
         return joint_columns(self, motion, motion.dq)
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
@@ -61,7 +61,7 @@ class CoulombFriction(Effect):
     holds_at_rest = True
 
     def columns(self, motion: Motion, arm: Arm) -> FloatArray:
-        """Return the Coulomb torque per unit of Fc, sign(dq) [-], shape (N, n, P)."""
+        """Return the friction torque per unit of Fc: sign(dq) [-], shape (N, n, P)."""
         return joint_columns(self, motion, direction(motion))
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
@@ -73,7 +73,7 @@ class CoulombFriction(Effect):
 @dataclass(frozen=True)
 class AsymmetricFriction(JointLaw):
     """
-    Difference of friction between the two directions of motion.
+    Difference of Coulomb and viscous friction between the two directions of motion.
 
     tau = dFc |sign(dq)| + dFv |dq|, where dFc = (Fc+ - Fc-) / 2 and dFv = (Fv+ - Fv-) / 2. The
     joint has Fc+, Fv+ forwards and Fc-, Fv- backwards. The means belong to coulomb_friction and
@@ -99,7 +99,7 @@ class AsymmetricFriction(JointLaw):
         return bool(np.all(shift <= known + MIN_Z_SCORE * doubt))
 
     def law(self, x: JointStates) -> tuple[FloatArray, ...]:
-        """Return the asymmetric friction per unit of dFc and dFv, |sign(dq)| and |dq|."""
+        """Return the friction torque per unit of dFc and dFv: |sign(dq)| and |dq|."""
         return x.forwards**2, x.forwards * x.dq
 
 
@@ -121,7 +121,7 @@ class QuadraticFriction(JointLaw):
     quantities = (Quantity('quadratic_coefficient', 'N m s^2/rad^2', typical=(0.0004, 1.0)),)
 
     def law(self, x: JointStates) -> tuple[FloatArray, ...]:
-        """Return the quadratic friction per unit of Fq, dq |dq| [rad^2/s^2]."""
+        """Return the friction torque per unit of Fq: dq |dq| [rad^2/s^2]."""
         return (x.dq * np.abs(x.dq),)
 
 
@@ -148,7 +148,7 @@ class StribeckFriction(JointLaw):
     holds_at_rest = True
 
     def law(self, x: JointStates) -> tuple[FloatArray, ...]:
-        """Return the Stribeck friction per unit of dFs, exp(-|dq / vs|^d) sign(dq) [-]."""
+        """Return the friction torque per unit of dFs: exp(-|dq / vs|^d) sign(dq) [-]."""
         velocity, exponent = self.shape_values.T
         return (np.exp(-(np.abs(x.dq / velocity) ** exponent)) * x.forwards,)
 
@@ -179,7 +179,7 @@ class ThermalFriction(JointLaw):
         return ThermalChange
 
     def law(self, x: JointStates) -> tuple[FloatArray, ...]:
-        """Return the thermal friction per unit of dFv, (1 - exp(-t / T)) dq [rad/s]."""
+        """Return the friction torque per unit of dFv: (1 - exp(-t / T)) dq [rad/s]."""
         return (-np.expm1(-x.t / self.shape_values[:, 0]) * x.dq,)
 
 
@@ -196,11 +196,11 @@ class ThermalChange(ThermalFriction):
     quantities = (*ThermalFriction.quantities, replace(*ViscousFriction.quantities, lower=-np.inf))
 
     def law(self, x: JointStates) -> tuple[FloatArray, ...]:
-        """Return the friction change per unit of dFv and c, (1 - exp(-t / T)) dq and dq."""
+        """Return the friction torque per unit of dFv and c: (1 - exp(-t / T)) dq and dq."""
         return *super().law(x), x.dq
 
     def named_as(self, values: FloatArray, arm: Arm) -> tuple[tuple[Effect, FloatArray], ...]:
-        """Return the equivalent thermal_friction and viscous_friction with their values."""
+        """Return the equivalent effects thermal_friction and viscous_friction, with values."""
         change, first = values.reshape(-1, 2).T
         return (
             (ThermalFriction(self.joints, self.shape), change),
@@ -241,7 +241,7 @@ class TemperatureDependentFriction(Effect):
     lasting = True
 
     def __post_init__(self) -> None:
-        """Set the default reference temperature of joints for which no temperature is given."""
+        """Set a default reference temperature for joints for which none is given."""
         super().__post_init__()
         known = dict.fromkeys(self.joints, _REFERENCE_TEMPERATURE) | dict(self.reference)
         object.__setattr__(self, 'reference', tuple(known.items()))
@@ -255,7 +255,7 @@ class TemperatureDependentFriction(Effect):
         return replace(self, reference=tuple(temperatures.items()))
 
     def particulars(self) -> dict[str, Any]:
-        """Return the reference temperature of each joint, for model.yaml."""
+        """Return the reference temperature of each joint as entry for model.yaml."""
         return {'reference_temperature': self.reference_temperatures}
 
     def with_particulars(self, entry: Mapping[str, Any]) -> Self:
@@ -270,7 +270,7 @@ class TemperatureDependentFriction(Effect):
         return {joint: known[joint] for joint in self.joints}
 
     def plausible(self, values: FloatArray, std: FloatArray, arm: Arm) -> bool:
-        """Return whether friction changes at most 5 % per kelvin, and viscous friction falls."""
+        """Return whether friction changes by at most 5 % per kelvin and viscous friction falls."""
         action, n = arm.action(), arm.robot.n_joints
         known = np.zeros((2, n))
         if action.damping is not None:
@@ -284,12 +284,12 @@ class TemperatureDependentFriction(Effect):
         return not (steep.any() or np.any(slopes[0] > doubts[0]))
 
     def columns(self, motion: Motion, arm: Arm) -> FloatArray:
-        """Return the friction per unit of a and b, (T - T0) (dq, sign(dq)), shape (N, n, P)."""
+        """Return the torque per unit of a and b: (T - T0) dq and (T - T0) sign(dq), (N, n, P)."""
         warmer = self.along(motion).warmer(motion.t, motion.joints)
         return joint_columns(self, motion, warmer * motion.dq, warmer * direction(motion))
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
-        """Return temperature-dependent friction as dry friction and a torque of the plant."""
+        """Return the friction as terms of the plant: dry friction, and a function of motion."""
         viscous, coulomb = scatter(self, values, arm.robot)
         if self.course is None:
             return Action()
@@ -303,7 +303,7 @@ class TemperatureDependentFriction(Effect):
         return Action(dry_friction=DryFriction(np.eye(len(level)), -level, level), torque=torque)
 
     def warmer(self, t: FloatArray, joints: tuple[str, ...]) -> FloatArray:
-        """Return the joint temperatures minus T0, zero without measurement, shape (N, n) [K]."""
+        """Return joint temperatures minus T0, zero where not measured, shape (N, n) [K]."""
         if self.course is None:
             return np.zeros((np.size(t), len(joints)))
         known = dict(self.reference)

@@ -42,7 +42,7 @@ class _GravityEffect(Effect):
 @dataclass(frozen=True)
 class GravityMagnitude(_GravityEffect):
     """
-    Difference of the magnitude of gravity from that of the model, |g| = |g_model| + dg.
+    Change of the magnitude of gravity relative to the model, |g| = |g_model| + dg.
 
     After a fit of the base parameters, it is identifiable only through masses that also cause
     inertia torques. Fast motion makes it identifiable.
@@ -63,7 +63,7 @@ class GravityMagnitude(_GravityEffect):
         return bool(values[0] > -np.linalg.norm(arm.robot.gravity))
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
-        """Return the robot under the changed magnitude of gravity, as part of the plant."""
+        """Return the robot with the changed magnitude of gravity, for the plant."""
         gravity = arm.robot.gravity
         return Action(robot=arm.robot.with_gravity(gravity + values[0] * _unit(gravity)))
 
@@ -71,7 +71,7 @@ class GravityMagnitude(_GravityEffect):
 @dataclass(frozen=True)
 class BaseTilt(_GravityEffect):
     """
-    Tilt of the robot base relative to the base of the model.
+    Tilt of the robot base relative to the base in the model.
 
     The base is turned by the rotation vector (tilt_x, tilt_y) about two axes normal to gravity.
     These are its own x and y axes for a base that is upright in the model. A rotation about
@@ -106,7 +106,7 @@ class BaseTilt(_GravityEffect):
 @dataclass(frozen=True)
 class GravityVector(_GravityEffect):
     """
-    Difference of the gravity vector from that of the model, in direction and magnitude.
+    Change of the gravity vector relative to the model, in direction and magnitude.
 
     The torque is exactly linear in the vector at any angle. A search uses this effect, and reports
     the result as base_tilt and gravity_magnitude.
@@ -123,11 +123,11 @@ class GravityVector(_GravityEffect):
         return arm.gravity_columns(motion)
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
-        """Return the robot with the changed gravity vector, as part of the plant."""
+        """Return the robot with the changed gravity vector, for the plant."""
         return Action(robot=arm.robot.with_gravity(arm.robot.gravity + values))
 
     def named_as(self, values: FloatArray, arm: Arm) -> tuple[tuple[Effect, FloatArray], ...]:
-        """Return the base tilt and gravity magnitude that describe the change of gravity."""
+        """Return the equivalent base tilt and change of gravity's magnitude, with values."""
         before = np.array(arm.robot.gravity)
         after = before + values
         lengths = np.linalg.norm(before), np.linalg.norm(after)
@@ -141,19 +141,19 @@ class GravityVector(_GravityEffect):
 
 
 def with_exact_vector(kinds: Sequence[type[Effect]]) -> list[type[Effect]]:
-    """Replace BaseTilt by GravityVector in effect classes that include GravityMagnitude."""
+    """Replace BaseTilt by GravityVector if GravityMagnitude is also among the effect classes."""
     both = BaseTilt in kinds and GravityMagnitude in kinds
     return [GravityVector if both and kind is BaseTilt else kind for kind in kinds]
 
 
 def _turned(gravity: FloatArray, tilt: FloatArray) -> FloatArray:
-    """Return the gravity vector in the frame of a base with tilt angles (2,) [rad]."""
+    """Return the gravity vector in the frame of a base that is tilted by angles (2,) [rad]."""
     rotation = Rotation.from_rotvec(tilt @ _horizontal_axes(gravity))
     return np.asarray(rotation.inv().apply(np.array(gravity)))
 
 
 def _unit(gravity: FloatArray) -> FloatArray:
-    """Return the direction of gravity; raise a ModelError without gravity."""
+    """Return the unit vector along gravity; raise a ModelError if gravity is zero."""
     length = np.linalg.norm(gravity)
     if not length > 0.0:
         raise ModelError('effects on gravity need a model with gravity, but its gravity is zero')
@@ -161,7 +161,7 @@ def _unit(gravity: FloatArray) -> FloatArray:
 
 
 def _horizontal_axes(gravity: FloatArray) -> FloatArray:
-    """Return two unit vectors normal to gravity as rows: x and y if gravity is along -z."""
+    """Return two unit vectors perpendicular to gravity: x and y if gravity is along -z."""
     down = _unit(gravity)
     upright, _ = Rotation.align_vectors([-down], [[0.0, 0.0, 1.0]])
     return np.asarray(upright.apply(np.eye(3)[:2]))

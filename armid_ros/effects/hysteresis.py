@@ -18,7 +18,7 @@ import numpy as np
 @dataclass(frozen=True)
 class LoadDependentFriction(Effect):
     """
-    Dry friction proportional to the load of the gear, tau = Kl |tau_load| sign(dq).
+    Dry friction proportional to the load on the gear, tau = Kl |tau_load| sign(dq).
 
     tau_load is the torque of the rigid body. At rest, the joint can stick. Confounded with
     torque_gain while the joint lifts its load; the same motion with two known payloads
@@ -33,7 +33,7 @@ class LoadDependentFriction(Effect):
     holds_at_rest = True
 
     def columns(self, motion: Motion, arm: Arm) -> FloatArray:
-        """Return the friction per unit of Kl, |tau_load| sign(dq) [N m], shape (N, n, P)."""
+        """Return the friction torque per unit of Kl: |tau_load| sign(dq), (N, n, P) [N m]."""
         load = arm.load(arm.link_motion(motion))
         return joint_columns(self, motion, np.abs(load) * direction(motion))
 
@@ -68,7 +68,7 @@ class PreslidingHysteresis(Effect):
     instantaneous = False
 
     def columns(self, motion: Motion, arm: Arm) -> FloatArray:
-        """Return the presliding friction per unit of F: the state h [-], shape (N, n, P)."""
+        """Return the friction torque per unit of F: hysteresis state h [-], shape (N, n, P)."""
         columns = np.zeros((*motion.q.shape, len(self.joints)))
         states = self._elements(np.ones(len(self.joints)), motion.joints).along(
             motion.q, motion.dq
@@ -78,12 +78,12 @@ class PreslidingHysteresis(Effect):
         return columns
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
-        """Return presliding friction as slipping springs of the plant."""
+        """Return the friction as springs of the plant that slip at a torque level."""
         if not np.any(values):
             return Action()
         return Action(hysteresis=self._elements(values, arm.robot.joints))
 
     def _elements(self, level: FloatArray, joints: tuple[str, ...]) -> Hysteresis:
-        """Return slipping springs on the effect's joints, with given torque levels."""
+        """Return springs on the effect's joints that slip at given torque levels."""
         directions = np.eye(len(joints))[self.indices(joints)]
         return Hysteresis(directions, level, self.shape_values[:, 0])

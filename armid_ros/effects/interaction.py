@@ -36,14 +36,14 @@ _ATTACHMENT_SHAPES = tuple(
 
 @dataclass(frozen=True)
 class Attached(Effect):
-    """An effect, such as a spring, that joins one point of a link to an anchor."""
+    """Base class of springs and similar effects that join points of links to anchors."""
 
     @classmethod
     def _possible_joints(cls, robot: Robot) -> tuple[str, ...]:
         return robot.moving
 
     def _default_shape(self, robot: Robot) -> FloatArray:
-        """Return shape parameters that attach the springs at or near centres of mass of links."""
+        """Return shape parameters with the springs attached near the links' centres of mass."""
         values, model = self.shape_values, robot.model
         reach = max(float(np.linalg.norm(place.translation)) for place in model.jointPlacements)
         for row, joint in zip(values, self.joints, strict=True):
@@ -54,7 +54,7 @@ class Attached(Effect):
         return values
 
     def shape_starts(self, unexplained: Unexplained, arm: Arm) -> tuple[FloatArray, ...]:
-        """Return start values of shapes: present coordinates of points, grids of other shapes."""
+        """Return start values for the shape search: link points as given, others on grids."""
         return tuple(
             self.shape_values[:, [index]]
             if shape.unit == 'm' and shape.lower < 0.0
@@ -64,15 +64,15 @@ class Attached(Effect):
 
     @property
     def _attachments(self) -> FloatArray:
-        """Attachment points of the springs on the links, shape (k, 3) [m]."""
+        """Points on the links at which the springs are attached, shape (k, 3) [m]."""
         return self.shape_values[:, :3]
 
     @abstractmethod
     def _anchor(self, arm: Arm) -> Anchor:
-        """Return a function from times to positions and velocities of the springs' anchors."""
+        """Return a function of time that gives position and velocity of the springs' anchors."""
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
-        """Return the joint torques of attached springs, as an action on the links."""
+        """Return the joint torques of the springs as a term of the plant."""
         robot, anchor = arm.robot, self._anchor(arm)
 
         def torque(t: FloatArray, q: FloatArray, dq: FloatArray) -> FloatArray:
@@ -84,7 +84,7 @@ class Attached(Effect):
         return Action(link_torque=torque if np.any(values) else None)
 
     def columns(self, motion: Motion, arm: Arm) -> FloatArray:
-        """Return the joint torque per unit of each quantity of every spring, shape (N, n, P)."""
+        """Return the joint torque per unit of each parameter of every spring, shape (N, n, P)."""
         link = arm.link_motion(motion)
         return self._columns(arm.link_frames(motion), link.dq, *self._anchor(arm)(link.t))
 
@@ -92,7 +92,7 @@ class Attached(Effect):
     def _columns(
         self, frames: LinkFrames, dq: FloatArray, anchors: FloatArray, velocities: FloatArray
     ) -> FloatArray:
-        """Return the torque per unit of each quantity for link and anchor motions, (N, n, P)."""
+        """Return `columns` for given motions of links and anchors, shape (N, n, P)."""
 
 
 @dataclass(frozen=True)
@@ -142,7 +142,7 @@ class HumanInteraction(Attached):
 @dataclass(frozen=True)
 class InterfaceSlack(Attached):
     """
-    Strap between a link and an anchor: a spring that pulls only beyond a slack.
+    Strap between a link and an anchor: a spring that pulls only when the slack is used up.
 
     tau = k J^T e max(|x| - slack, 0), where x = p - r is the vector from the anchor to the
     attachment and e its direction. Without slack it equals human_interaction with a known anchor;
@@ -165,7 +165,7 @@ class InterfaceSlack(Attached):
     )
 
     def _default_shape(self, robot: Robot) -> FloatArray:
-        """Return shape parameters with anchors at the attachment points in the middle pose."""
+        """Return shape parameters with each anchor at the strap's link point in mid-range pose."""
         values = super()._default_shape(robot)
         middle = LinkFrames.in_the_middle(robot)
         for row, joint in zip(values, self.joints, strict=True):
@@ -173,7 +173,7 @@ class InterfaceSlack(Attached):
         return values
 
     def shape_starts(self, unexplained: Unexplained, arm: Arm) -> tuple[FloatArray, ...]:
-        """Return the anchors and slacks that explain most of the residual, as start values."""
+        """Return start values of anchors and slacks that explain most of the residual."""
         rows = np.unique(np.linspace(0, len(unexplained.q) - 1, 400).astype(int))
         weight = unexplained.weight[rows, :, np.newaxis]
         basis = np.linalg.qr((unexplained.nuisance[rows] * weight).reshape(weight.size, -1))[0]
@@ -217,7 +217,7 @@ class InterfaceSlack(Attached):
 
 
 def _proposals(places: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return candidate anchors (A, 3) and slacks (A,) around positions of an attachment."""
+    """Return candidate anchors (A, 3) and slacks (A,), given positions of a link point."""
     middle, spread = places.mean(axis=0), float(places.std(axis=0).max())
     directions = np.array(
         [direction for direction in product((-1.0, 0.0, 1.0), repeat=3) if any(direction)]

@@ -21,7 +21,7 @@ import numpy.typing as npt
 
 class JointStates(NamedTuple):
     """
-    Time, position, velocity and direction of motion of the k joints of an effect.
+    Time, position, velocity and motion direction of the k joints of an effect.
 
     Attributes
     ----------
@@ -42,7 +42,7 @@ class JointStates(NamedTuple):
 
 @dataclass(frozen=True)
 class JointLaw(Effect):
-    """Effect whose torque on a joint depends on time and the motion of this joint only."""
+    """Base class of effects whose torque depends only on time and the joint's own motion."""
 
     #: Whether the torque acts on the link side of an elastic transmission.
     on_links: ClassVar[bool] = False
@@ -50,7 +50,7 @@ class JointLaw(Effect):
     @abstractmethod
     def law(self, x: JointStates) -> tuple[FloatArray, ...]:
         """
-        Return the torque per unit of each quantity, each of shape (..., k).
+        Return the torque per unit of each parameter, arrays of shape (..., k).
 
         A law that depends on the direction of motion holds the joint at rest, between two levels
         that depend on nothing else.
@@ -65,7 +65,7 @@ class JointLaw(Effect):
         return _placed(self, motion, self.law(JointStates(motion.t[:, np.newaxis], *states)))
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
-        """Return the torque as an action; its two levels at rest become dry friction."""
+        """Return the torque as terms of the plant; torque that jumps at rest is dry friction."""
         places, n = self.indices(arm.robot.joints), arm.robot.n_joints
         first, *others = values.reshape(len(places), -1).T
         # a slice takes less time than indices, and the plant calls the law in every step
@@ -102,7 +102,7 @@ class JointLaw(Effect):
 
 def joint_columns(effect: Effect, motion: Motion, *quantities: FloatArray) -> FloatArray:
     """
-    Return the regressor of an effect that acts on each of its joints separately.
+    Return the regressor (N, n, P) of an effect that acts on each joint separately.
 
     Parameters
     ----------
@@ -125,7 +125,7 @@ def joint_columns(effect: Effect, motion: Motion, *quantities: FloatArray) -> Fl
 
 def scatter(effect: Effect, values: FloatArray, robot: Robot) -> FloatArray:
     """
-    Return effect values as an array with a column for each joint of the robot.
+    Return effect values as an array with one column per joint of the robot, zero elsewhere.
 
     Parameters
     ----------
@@ -148,7 +148,7 @@ def scatter(effect: Effect, values: FloatArray, robot: Robot) -> FloatArray:
 
 
 def _placed(effect: Effect, motion: Motion, quantities: Sequence[FloatArray]) -> FloatArray:
-    """Assemble the regressor (N, n, P) from the torques (N, k) per unit of each quantity."""
+    """Build the regressor (N, n, P) from the torque per unit of each parameter, (N, k)."""
     size = len(quantities) * len(effect.joints)
     columns = np.zeros((len(motion), motion.n_joints * size))
     _, places = _flat_places(effect.joints, motion.joints, len(quantities))

@@ -69,7 +69,7 @@ class TorqueMap:
     knee: float
 
     def __post_init__(self) -> None:
-        """Freeze the arrays of the torque map, and check their shapes and signs."""
+        """Freeze the arrays, and check their shapes and signs."""
         for name in ('points', 'weights', 'noise', 'lengths'):
             object.__setattr__(self, name, read_only(getattr(self, name)))
         count = len(self.weights)
@@ -90,7 +90,7 @@ class TorqueMap:
         return isinstance(other, TorqueMap) and self._numbers == other._numbers
 
     def __hash__(self) -> int:
-        """Return a hash of all numbers of the torque map."""
+        """Return a hash of all numbers in the torque map."""
         return hash(self._numbers)
 
     @property
@@ -104,7 +104,7 @@ class TorqueMap:
         return bool(np.isfinite(self.lengths[2]))
 
     def fitted_to(self, torque: FloatArray) -> TorqueMap:
-        """Return the torque map fitted to torques at its inducing points, shape (M,) [N m]."""
+        """Return the torque map with other torques at its M inducing points, shape (M,) [N m]."""
         return replace(self, weights=cho_solve(self._factor, torque))
 
     def torque(self, inputs: FloatArray) -> FloatArray:
@@ -124,7 +124,7 @@ class TorqueMap:
         return cho_factor(self._nearness(self.points) + np.diag(share))
 
     def _nearness(self, inputs: FloatArray) -> FloatArray:
-        """Return the kernel divided by s^2 between inputs and inducing points, shape (..., M)."""
+        """Return the kernel between inputs and inducing points, 1 at zero distance, (..., M)."""
         own, others = (scaled_inputs(x, self.knee) for x in (inputs, self.points))
         difference = (own[..., np.newaxis, :] - others) / self.lengths
         return np.asarray(np.exp(-0.5 * np.sum(difference**2, axis=-1)))
@@ -142,7 +142,7 @@ class TorqueMap:
     @classmethod
     def of_document(cls, entry: Mapping[str, Any], joint: str) -> TorqueMap:
         """
-        Return the torque map of an entry in model.yaml that `document` wrote.
+        Return the torque map from an entry of model.yaml that `document` wrote.
 
         Raises
         ------
@@ -191,7 +191,7 @@ class LearnedTorque(Effect):
     learned = True
 
     def __post_init__(self) -> None:
-        """Check that each joint has a torque map."""
+        """Check that there is a torque map for each joint."""
         super().__post_init__()
         if self.maps and len(self.maps) != len(self.joints):
             raise ModelError(
@@ -216,7 +216,7 @@ class LearnedTorque(Effect):
         return replace(self, maps=maps)
 
     def torque(self, robot: Robot, q: FloatArray, dq: FloatArray) -> FloatArray:
-        """Return the learned torque of all joints, zero without a map, shape (..., n) [N m]."""
+        """Return the learned torque (..., n) of all joints, zero for those without a map [N m]."""
         tau = np.zeros(np.shape(q))
         if self.maps:
             loads = any(own.takes_load for own in self.maps)
@@ -227,12 +227,12 @@ class LearnedTorque(Effect):
         return tau
 
     def columns(self, motion: Motion, arm: Arm) -> FloatArray:
-        """Return the learned torque of each joint in a column of its own, (N, n, P) [N m]."""
+        """Return the learned torque of each joint as a regressor column, (N, n, P) [N m]."""
         link = arm.link_motion(motion)
         return joint_columns(self, motion, self.torque(arm.body, link.q, link.dq))
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
-        """Return the learned torque as an action on the links."""
+        """Return the learned torque as a term of the plant."""
         (share,) = scatter(self, values, arm.robot)
         robot = arm.robot
 
@@ -243,13 +243,13 @@ class LearnedTorque(Effect):
 
 
 def scaled_inputs(inputs: FloatArray, knee: float) -> FloatArray:
-    """Return inputs (position, velocity, load) with velocities on the scale u of `TorqueMap`."""
+    """Scale velocities in inputs (position, velocity, load) to u of `TorqueMap`."""
     velocity = knee * np.arcsinh(inputs[..., 1] / knee)
     return np.stack([inputs[..., 0], velocity, inputs[..., 2]], axis=-1)
 
 
 def holding_torque(robot: Robot, q: FloatArray) -> FloatArray:
-    """Return the torque that holds the rigid body at rest, shape (..., n) [N m]."""
+    """Return the torques that hold the rigid body at rest in poses q, shape (..., n) [N m]."""
     poses = np.reshape(q, (-1, robot.n_joints))
     still = Motion.of_states(robot.joints, poses, 0.0, 0.0)
     return inverse_dynamics(robot, still).reshape(np.shape(q))

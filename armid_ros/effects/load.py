@@ -18,12 +18,12 @@ import numpy as np
 
 @dataclass(frozen=True)
 class _LinkBody(Effect):
-    """Base class of bodies added to links: ten inertial parameters in the joint's frame."""
+    """Base class of bodies that are added to links, with ten inertial parameters each."""
 
     changes_body = True
 
     def parameters(self, robot: Robot) -> tuple[ParameterName, ...]:
-        """Return parameter names; their units are the same on revolute and prismatic joints."""
+        """Return parameter names; the units are the same for revolute and prismatic joints."""
         return tuple(
             ParameterName(q.name, owner, q.unit) for owner in self.owners for q in self.quantities
         )
@@ -33,17 +33,17 @@ class _LinkBody(Effect):
         return arm.body_columns(motion)[:, :, list(self.adds_to(arm.robot))]
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
-        """Return the robot whose links carry the added mass, first moments and inertia."""
+        """Return the robot whose links include the added bodies, for the plant."""
         parameters = arm.robot.rigid_parameters.copy()
         parameters[list(self.adds_to(arm.robot))] += values
         return Action(robot=arm.robot.with_inertias(parameters))
 
     def spread(self, robot: Robot) -> FloatArray:
-        """Return the largest expected errors of the described links, shape (P,)."""
+        """Return the largest expected errors of the links' described parameters, shape (P,)."""
         return robot.described_spread.ravel()[list(self.adds_to(robot))]
 
     def adds_to(self, robot: Robot) -> tuple[int, ...]:
-        """Return the indices of the rigid-body parameters to which the bodies add."""
+        """Return the indices of the rigid-body parameters that the added bodies change."""
         size = len(LINK_PARAMETERS)
         return tuple(size * joint + i for joint in self.indices(robot.moving) for i in range(size))
 
@@ -55,7 +55,7 @@ class _LinkBody(Effect):
 @dataclass(frozen=True)
 class Payload(_LinkBody):
     """
-    A body fixed to a link, the last one by default: mass, first moments and inertia.
+    Body that is fixed to a link, by default the last: mass, first moments and inertia.
 
     All ten parameters are about the frame of the link's joint. They add to the parameters of the
     link, and the torque is linear in them. They are exactly collinear with the parameters of the
@@ -81,16 +81,16 @@ class Payload(_LinkBody):
 
     @classmethod
     def places(cls, robot: Robot) -> tuple[tuple[str, ...], ...]:
-        """Return the joint of each moving link, as a possible place of a payload."""
+        """Return each moving link, by its joint, as a place where a payload may be fixed."""
         return tuple((joint,) for joint in robot.moving)
 
     @classmethod
     def as_change(cls) -> type[Effect]:
-        """Return the class for a change of the payload, whose mass may be negative."""
+        """Return the effect class for changes of a payload, whose mass may be negative."""
         return PayloadChange
 
     def plausible(self, values: FloatArray, std: FloatArray, arm: Arm) -> bool:
-        """Return whether a body within the arm's length can have the values of the payload."""
+        """Return whether a body within the arm's length can have the payload's parameters."""
         if not self._weighs(values, std, arm):
             return False
         # the inertia of a body about the joint is at least that of a point mass at its centre
@@ -107,7 +107,7 @@ class Payload(_LinkBody):
         return not most * heaviest < np.maximum(aside, 0.0) ** 2
 
     def _weighs(self, values: FloatArray, std: FloatArray, arm: Arm) -> bool:
-        """Return whether the mass can be positive, and its centre within the arm's length."""
+        """Return whether the mass may be positive, with its centre within the arm's length."""
         if std[0] == 0.0:  # noqa: RUF069 - set exactly to zero if no motion identifies it, as for an inner link
             return bool(np.any(values[1:4]))
         places = [placement.translation for placement in arm.robot.model.jointPlacements]
@@ -118,7 +118,7 @@ class Payload(_LinkBody):
 
     def spread(self, robot: Robot) -> FloatArray:
         """
-        Return the parameters of the largest expected payload, which has the arm's mass, (P,).
+        Return the parameters of the largest expected payload: it has the mass of the arm.
 
         First moments and inertia are proportional to the mass.
 
@@ -131,7 +131,7 @@ class Payload(_LinkBody):
 @dataclass(frozen=True)
 class PayloadChange(Payload):
     """
-    Change of the payload of a link; its mass may be negative.
+    Change of the payload on a link; its mass may be negative.
 
     A negative mass is a payload that was put down, and that the model has as part of the link.
 
@@ -149,14 +149,14 @@ class PayloadChange(Payload):
         return self._weighs(np.concatenate([np.abs(values[:1]), values[1:]]), std, arm)
 
     def named_as(self, values: FloatArray, arm: Arm) -> tuple[tuple[Effect, FloatArray], ...]:
-        """Return the change of the payload as a payload with the same values."""
+        """Return the change as a payload with the same values."""
         return ((Payload(self.joints), values),)
 
 
 @dataclass(frozen=True)
 class LinkInertia(_LinkBody):
     """
-    Difference of mass, first moments and inertia between a link and its description.
+    Difference in mass, first moments and inertia between a link and its description.
 
     The columns are those of the rigid-body parameters. The effect is identifiable only if the
     other parameters are known; a fit of all parameters absorbs it. For a body on the last link,

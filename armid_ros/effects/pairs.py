@@ -20,10 +20,10 @@ import numpy as np
 
 @dataclass(frozen=True)
 class _Pairs(Effect):
-    """Base class of effects on pairs of joints (i, k), which are consecutive in ``joints``."""
+    """Base class of effects on pairs of joints; ``joints`` lists both joints of each pair."""
 
     def __post_init__(self) -> None:
-        """Check that the joints form pairs of different joints, each pair given once."""
+        """Check that the joints form pairs of different joints, without repeated pairs."""
         if not self.joints or len(self.joints) % 2:
             raise ModelError(
                 f'{self.name} needs pairs of joints, such as joint_5 and joint_6; got '
@@ -47,21 +47,21 @@ class _Pairs(Effect):
         return tuple(chain.from_iterable(pairwise(robot.joints)))
 
     def in_usual_place(self, robot: Robot) -> bool:
-        """Return True, as all pairs of joints are equally likely."""
+        """Return True: all pairs of joints are equally likely."""
         return True
 
     @classmethod
     def places(cls, robot: Robot) -> tuple[tuple[str, ...], ...]:
-        """Return the pairs of neighbouring joints, which may be coupled."""
+        """Return all pairs of neighbouring joints, which may be coupled."""
         return tuple(pairwise(robot.joints))
 
     @property
     def owners(self) -> tuple[str, ...]:
-        """First joint of every pair, which appears in the parameter names of the pair."""
+        """First joint of each pair, which names the pair's parameters."""
         return self.joints[::2]
 
     def parameters(self, robot: Robot) -> tuple[ParameterName, ...]:
-        """Return the parameter names of each pair, with the units of the two joints."""
+        """Return names and units of the parameters of each pair."""
         return tuple(
             ParameterName(q.name, first, pair_unit(q.unit, first, second, robot))
             for first, second in zip(self.joints[::2], self.joints[1::2], strict=True)
@@ -69,7 +69,7 @@ class _Pairs(Effect):
         )
 
     def pairs(self, joints: tuple[str, ...]) -> list[tuple[int, int]]:
-        """Return the indices of every pair among the joints of a motion or robot."""
+        """Return the indices of the two joints of each pair among the given joints."""
         columns = self.indices(joints)
         return list(zip(columns[::2], columns[1::2], strict=True))
 
@@ -77,7 +77,7 @@ class _Pairs(Effect):
 @dataclass(frozen=True)
 class CoupledJointFriction(_Pairs):
     """
-    Friction and inertia of a shaft that turns with the sum of two joints, as in a wrist.
+    Friction and inertia of a shaft whose rotation is the sum of two joints, as in a wrist.
 
     The joints are consecutive pairs (i, k). With the shaft's velocity dq_i + dq_k,
 
@@ -104,7 +104,7 @@ class CoupledJointFriction(_Pairs):
         return super()._default_joints(robot)[-2:]
 
     def columns(self, motion: Motion, arm: Arm) -> FloatArray:
-        """Return the torque per inertia, viscous and Coulomb friction of each shaft, (N, n, P)."""
+        """Return the torque per unit of inertia, viscous and Coulomb friction, (N, n, P)."""
         columns = np.zeros((len(motion), motion.n_joints, 3 * len(self.owners)))
         for position, (i, k) in enumerate(self.pairs(motion.joints)):
             forwards = direction(motion, (i, k))
@@ -115,7 +115,7 @@ class CoupledJointFriction(_Pairs):
         return columns
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
-        """Return coupled inertia and damping, and dry friction of the shared shafts."""
+        """Return inertia, damping and dry friction of the shared shafts as terms of the plant."""
         n = arm.robot.n_joints
         inertia, damping = np.zeros((n, n)), np.zeros((n, n))
         pairs = self.pairs(arm.robot.joints)
@@ -149,7 +149,7 @@ class JointCoupling(_Pairs):
     quantities = (Quantity('coupling_stiffness', 'N m/rad', typical=(0.1, 50.0)),)
 
     def __post_init__(self) -> None:
-        """Check that no joint is first in two pairs, because parameter names would be equal."""
+        """Check that no joint is first in two pairs: their parameter names would be equal."""
         super().__post_init__()
         twice = [joint for joint in self.owners if self.owners.count(joint) > 1]
         if twice:
@@ -160,11 +160,11 @@ class JointCoupling(_Pairs):
 
     @classmethod
     def places(cls, robot: Robot) -> tuple[tuple[str, ...], ...]:
-        """Return all pairs of joints as places of a coupling; their order has no influence."""
+        """Return all pairs of joints that may be coupled, each pair in one order only."""
         return tuple(combinations(robot.joints, 2))
 
     def columns(self, motion: Motion, arm: Arm) -> FloatArray:
-        """Return the torque per coupling stiffness of each pair [rad], shape (N, n, P)."""
+        """Return the torque per unit of coupling stiffness of each pair [rad], shape (N, n, P)."""
         q = arm.link_motion(motion).q
         columns = np.zeros((*q.shape, len(self.owners)))
         for position, (i, k) in enumerate(self.pairs(motion.joints)):
@@ -195,11 +195,11 @@ class TorqueCrosstalk(_Pairs, TorqueReading):
 
     @classmethod
     def places(cls, robot: Robot) -> tuple[tuple[str, ...], ...]:
-        """Return all ordered pairs of joints: joint of the reading, then joint of the torque."""
+        """Return all ordered pairs of joints: the sensor's joint, then the joint it picks up."""
         return tuple(permutations(robot.joints, 2))
 
     def parameters(self, robot: Robot) -> tuple[ParameterName, ...]:
-        """Return parameter names with the joint of the reading and the joint of the torque."""
+        """Return parameter names with the sensor's joint and the joint it picks up."""
         (quantity,) = self.quantities
         return tuple(
             ParameterName(
@@ -211,7 +211,7 @@ class TorqueCrosstalk(_Pairs, TorqueReading):
         )
 
     def read(self, values: FloatArray, motion: Motion, tau: FloatArray) -> FloatArray:
-        """Return torque readings with shares of other joints' torques, shape (N, n) [N m]."""
+        """Return torque readings that include shares of other joints' torques, (N, n) [N m]."""
         return tau + tau @ self._shares(values, motion).T
 
     def transfer(

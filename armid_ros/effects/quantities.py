@@ -42,7 +42,7 @@ MIN_Z_SCORE = 3.0
 @dataclass(frozen=True)
 class Quantity:
     """
-    One physical quantity of an effect, per joint or once for the arm.
+    Physical quantity of an effect, with one value per joint or one for the whole arm.
 
     Attributes
     ----------
@@ -71,7 +71,7 @@ class Quantity:
 
     def largest(self, joint: str, robot: Robot) -> float:
         """
-        Return the largest plausible size of a quantity on a joint, or on the whole arm (`''`).
+        Return the largest plausible value of the quantity on a joint, or on the whole arm ('').
 
         The size is limited by the bounds, by the torque limit of the joint if described, and by a
         multiple of the typical size. It is inf without any of these limits.
@@ -91,7 +91,7 @@ class Quantity:
 @dataclass(frozen=True)
 class Shape:
     """
-    One nonlinear parameter of an effect, per joint or once for the arm.
+    Parameter of an effect in which torque is nonlinear, per joint or for the whole arm.
 
     Attributes
     ----------
@@ -120,7 +120,7 @@ class Shape:
 
     def determined(self, value: float, half_width: float) -> bool:
         """
-        Return whether the confidence interval of a shape parameter is informative.
+        Return whether a confidence interval is narrow enough to determine the parameter.
 
         The interval is uninformative if it covers all possible values. The half width of a
         non-negative shape may be three times the value, or the smallest start value if that is
@@ -144,14 +144,14 @@ class Shape:
 
 
 def joint_unit(unit: str, joint: str, robot: Robot) -> str:
-    """Return a unit for a joint: 'N m' becomes 'N' on a prismatic joint."""
+    """Adapt a unit to a joint: 'N m' becomes 'N' on a prismatic joint."""
     slides = joint and robot.slides(joint)
     return _PRISMATIC_UNITS.get(unit, unit) if slides else unit
 
 
 def pair_unit(unit: str, first: str, second: str, robot: Robot) -> str:
     """
-    Return a unit for a pair of joints, one of which may be prismatic.
+    Adapt a unit to a pair of joints, of which one or both may be prismatic.
 
     A coupling stiffness between a revolute and a prismatic joint has the unit N/rad. Dry friction
     is a force on one joint and a torque on the other. A share of a torque in the reading of a
@@ -165,7 +165,7 @@ def pair_unit(unit: str, first: str, second: str, robot: Robot) -> str:
 
 
 def written_units(unit: str) -> tuple[str, ...]:
-    """Return all forms of a unit on revolute and prismatic joints, and between two joints."""
+    """Return all forms of a unit: on revolute and prismatic joints, and between two joints."""
     return tuple(
         dict.fromkeys((unit, _PRISMATIC_UNITS.get(unit, unit), *_MIXED_UNITS.get(unit, ())))
     )
@@ -173,5 +173,5 @@ def written_units(unit: str) -> tuple[str, ...]:
 
 @lru_cache(maxsize=1024)
 def places_among(joints: tuple[str, ...], among: tuple[str, ...]) -> tuple[int, ...]:
-    """Return the indices of joints among other joints; cached for calls in every sample."""
+    """Return the indices of joints among other joints; results are cached."""
     return tuple(among.index(joint) for joint in joints)

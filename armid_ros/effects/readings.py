@@ -26,12 +26,12 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Displacing(Effect):
-    """Base class of effects that make link positions differ from recorded positions."""
+    """Base class of effects by which the link positions differ from the recorded ones."""
 
     @abstractmethod
     def displacements(self, motion: Motion, arm: Arm) -> Displacement:
         """
-        Return the true minus the recorded motion, per unit of each parameter.
+        Return true minus recorded motion of the links, per unit of each parameter.
 
         Returns
         -------
@@ -41,11 +41,11 @@ class Displacing(Effect):
         """
 
     def columns(self, motion: Motion, arm: Arm) -> FloatArray:
-        """Return the change of torque due to link displacements, dtau/dtheta, shape (N, n, P)."""
+        """Return the torque change by link displacements per unit of parameter, (N, n, P)."""
         return arm.torque_change(motion, self.displacements(motion, arm))
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
-        """Return a link displacement in proportion to the parameter values, as an action."""
+        """Return the link displacements for given parameter values, for plant and sensors."""
 
         def displacement(motion: Motion) -> Displacement:
             parts = self.displacements(motion, arm)
@@ -56,7 +56,7 @@ class Displacing(Effect):
 
 @dataclass(frozen=True)
 class TorqueReading(Effect):
-    """Base class of effects that change the recorded torque."""
+    """Base class of sensor effects, which change the recorded torque."""
 
     @abstractmethod
     def read(self, values: FloatArray, motion: Motion, tau: FloatArray) -> FloatArray:
@@ -87,10 +87,10 @@ class TorqueReading(Effect):
 
     @abstractmethod
     def sensitivity(self, values: FloatArray, motion: Motion, tau: FloatArray) -> FloatArray:
-        """Return the derivatives of the reading of `tau` by effect parameters, shape (N, n, P)."""
+        """Return derivatives of the reading of a torque `tau` by the parameters, (N, n, P)."""
 
     def memory(self, values: FloatArray) -> float:
-        """Return the time span of the past torque on which the reading depends [s]."""
+        """Return for how long past torques influence the reading [s]."""
         return 0.0
 
     def columns(self, motion: Motion, arm: Arm) -> FloatArray:
@@ -98,7 +98,7 @@ class TorqueReading(Effect):
         return self.sensitivity(arm.values_of(self), motion, arm.torque_before(self, motion))
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
-        """Return the function from true torque to torque reading, as an action on sensors."""
+        """Return the function from true torque to reading, for the sensors."""
         if not np.any(values):
             return Action()
         return Action(reading=partial(self.read, values), reading_memory=self.memory(values))

@@ -18,7 +18,7 @@ import numpy as np
 @dataclass(frozen=True)
 class TorqueOffset(Effect):
     """
-    Constant torque, in motion and at rest, tau = offset.
+    Constant torque, added in motion and at rest, tau = offset.
 
     Confounded with asymmetric Coulomb friction while the joint moves and with the preload of a
     spring.
@@ -31,11 +31,11 @@ class TorqueOffset(Effect):
     quantities = (Quantity('torque_offset', 'N m', typical=(0.004, 2.0)),)
 
     def columns(self, motion: Motion, arm: Arm) -> FloatArray:
-        """Return the torque per unit of offset, which is 1 [-], shape (N, n, P)."""
+        """Return the torque per unit of offset, which is 1, shape (N, n, P)."""
         return joint_columns(self, motion, np.ones_like(motion.q))
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
-        """Return the torque offset as a constant torque of the plant."""
+        """Return the offset as a constant torque of the plant."""
         (offset,) = scatter(self, values, arm.robot)
 
         def torque(t: FloatArray, q: FloatArray, dq: FloatArray) -> FloatArray:
@@ -66,7 +66,7 @@ class TorqueGain(TorqueReading):
         return np.asarray(tau * gain.reshape(-1, *(1,) * (tau.ndim - 2)))
 
     def sensitivity(self, values: FloatArray, motion: Motion, tau: FloatArray) -> FloatArray:
-        """Return the derivative of the reading by the gain error: the torque [N m], (N, n, P)."""
+        """Return the derivative of the reading by the gain error: the torque, (N, n, P) [N m]."""
         return joint_columns(self, motion, tau)
 
 
@@ -87,7 +87,7 @@ class TorqueDrift(TorqueReading):
     shapes = (Shape('drift_time', 's', 0.1, 1e5, 600.0, (10.0, 60.0, 300.0, 1000.0, 3000.0)),)
 
     def shape_starts(self, unexplained: Unexplained, arm: Arm) -> tuple[FloatArray, ...]:
-        """Return start values of the time constant, in proportion to the recording length."""
+        """Return start values of the time constant: multiples of the recording length."""
         # a faster drift is an offset, and a slower drift is a straight line
         times = np.maximum(
             float(np.ptp(unexplained.motion.t)) * np.array((0.3, 1.0, 3.0)), self.shapes[0].lower
@@ -114,7 +114,7 @@ class TorqueDrift(TorqueReading):
 @dataclass(frozen=True)
 class EncoderOffset(Displacing):
     """
-    Offset of the zero of an encoder, q = reading + offset.
+    Zero error of an encoder, q = reading + offset.
 
     To first order, the torque changes by dtau/dq times the offset, which is the same at all loads.
     Confounded with base_tilt (exactly, for the first joint of a planar arm), and with the
@@ -129,6 +129,6 @@ class EncoderOffset(Displacing):
     linear = False
 
     def displacements(self, motion: Motion, arm: Arm) -> Displacement:
-        """Return the displacement per encoder offset: 1 in position, 0 in its derivatives."""
+        """Return the displacement per unit of offset: 1 in position, 0 in velocity and above."""
         shift = joint_columns(self, motion, np.ones_like(motion.q))
         return Displacement(shift, np.zeros_like(shift), np.zeros_like(shift))

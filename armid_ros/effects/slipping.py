@@ -13,7 +13,7 @@ import numpy as np
 @dataclass(frozen=True)
 class Hysteresis:
     """
-    Friction of m slipping springs, which grows with the travel since the last reversal.
+    Friction of m springs that slip: it grows with the travel since the last reversal.
 
     The state h of an element, from -1 to 1, follows dh = (1 - h sign(dx)) |dx| / distance along
     its travel x, at any speed. Its torque is level * h.
@@ -35,22 +35,22 @@ class Hysteresis:
     distance: FloatArray
 
     def start(self, dq: FloatArray) -> FloatArray:
-        """Return the states of slipping springs after long motion at a velocity, shape (m,)."""
+        """Return the spring states (m,) after a long motion with constant velocity."""
         return np.asarray(np.sign(self.directions @ dq))
 
     def advance(self, state: FloatArray, dq: FloatArray) -> FloatArray:
-        """Return the states of slipping springs after a joint displacement without reversal."""
+        """Return the spring states after a joint displacement without reversal."""
         travel = self.directions @ dq
         end = np.sign(travel)
         return np.asarray(end - (end - state) * np.exp(-np.abs(travel) / self.distance))
 
     def torque(self, state: FloatArray) -> FloatArray:
-        """Return the joint torques, (..., n) [N m], for states of slipping springs, (..., m)."""
+        """Return the joint torques (..., n) [N m] for spring states (..., m)."""
         return np.asarray((self.level * state) @ self.directions)
 
     def along(self, q: FloatArray, dq: FloatArray) -> FloatArray:
         """
-        Return the states of slipping springs in each sample of a joint motion, shape (N, m).
+        Return the spring states in each sample of a joint motion, shape (N, m).
 
         Parameters
         ----------
@@ -71,7 +71,7 @@ class Hysteresis:
 
     def pullback(self, q: FloatArray, dq: FloatArray, weights: FloatArray) -> FloatArray:
         """
-        Return the derivative of a weighted sum of torques along a motion by joint positions.
+        Return the derivative by joint positions of a weighted sum of torques along a motion.
 
         Parameters
         ----------
@@ -103,7 +103,7 @@ class Hysteresis:
 
 
 def _monotone_parts(travel: FloatArray) -> list[tuple[int, int, float]]:
-    """Return first sample, last sample and direction of each motion between two reversals."""
+    """Return each motion between two reversals: first sample, last sample, direction."""
     step = np.sign(np.diff(travel))
     turns = np.flatnonzero(np.diff(step)) + 1
     ends = zip(np.append(0, turns), np.append(turns, len(step)), strict=True)

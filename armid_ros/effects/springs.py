@@ -36,18 +36,18 @@ class JointSpring(JointLaw):
     on_links = True
 
     def law(self, x: JointStates) -> tuple[FloatArray, ...]:
-        """Return the spring torque per unit of stiffness, q, and per unit of preload, 1."""
+        """Return the spring torque per unit of stiffness (q) and per unit of preload (1)."""
         return x.q, np.ones_like(x.q)
 
     def plausible(self, values: FloatArray, std: FloatArray, arm: Arm) -> bool:
-        """Return whether the spring stiffness is significant; a preload alone is an offset."""
+        """Return whether the stiffness is significant; a preload alone is a torque offset."""
         return bool(values[0] > MIN_Z_SCORE * std[0])
 
 
 @dataclass(frozen=True)
 class SoftLimit(JointLaw):
     """
-    Bumpers that push back beyond a position at either end of the range of motion.
+    Elastic stops at both ends of the joint range: they push back beyond a position.
 
     tau = k_up max(q - q_up, 0) - k_low max(q_low - q, 0), zero between q_low and q_up. Confounded
     with a hardening joint_spring; motion outside the bumpers distinguishes them.
@@ -77,7 +77,7 @@ class SoftLimit(JointLaw):
         return np.where(known[:, np.newaxis], edges, self.shape_values)
 
     def shape_starts(self, unexplained: Unexplained, arm: Arm) -> tuple[FloatArray, ...]:
-        """Return start positions of the bumpers near both ends of the recorded motion."""
+        """Return start values of the stop positions, near the ends of the recorded motion."""
         motion = unexplained.motion
         q = arm.link_motion(motion).q[:, self.indices(motion.joints)]
         lowest, highest = q.min(axis=0)[:, np.newaxis], q.max(axis=0)[:, np.newaxis]
@@ -86,6 +86,6 @@ class SoftLimit(JointLaw):
         return lowest + depth, highest - depth
 
     def law(self, x: JointStates) -> tuple[FloatArray, ...]:
-        """Return the torque per unit of bumper stiffness: the signed compression [rad]."""
+        """Return the torque per unit of stop stiffness: the signed compression [rad]."""
         lower, upper = self.shape_values.T
         return -np.maximum(lower - x.q, 0.0), np.maximum(x.q - upper, 0.0)

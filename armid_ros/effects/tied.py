@@ -28,7 +28,7 @@ from scipy.interpolate import CubicHermiteSpline
 @dataclass(frozen=True)
 class Tied(Attached):
     """
-    Base class of springs between an arm and moving points of another machine or person.
+    Base class of springs between an arm and moving points of another machine or a person.
 
     Attributes
     ----------
@@ -47,12 +47,12 @@ class Tied(Attached):
 
     @property
     def points(self) -> tuple[str, ...]:
-        """Names of the points of the other machine to which the arm is tied."""
+        """Names of the points of the other machine to which springs connect the arm."""
         return tuple(tie.name for tie in self.ties)
 
     def along(self, motion: Motion) -> Self:
         """
-        Return the springs with the recorded positions of their anchors.
+        Return the springs with the recorded motion of their anchors.
 
         Raises
         ------
@@ -73,7 +73,7 @@ class Tied(Attached):
         return replace(self, anchor=lambda t: (curve(t), curve(t, 1)))
 
     def columns(self, motion: Motion, arm: Arm) -> FloatArray:
-        """Return the joint torque per unit of each quantity of every spring, shape (N, n, P)."""
+        """Return the joint torque per unit of each parameter of every spring, shape (N, n, P)."""
         return Attached.columns(self.along(motion), motion, arm)
 
     @property
@@ -113,7 +113,7 @@ class Tied(Attached):
 
 @dataclass(frozen=True)
 class TiedInteraction(Tied, HumanInteraction):
-    """Spring and damper to a point whose motion is known, tau = J^T (k (p - r) + d (v - w))."""
+    """Spring and damper to a point of known motion, tau = J^T (k (p - r) + d (v - w))."""
 
     quantities = HumanInteraction.quantities[:2]
     shapes = ()
@@ -121,7 +121,7 @@ class TiedInteraction(Tied, HumanInteraction):
 
 @dataclass(frozen=True)
 class TiedSlack(Tied, InterfaceSlack):
-    """Strap to a point whose motion is known; it pulls only beyond a slack."""
+    """Strap to a point of known motion: it pulls only when its slack is used up."""
 
     # start values [m]; straps stretch by millimetres
     shapes = (
@@ -137,7 +137,7 @@ def tied_effect(
     joints: Sequence[str] | None = None,
 ) -> Tied:
     """
-    Make springs that tie given joints, or all joints with a tie, to another machine.
+    Create the springs that connect joints of an arm to another machine.
 
     Parameters
     ----------
@@ -183,7 +183,7 @@ def tied_effect(
 
 def tied_as_written(entry: Mapping[str, Any], robot: Robot) -> Tied:
     """
-    Make springs between the arm and another machine from an entry of model.yaml.
+    Create the springs between an arm and another machine from an entry of model.yaml.
 
     Raises
     ------
@@ -214,7 +214,7 @@ def tied_as_written(entry: Mapping[str, Any], robot: Robot) -> Tied:
 @dataclass(frozen=True)
 class Partner:
     """
-    A second machine, and the springs that may tie the arm to it.
+    Second machine, and the springs that may connect the arm to it.
 
     Attributes
     ----------
@@ -232,6 +232,6 @@ class Partner:
     source: str = ''
 
     def tied(self, arm: Robot, joints: Sequence[str] | None = None, *, slack: bool) -> Effect:
-        """Make springs with dampers, or straps with slack, on given joints or all tied joints."""
+        """Create springs with dampers, or straps with slack, on given or all connected joints."""
         name = (TiedSlack if slack else TiedInteraction).name
         return tied_effect(name, self.ties, self.source or self.robot.name, arm, joints)

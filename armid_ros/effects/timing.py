@@ -21,7 +21,7 @@ from scipy.signal import butter, lfilter, sosfiltfilt
 
 @dataclass(frozen=True)
 class LateReading(TorqueReading):
-    """Base class of late torque readings, whose error grows with the rate of the torque."""
+    """Base class of torque readings that are late: their error grows with the torque's rate."""
 
     def columns(self, motion: Motion, arm: Arm) -> FloatArray:
         """
@@ -35,11 +35,11 @@ class LateReading(TorqueReading):
 
     @classmethod
     def places(cls, robot: Robot) -> tuple[tuple[str, ...], ...]:
-        """Return the places of a delay: the whole arm, with one delay, or a single joint."""
+        """Return where a delay can act: on the whole arm with one value, or on a single joint."""
         return ((), *((joint,) for joint in robot.joints))
 
     def _joints_of_delays(self, motion: Motion) -> list[list[int]]:
-        """Return indices of the joints that share each delay: all joints, or single joints."""
+        """Return for each delay the indices of its joints: one joint or all."""
         joints = self.indices(motion.joints)
         return [[joint] for joint in joints] or [list(range(motion.n_joints))]
 
@@ -110,7 +110,7 @@ class TorqueLag(LateReading):
     instantaneous = False
 
     def read(self, values: FloatArray, motion: Motion, tau: FloatArray) -> FloatArray:
-        """Filter torques [N m] or regressor columns by the low-pass, shape (N, n, ...)."""
+        """Apply the low-pass to torques [N m] or to regressor columns, shape (N, n, ...)."""
         result = tau.copy()
         for lag, rows in zip(values, self._joints_of_delays(motion), strict=True):
             if lag:
@@ -145,7 +145,7 @@ def rate_of_change(t: FloatArray, x: FloatArray) -> FloatArray:
 
 def within_band(motion: Motion, x: FloatArray) -> FloatArray:
     """
-    Return a signal without frequencies above the band of the motion that it depends on.
+    Remove the frequencies of a signal above the band limit of its motion.
 
     The second derivative of a torque contains the fourth derivative of the positions, in which
     noise dominates at high frequency. The filter runs forwards and backwards, without a time
@@ -166,7 +166,7 @@ def _sections(band_hz: float, rate_hz: float) -> FloatArray:
 
 
 def smoothed(motion: Motion) -> Motion:
-    """Return a motion whose q, dq and ddq have no frequencies above its band."""
+    """Remove the frequencies of q, dq and ddq above the band limit of the motion."""
     q, dq, ddq = (within_band(motion, x) for x in (motion.q, motion.dq, motion.ddq))
     return replace(motion, q=q, dq=dq, ddq=ddq)
 
@@ -193,7 +193,7 @@ def low_pass(t: FloatArray, x: FloatArray, lag: float) -> FloatArray:
 
 
 def _as_columns(effect: TorqueReading, motion: Motion, values: FloatArray) -> FloatArray:
-    """Return derivatives (N, n) as a regressor: a column per joint, or a single column."""
+    """Arrange derivatives (N, n) as a regressor, with one column per joint or one in total."""
     if effect.joints:
         return joint_columns(effect, motion, values)
     return values[:, :, np.newaxis]

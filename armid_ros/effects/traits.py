@@ -16,7 +16,7 @@ from dataclasses import dataclass
 @dataclass(frozen=True)
 class Traits:
     """
-    Texts and prior knowledge of an effect class, in addition to its equations.
+    Texts and prior knowledge on an effect class, which its equations do not contain.
 
     Attributes
     ----------
