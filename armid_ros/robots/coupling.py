@@ -20,7 +20,7 @@ import pinocchio as pin
 
 def moving_joints(description: Description, driven: Sequence[str]) -> tuple[str, ...]:
     """
-    Return the names of the joints that move a body if given joints are driven, in file order.
+    Return the joints that move a body when the given joints are driven, in file order.
 
     A driven joint that others follow is a motor without a body if neither its link nor the links
     that it carries have inertia.
@@ -46,7 +46,7 @@ def moving_joints(description: Description, driven: Sequence[str]) -> tuple[str,
 
 def couple(tree: Robot, driven: Sequence[Joint], known: Mapping[str, float]) -> Robot:
     """
-    Return the robot in which only given joints are driven and all other moving joints follow.
+    Return the robot with only the given joints driven; its other moving joints follow them.
 
     Parameters
     ----------
@@ -96,7 +96,7 @@ def couple(tree: Robot, driven: Sequence[Joint], known: Mapping[str, float]) -> 
 def _mechanism(
     tree: Robot, names: Sequence[str], start: FloatArray, known: Mapping[str, float]
 ) -> Mechanism:
-    """Return the map from positions of the named driven joints to those of all moving joints."""
+    """Return the map from positions of the driven joints to positions of all moving joints."""
     description = tree.description
     passive = [name for name in description.passive if name in tree.joints]
     matrix, offset = np.zeros((len(tree.joints), len(names) + len(passive))), []

@@ -27,7 +27,7 @@ INERTIA = ('ixx', 'ixy', 'ixz', 'iyy', 'iyz', 'izz')
 
 @dataclass(frozen=True)
 class Inertial:
-    """Mass [kg] of a link, pose of its centroid frame [m, rad], and its inertia [kg m^2]."""
+    """Mass [kg] of a link, pose of its centre of mass [m, rad], and its inertia [kg m^2]."""
 
     mass: float
     xyz: Vector
@@ -55,20 +55,20 @@ class Inertial:
 
 @dataclass(frozen=True)
 class Mimic:
-    """Relation of a mimic joint: position = offset + sum of multiplier x position of a leader."""
+    """Relation of a mimic joint to its leaders: position = offset + sum of multiplier x leader."""
 
     multipliers: Mapping[str, float]
     offset: float
 
     @property
     def joint(self) -> str:
-        """Return the name of the leader, the first leader if the mimic joint has several."""
+        """Name of the leader; of several leaders, the first."""
         return next(iter(self.multipliers))
 
 
 @dataclass(frozen=True)
 class Loop:
-    """Closed kinematic loop: points of two links [m] that coincide, and the passive joints."""
+    """Closed kinematic loop: points of two links [m] that coincide, and its passive joints."""
 
     links: tuple[str, str]
     points: tuple[Vector, Vector]
@@ -77,7 +77,7 @@ class Loop:
 
 @dataclass(frozen=True)
 class Joint:
-    """Joint of a URDF; missing limits are infinite."""
+    """Joint of a URDF with its limits, which are infinite if missing."""
 
     name: str
     kind: str
@@ -97,13 +97,13 @@ class Joint:
 
     @property
     def unit(self) -> str:
-        """Return the unit of the joint position: 'rad' or 'm'."""
+        """Unit of the joint position: 'rad' or 'm'."""
         return 'm' if self.kind == 'prismatic' else 'rad'
 
 
 @dataclass(frozen=True)
 class Description:
-    """Contents of a URDF: links with inertial data, joints and closed loops, in file order."""
+    """Content of a URDF in file order: links with inertial data, joints and closed loops."""
 
     name: str
     links: dict[str, Inertial | None]
@@ -113,21 +113,21 @@ class Description:
 
     @property
     def passive(self) -> tuple[str, ...]:
-        """Return the names of the passive joints, whose positions follow from closed loops."""
+        """Names of the passive joints, whose positions follow from closed loops."""
         return tuple(dict.fromkeys(joint for loop in self.loops for joint in loop.passive))
 
     def movable(self) -> tuple[Joint, ...]:
-        """Return the revolute, continuous and prismatic joints."""
+        """Revolute, continuous and prismatic joints."""
         return tuple(joint for joint in self.joints if joint.kind in MOVABLE)
 
     def inertia_doubts(self) -> tuple[str, ...]:
-        """Return one line for every link whose inertia no body can have."""
+        """Return a line of text for each link whose inertia no body can have."""
         doubts = {link: inertial.doubt() for link, inertial in self.links.items() if inertial}
         return tuple(f"link '{link}': {doubt}" for link, doubt in doubts.items() if doubt)
 
     @cached_property
     def by_name(self) -> Mapping[str, Joint]:
-        """Return a mapping from joint names to joints."""
+        """Mapping from names to joints."""
         return {joint.name: joint for joint in self.joints}
 
 
@@ -167,7 +167,7 @@ GROUND = 'world'
 
 def parse_description(root: ElementTree.Element) -> Description:
     """
-    Return the links, joints and closed loops that a URDF describes.
+    Return links, joints and closed loops of a URDF.
 
     Raises
     ------
@@ -221,7 +221,7 @@ def _loop(element: ElementTree.Element, links: Iterable[str], joints: Mapping[st
 
 
 def _mimic(element: ElementTree.Element, where: str, known: Mimic | None) -> Mimic:
-    """Return the mimic relation of a joint, extended by the leader in a <mimic> element."""
+    """Return a joint's mimic relation after the leader in a <mimic> element is added."""
     joint = element.get('joint', '')
     before = {} if known is None else dict(known.multipliers)
     before[joint] = before.get(joint, 0.0) + _number(element, 'multiplier', where, 1.0)
@@ -230,7 +230,7 @@ def _mimic(element: ElementTree.Element, where: str, known: Mimic | None) -> Mim
 
 
 def _check_tree(links: Iterable[str], joints: Iterable[Joint]) -> None:
-    """Raise a RobotError unless the joints connect all links to one base link as a tree."""
+    """Raise a RobotError unless the joints connect all links to a single base link."""
     carriers: dict[str, Joint] = {}  # joint above each link
     for joint in joints:
         for role, link in (('parent', joint.parent), ('child', joint.child)):
@@ -390,7 +390,7 @@ def _origin(element: ElementTree.Element, where: str) -> tuple[Vector, Vector]:
 
 
 def _vector(element: ElementTree.Element, name: str, where: str) -> Vector:
-    """Return the three numbers of an XML attribute, or zeros if the attribute is missing."""
+    """Read three numbers from an XML attribute; zeros if it is missing."""
     text = element.get(name, '0 0 0')
     attribute = f"{where}: {name}='{text}' of <{element.tag}>"
     try:
@@ -412,7 +412,7 @@ def _number(
     *,
     endless: bool = False,
 ) -> float:
-    """Return the number in an XML attribute; it may be infinite only if `endless` is True."""
+    """Read a number from an XML attribute; it may be infinite only if `endless` is True."""
     text = element.get(name, '' if default is None else repr(default))
     attribute = f"{where}: {name}='{text}' of <{element.tag}>"
     try:

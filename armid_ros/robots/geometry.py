@@ -34,7 +34,7 @@ _SHAPE_ATTRIBUTES = {
 
 class LinkShape(NamedTuple):
     """
-    Shape of one <visual> or <collision> element of a link.
+    Geometric shape in a <visual> or <collision> element of a link.
 
     Attributes
     ----------
@@ -127,7 +127,7 @@ def collision_geometry(
     other: Literal['visual', 'collision'] = 'collision',
 ) -> tuple[pin.GeometryModel, dict[str, str]]:
     """
-    Return the collision bodies of a robot, and notes on links whose mesh file is missing.
+    Return the collision bodies of a robot, with notes on links whose mesh file is missing.
 
     Boxes, spheres and cylinders are exact. A mesh is replaced by convex bodies that contain the
     mesh. A mesh that is not found is left out and noted.
@@ -163,7 +163,7 @@ def collision_geometry(
 
 def sticks(model: pin.Model) -> list[tuple[int, FloatArray]]:
     """
-    Return the lines of a stick figure of a robot: joint index, and end in the joint's frame [m].
+    Return a stick figure of a robot: lines with joint index and end in the joint's frame [m].
 
     A line ends at the next joint; the line of the last body ends beyond its centre of mass.
     Index 0 is the base.
@@ -181,14 +181,14 @@ def sticks(model: pin.Model) -> list[tuple[int, FloatArray]]:
 
 
 def combined_mesh_note(notes: Sequence[str]) -> tuple[str, ...]:
-    """Combine notes on missing meshes into a note with their number and the first note."""
+    """Replace several notes on missing meshes by one note with their number."""
     if len(notes) < 2:
         return tuple(notes)
     return (f'{len(notes)} meshes not found, such as that of {notes[0]}',)
 
 
 def _bodies(shape: LinkShape, meshes: _Meshes) -> list[tuple[coal.CollisionGeometry, float]]:
-    """Return the coal bodies that form a shape, each with its offset along the shape's z axis."""
+    """Return the coal bodies that form a shape, each with an offset along the shape's z axis."""
     if shape.kind == 'box':
         return [(coal.Box(*shape.size), 0.0)]
     if shape.kind == 'sphere':
@@ -205,7 +205,7 @@ def _bodies(shape: LinkShape, meshes: _Meshes) -> list[tuple[coal.CollisionGeome
 
 
 def _geometry(element: ElementTree.Element) -> tuple[str, tuple[float, ...], str]:
-    """Return kind, dimensions and mesh file name from a <visual> or <collision> element."""
+    """Return kind, dimensions and mesh file of the shape in a <visual> or <collision> element."""
     for shape in element.findall('geometry/*'):
         if shape.tag in _SHAPE_ATTRIBUTES:
             texts = [shape.get(name, '') for name in _SHAPE_ATTRIBUTES[shape.tag]]
@@ -252,7 +252,7 @@ class CollisionModel:
 
     @property
     def pairs(self) -> tuple[tuple[str, str], ...]:
-        """Return the pairs of links whose distance is checked, in alphabetical order."""
+        """Return the pairs of links whose distance is checked, each in alphabetical order."""
         numbers = range(len(self.geometry.collisionPairs))
         return tuple(sorted({_links(self.robot, self.geometry, number) for number in numbers}))
 
@@ -261,7 +261,7 @@ def collision_model(
     robot: Robot, *, progress: Callable[[float], None] | None = None
 ) -> CollisionModel:
     """
-    Return the collision bodies of a robot, and the pairs of bodies whose distance is checked.
+    Build the collision model of a robot: bodies, and pairs whose distance is checked.
 
     Four kinds of pairs are not checked: links that cannot move against each other, links joined by
     a joint, pairs that one joint moves and that touch nowhere in its range, and pairs that the
@@ -313,7 +313,7 @@ def collision_model(
 
 
 def _leave_out_touching(robot: Robot, geometry: pin.GeometryModel) -> tuple[tuple[str, str], ...]:
-    """Remove the collision pairs of links that touch in the zero pose; return the links sorted."""
+    """Remove pairs of links that touch in the zero pose; return these pairs sorted."""
     data, placed = robot.model.createData(), geometry.createData()
     pin.computeDistances(robot.model, data, geometry, placed, robot.positions(robot.zero_pose))
     touching = {
@@ -328,7 +328,7 @@ def _leave_out_touching(robot: Robot, geometry: pin.GeometryModel) -> tuple[tupl
 
 
 def _leave_out_separate(robot: Robot, geometry: pin.GeometryModel) -> None:
-    """Remove pairs of bodies with a single joint between them that never touch in its range."""
+    """Remove pairs of bodies on both sides of one joint that cannot touch in its range."""
     robot = robot.tree
     data, placed = robot.model.createData(), geometry.createData()
     by_joint: dict[int, list[int]] = {}

@@ -257,7 +257,7 @@ def _split_arguments(source: str | Path) -> tuple[str | Path, dict[str, str], di
 
 def described_at(robot: Robot, positions: Mapping[str, float]) -> Robot:
     """
-    Return the described robot with given positions of the joints that are not driven.
+    Return the robot of the same description, with given positions of its undriven joints.
 
     Parameters
     ----------
@@ -278,7 +278,7 @@ def described_at(robot: Robot, positions: Mapping[str, float]) -> Robot:
 def _kinematic_model(
     description: Description, driven: Sequence[Joint], known: Mapping[str, float]
 ) -> tuple[pin.Model, tuple[str, ...]]:
-    """Return the Pinocchio model of the moving joints, and a note on each locked joint."""
+    """Return the Pinocchio model of the moving joints, with a note on each locked joint."""
     moving = moving_joints(description, [joint.name for joint in driven])
     positions = {
         joint.name: standing_position(description, joint, known)
@@ -298,7 +298,7 @@ def _kinematic_model(
 
 
 def _kinematic_urdf(description: Description, positions: Mapping[str, float]) -> str:
-    """Return a URDF for Pinocchio: some joints locked, continuous joints made revolute."""
+    """Return a URDF for Pinocchio with locked joints fixed and continuous joints revolute."""
     root = ElementTree.Element('robot', name=description.name)
     for name, inertial in description.links.items():
         link = ElementTree.SubElement(root, 'link', name=name)
@@ -336,7 +336,7 @@ def _text(numbers: Sequence[float]) -> str:
 
 def read_mounting(robot: Robot) -> tuple[float | None, Path] | None:
     """
-    Read the floor height from NAME.mounting.yaml next to NAME.urdf; None without this file.
+    Read the floor height from NAME.mounting.yaml beside NAME.urdf; None if there is none.
 
     Returns
     -------
@@ -369,7 +369,7 @@ def read_mounting(robot: Robot) -> tuple[float | None, Path] | None:
 
 def with_mechanism(text: str, path: Path) -> str:
     """
-    Return a URDF with the coupled joints of NAME.mechanism.yaml added, if this file exists.
+    Add the coupled joints of NAME.mechanism.yaml, if it exists, to a URDF text.
 
     The file is in the folder of NAME.urdf, NAME.urdf.xacro or NAME.xml. Other readers of a URDF
     ignore the additional elements.
@@ -399,7 +399,7 @@ def with_mechanism(text: str, path: Path) -> str:
 
 
 def _elements(document: Mapping[str, Any], urdf: str) -> list[str]:
-    """Return URDF elements for the mimic joints, motors and loops of NAME.mechanism.yaml."""
+    """Convert NAME.mechanism.yaml to URDF elements: mimic joints, motors and loops."""
 
     def tag(kind: str, /, *inside: str, **attributes: Any) -> str:
         pairs = ''.join(f' {key}={quoteattr(str(value))}' for key, value in attributes.items())

@@ -27,7 +27,7 @@ from scipy.linalg.lapack import dposv
 
 class Configuration(NamedTuple):
     """
-    State of the moving joints for a state of the driven joints, or for N states.
+    Positions, velocities and Jacobian of the moving joints, in one or in N states.
 
     Attributes
     ----------
@@ -48,7 +48,7 @@ class Configuration(NamedTuple):
 @dataclass(frozen=True, eq=False)
 class Mechanism:
     """
-    Map from positions u of n driven joints to those of m moving joints, q = A u + B p(u) + b.
+    Map from n driven to m moving joint positions, q = A u + B p(u) + b.
 
     Attributes
     ----------
@@ -87,12 +87,12 @@ class Mechanism:
 
     @property
     def constant(self) -> bool:
-        """Whether the Jacobian J is constant."""
+        """Whether the Jacobian from driven to moving joints is constant."""
         return not self.loops
 
     def at(self, u: FloatArray, du: FloatArray | None = None) -> Configuration:
         """
-        Return the state of the moving joints for one state of the driven joints.
+        Return the moving joints' positions and velocities for those of the driven joints.
 
         Parameters
         ----------
@@ -112,7 +112,7 @@ class Mechanism:
         return Configuration(solution[0], solution[1], drift)
 
     def states(self, u: FloatArray, du: FloatArray | None = None) -> Configuration:
-        """Return the states of the moving joints for N states of the driven joints, (N, n)."""
+        """Return the moving joints' states for N states (N, n) of the driven joints."""
         m, n = self.driven.shape
         if self.constant:
             q = u @ self.driven.T + self.offset
@@ -131,14 +131,14 @@ class Mechanism:
         return Configuration(q.reshape(-1, m), jacobian.reshape(-1, m, n), drift)
 
     def along(self, motion: Motion) -> tuple[Motion, FloatArray]:
-        """Convert a motion of the driven joints to the moving joints; return also J, (N, m, n)."""
+        """Convert a motion of the driven joints to the moving joints; also return J, (N, m, n)."""
         q, jacobian, drift = self.states(motion.q, motion.dq)
         dq, ddq = (np.einsum('kmn,kn->km', jacobian, x) for x in (motion.dq, motion.ddq))
         return Motion(self.joints, motion.t, q, dq, ddq + drift), jacobian
 
     def _solved(self, u: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """
-        Solve loop closure for a pose of the driven joints; return all joint positions and J.
+        Solve the loop closure in one pose of the driven joints; return positions and J.
 
         The third result, (m, 3 L), is the change of the moving joints per metre between the ends.
 
@@ -177,7 +177,7 @@ class Mechanism:
     def _drift(
         self, q: FloatArray, jacobian: FloatArray, closing: FloatArray, du: FloatArray
     ) -> FloatArray:
-        """Return the accelerations dJ/dt du of the moving joints in closed loops, shape (m,)."""
+        """Return the accelerations dJ/dt du of the moving joints, shape (m,)."""
         data, world = _SCRATCH.of(self)[0], pin.LOCAL_WORLD_ALIGNED
         pin.forwardKinematics(self.model, data, q, jacobian @ du, np.zeros(len(q)))
         apart = [
@@ -188,7 +188,7 @@ class Mechanism:
         return np.asarray(-closing @ np.concatenate(apart))
 
     def _gap(self, data: pin.Data, q: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return the vectors between the two ends of each loop, (3 L,) [m], and their Jacobian."""
+        """Return vectors between the ends of all loops, (3 L,) [m], and their Jacobian."""
         pin.computeJointJacobians(self.model, data, q)
         pin.updateFramePlacements(self.model, data)
         world, gaps, slopes = pin.LOCAL_WORLD_ALIGNED, [], []
@@ -200,7 +200,7 @@ class Mechanism:
 
 
 class _Scratch(threading.local):
-    """Pinocchio data, last solution and solved motions of each mechanism, for each thread."""
+    """Work space of each thread: Pinocchio data, last solution, solved motions, by mechanism."""
 
     def __init__(self) -> None:
         self._of: WeakKeyDictionary[Mechanism, list[Any]] = WeakKeyDictionary()

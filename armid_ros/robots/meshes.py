@@ -50,7 +50,7 @@ def find_mesh(name: str, urdf: Path | None) -> Path | None:
 
 
 def load_mesh(path: Path, scale: FloatArray) -> Any:
-    """Return a scaled mesh as an object of coal; RobotError if the file is not a mesh."""
+    """Load a mesh file as a scaled coal object; RobotError if it is not a mesh."""
     try:
         return coal.MeshLoader().load(str(path), scale)
     except (RuntimeError, ValueError) as error:
@@ -59,7 +59,7 @@ def load_mesh(path: Path, scale: FloatArray) -> Any:
 
 def convex_bodies(path: Path, scale: FloatArray) -> tuple[coal.CollisionGeometry, ...]:
     """
-    Return convex bodies that tightly contain a mesh; a flat mesh becomes one body.
+    Return convex bodies that tightly enclose a mesh; a flat mesh gives one body.
 
     Parameters
     ----------
@@ -96,7 +96,7 @@ def convex_bodies(path: Path, scale: FloatArray) -> tuple[coal.CollisionGeometry
 def _slabs(
     vertices: FloatArray, ends: npt.NDArray[np.intp], axis: FloatArray
 ) -> tuple[coal.ConvexBase, ...]:
-    """Cut a mesh into slabs across an axis, and return the convex hull of each slab."""
+    """Cut a mesh across an axis into slabs; return the convex hull of each slab."""
     along = vertices @ axis
     start, end = along[ends[:, 0]], along[ends[:, 1]]
     hulls: list[coal.ConvexBase] = []
@@ -120,7 +120,7 @@ def _slabs(
 
 
 def _join(slabs: Sequence[coal.ConvexBase]) -> tuple[coal.ConvexBase, ...]:
-    """Merge neighbouring hulls, first the pair whose common hull increases the volume least."""
+    """Merge neighbouring hulls, first those whose common hull adds the least volume."""
     bodies = list(slabs)
     apart = [body.computeVolume() for body in bodies]
     common = [_common_hull(*pair) for pair in pairwise(bodies)]

@@ -30,13 +30,13 @@ _ROOT = re.compile(r'(?:\s|<\?(?>.*?\?>)|<!--(?>.*?-->))*+<mujoco[\s/>]', re.DOT
 
 
 def is_mjcf(text: str) -> bool:
-    """Return whether a text is an MJCF: whether its root element is <mujoco>."""
+    """Return whether a text is in MJCF format: its root element is <mujoco>."""
     return _ROOT.match(text) is not None
 
 
 def urdf_of_mjcf(path: Path) -> tuple[str, tuple[str, ...]]:
     """
-    Return the URDF of the arm in an MJCF file.
+    Convert the arm in an MJCF file to URDF; return the URDF, and notes.
 
     Parameters
     ----------
@@ -77,7 +77,7 @@ def urdf_of_mjcf(path: Path) -> tuple[str, tuple[str, ...]]:
 
 
 def _compiled(mujoco: ModuleType, path: Path, notes: list[str]) -> Any:
-    """Compile an MJCF file with MuJoCo, without its textures and its missing meshes."""
+    """Compile an MJCF file with MuJoCo; textures and missing meshes are left out."""
     spec = mujoco.MjSpec.from_file(str(path))
     folder = Path(spec.modelfiledir) / spec.meshdir
     missing = {
@@ -100,7 +100,7 @@ def _compiled(mujoco: ModuleType, path: Path, notes: list[str]) -> Any:
 
 
 class _Writer:
-    """Conversion of one compiled MuJoCo model to URDF elements."""
+    """Converter of one compiled MuJoCo model to URDF elements."""
 
     def __init__(self, mujoco: ModuleType, model: Any, path: Path, notes: list[str]) -> None:
         self.mujoco, self.model, self.path, self.notes = mujoco, model, path, notes
@@ -109,7 +109,7 @@ class _Writer:
         self.joints = _names('joint', [model.joint(k).name for k in range(model.njnt)])
 
     def urdf(self) -> ElementTree.Element:
-        """Return the root element of a URDF of all bodies except floating ones."""
+        """Return the root element of a URDF with all bodies but floating ones."""
         model, afloat, anchors = self.model, set[int](), {0: np.zeros(3)}
         ElementTree.SubElement(self.root, 'link', name=self.bodies[0])
         self._shapes(self.root[-1], 0, anchors[0])
@@ -272,7 +272,7 @@ class _Writer:
             ElementTree.SubElement(element, 'mimic', values | {'offset': _number(offset)})
 
     def _loop(self, equality: int, anchors: Mapping[int, FloatArray]) -> bool:
-        """Write a connect equality as a closed loop; return False if this is not possible."""
+        """Write a `connect` equality as a closed loop; return False if this is impossible."""
         model, kinds = self.model, self.mujoco.mjtEq
         bodies = [int(model.eq_obj1id[equality]), int(model.eq_obj2id[equality])]
         of_bodies = model.eq_objtype[equality] == self.mujoco.mjtObj.mjOBJ_BODY
@@ -338,7 +338,7 @@ class _Writer:
 
 
 def _names(kind: str, given: list[str]) -> list[str]:
-    """Return the names of bodies or joints; an unnamed element gets its kind and number."""
+    """Return the names of bodies or joints; an unnamed one is called by kind and number."""
     return [one or _unused(f'{kind}_{number}', given) for number, one in enumerate(given)]
 
 
@@ -355,7 +355,7 @@ def _place(element: ElementTree.Element, parent: str, child: str, placement: pin
 
 
 def _origin(element: ElementTree.Element, placement: pin.SE3) -> None:
-    """Write a placement as the <origin> of a URDF element, with exact angles in gimbal lock."""
+    """Write a placement as <origin> of a URDF element; angles are exact even in gimbal lock."""
     r = np.array(placement.rotation)
     roll = math.atan2(r[2, 1], r[2, 2])
     pitch = math.atan2(-r[2, 0], math.hypot(r[2, 1], r[2, 2]))

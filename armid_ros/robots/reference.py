@@ -27,7 +27,7 @@ LIMIT_TOLERANCE = 1e-6
 @dataclass(frozen=True, eq=False)
 class Reference:
     """
-    Joint trajectory of waypoints, and the smooth curve through them.
+    Reference trajectory of joints: waypoints, and the smooth curve through them.
 
     Attributes
     ----------
@@ -98,7 +98,7 @@ class Reference:
 
     @classmethod
     def of(cls, motion: Motion) -> Reference:
-        """Return the reference that passes through every sample of a motion, from time zero."""
+        """Return the reference through every sample of a motion, starting at time zero."""
         return cls(motion.joints, motion.t - motion.t[0], motion.q, motion.dq, motion.ddq)
 
     @property
@@ -108,7 +108,7 @@ class Reference:
 
     def sample(self, t: FloatArray) -> Motion:
         """
-        Evaluate the smooth curve through the waypoints at given times.
+        Return the motion on the smooth curve through the waypoints at given times.
 
         Parameters
         ----------
@@ -161,13 +161,13 @@ class Reference:
         return self if self.joints == robot.joints else self.of_joints(robot.joints)
 
     def of_joints(self, joints: tuple[str, ...]) -> Reference:
-        """Return the reference of the named joints, in the given order."""
+        """Return the reference of only the named joints, in the given order."""
         order = [self.joints.index(joint) for joint in joints]
         return self._waypoints(joints, self.t, (slice(None), order))
 
     def remaining(self, late: float) -> Reference:
         """
-        Return the remaining reference when its start time is in the past.
+        Return the part of the reference that remains if its start was `late` seconds ago.
 
         Waypoints of the first 2 * late seconds are left out, so the arm has time to reach the
         reference. If no waypoint remains, the whole reference is returned.
@@ -191,7 +191,7 @@ class Reference:
 
     def after(self, q: FloatArray, dq: FloatArray, ddq: FloatArray) -> Reference:
         """
-        Return the reference preceded by a waypoint at time zero, at the position of the arm.
+        Return the reference with the arm's present state inserted as waypoint at time zero.
 
         The time of the first point has to be later than zero.
 
@@ -207,7 +207,7 @@ class Reference:
 
     def require_limits(self, robot: Robot, dt: float) -> None:
         """
-        Check that the interpolated motion keeps the position and velocity limits of a robot.
+        Raise an error if the interpolated motion exceeds position or velocity limits.
 
         Parameters
         ----------
@@ -250,13 +250,13 @@ class Reference:
 
 
 def limit_slack(robot: Robot) -> FloatArray:
-    """Return the tolerance beyond a position limit [rad or m], shape (n,)."""
+    """Return by how much a position may exceed its limit, by rounding, (n,) [rad or m]."""
     span = robot.upper - robot.lower
     return np.asarray(LIMIT_TOLERANCE * np.where(np.isfinite(span), span, 1.0))
 
 
 def _curve(t: FloatArray, q: FloatArray, dq: FloatArray | None, ddq: FloatArray | None) -> PPoly:
-    """Return the piecewise polynomial of all joint positions through the waypoints."""
+    """Return the piecewise polynomial of joint positions through the waypoints."""
     span, way = np.diff(t)[:, np.newaxis], np.diff(q, axis=0)
     c = np.zeros((6, *way.shape))  # coefficients of u^0 to u^5, u = (t - t_k) / (t_k+1 - t_k)
     c[0], c[1] = q[:-1], way

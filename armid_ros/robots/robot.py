@@ -33,7 +33,7 @@ UNLIMITED_HALF_RANGE = np.pi
 @dataclass(frozen=True, eq=False)
 class Robot:
     """
-    A fixed-base robot with n driven joints, each revolute or prismatic.
+    Robot with fixed base and n driven joints, each revolute or prismatic.
 
     The model is never changed; `with_gravity` and `with_inertias` return a robot with a copy of
     it. Friction, damping and rotor inertia are no part of the model, but effects with their own
@@ -133,17 +133,17 @@ class Robot:
 
     @property
     def moving(self) -> tuple[str, ...]:
-        """Return the joints that move a body: the driven joints and those coupled to them."""
+        """Joints that move a body: the driven joints and those coupled to them."""
         return self.joints if self.mechanism is None else self.mechanism.joints
 
     @property
     def all_joints(self) -> tuple[str, ...]:
-        """Return the moving joints and the motors without a body."""
+        """Moving joints, and motors that move no body of their own."""
         return tuple(dict.fromkeys([*self.moving, *self.joints]))
 
     @property
     def tip(self) -> str:
-        """Return the last moving joint; with coupled joints, the one farthest from the base."""
+        """Last moving joint of the arm; with coupled joints, the one farthest from the base."""
         if self.mechanism is None:
             return self.joints[-1]
         lengths = [np.linalg.norm(place.translation) for place in self.model.jointPlacements]
@@ -159,21 +159,21 @@ class Robot:
         return bool(own.prismatic[own.index(joint)])
 
     def body_of(self, joint: str) -> int:
-        """Return the index of the body of a joint; for a motor, of the last body it drives."""
+        """Return the index of the body that a joint moves; for a motor, the last such body."""
         if self.mechanism is None or joint in self.moving:
             return self.moving.index(joint)
         return int(np.flatnonzero(self.mechanism.driven[:, self.index(joint)])[-1])
 
     @cached_property
     def tree(self) -> Robot:
-        """Return the robot with all moving joints driven; itself if no joints are coupled."""
+        """Robot in which all moving joints are driven; itself if no joints are coupled."""
         if self.mechanism is None:
             return self
         own = [self.description.by_name[name] for name in self.moving]
         return replace(self, **joint_fields(own), mechanism=None)
 
     def positions(self, q: FloatArray) -> FloatArray:
-        """Return the positions of the moving joints, (..., m), from the driven ones, (..., n)."""
+        """Convert positions of driven joints (..., n) to those of all moving joints (..., m)."""
         if self.mechanism is None:
             return q
         rows = self.mechanism.states(q.reshape(-1, self.n_joints)).q
@@ -182,7 +182,7 @@ class Robot:
     def state(
         self, q: FloatArray, dq: FloatArray, ddq: FloatArray
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return position, velocity and acceleration of the moving joints, from driven joints."""
+        """Convert positions, velocities and accelerations of driven joints to moving joints."""
         if self.mechanism is None:
             return q, dq, ddq
         position, jacobian, drift = self.mechanism.at(q, dq)
@@ -191,7 +191,7 @@ class Robot:
     def inverse_dynamics(
         self, data: pin.Data, q: FloatArray, dq: FloatArray, ddq: FloatArray
     ) -> FloatArray:
-        """Return the torques of the driven joints in one state, shape (n,) [N m or N]."""
+        """Return the torques of the driven joints for one state, shape (n,) [N m or N]."""
         if self.mechanism is None:
             return np.asarray(pin.rnea(self.model, data, q, dq, ddq))
         position, jacobian, drift = self.mechanism.at(q, dq)
@@ -199,7 +199,7 @@ class Robot:
         return np.asarray(jacobian.T @ tau)
 
     def inertia(self, data: pin.Data, q: FloatArray) -> FloatArray:
-        """Return the inertia matrix J^T M J of the driven joints, shape (n, n) [kg m^2]."""
+        """Return the inertia matrix of the driven joints in a pose, shape (n, n) [kg m^2]."""
         if self.mechanism is None:
             return np.asarray(pin.crba(self.model, data, q))
         position, jacobian, _ = self.mechanism.at(q)
@@ -207,17 +207,17 @@ class Robot:
 
     @cached_property
     def description(self) -> Description:
-        """Return the links and joints of the URDF, driven or not."""
+        """Links and joints of the URDF, driven or not."""
         return parse_description(parse_xml(self.urdf))
 
     @cached_property
     def geometry(self) -> tuple[JointGeometry, ...]:
-        """Return axis and placement of each moving joint."""
+        """Axis and placement of each moving joint."""
         return tuple(JointGeometry.of(self.model, k) for k in range(len(self.links)))
 
     @property
     def gravity(self) -> FloatArray:
-        """Acceleration of gravity in the base frame, shape (3,) [m/s^2]."""
+        """Gravity vector in the base frame, shape (3,) [m/s^2]."""
         return read_only(np.array(self.model.gravity.linear))
 
     @property
@@ -231,7 +231,7 @@ class Robot:
     @property
     def rigid_parameters(self) -> FloatArray:
         """
-        Rigid-body parameters of the moving bodies, shape (10 m,).
+        Inertial parameters of the m moving bodies, shape (10 m,).
 
         Body by body m, m cx, m cy, m cz [kg, kg m] and Ixx, Ixy, Iyy, Ixz, Iyz, Izz [kg m^2]
         about the joint frame, which is the column order of pinocchio's
@@ -244,7 +244,7 @@ class Robot:
     @property
     def described_spread(self) -> FloatArray:
         """
-        Largest expected errors of the described rigid parameters, shape (m, 10).
+        Largest expected errors of the described inertial parameters, shape (m, 10).
 
         A described value may be wrong by as much as its own size. A missing value gets a tenth of
         a mean link, at 0.1 m from the joint.
@@ -266,18 +266,18 @@ class Robot:
 
     @property
     def zero_pose(self) -> FloatArray:
-        """Return the pose with joints at zero, or at their limits nearest to zero, (n,)."""
+        """Pose with each joint at zero, or at the limit nearest to zero, shape (n,)."""
         return np.clip(np.zeros(self.n_joints), self.lower, self.upper)
 
     @property
     def middle_pose(self) -> FloatArray:
-        """Return the middle of each joint's range, shape (n,); 0 without limits."""
+        """Pose with each joint in the middle of its range, 0 without limits, shape (n,)."""
         limited = np.isfinite(self.lower) & np.isfinite(self.upper)
         lower, upper = (np.where(limited, end, 0.0) for end in (self.lower, self.upper))
         return np.asarray((lower + upper) / 2)
 
     def position_range(self) -> tuple[FloatArray, FloatArray]:
-        """Return the position limits, (n,); +-`UNLIMITED_HALF_RANGE` for an unlimited joint."""
+        """Return lower and upper positions (n,), +-`UNLIMITED_HALF_RANGE` if unlimited."""
         return position_range(self.lower, self.upper)
 
     def index(self, joint: str) -> int:
@@ -298,7 +298,7 @@ class Robot:
 
     def with_inertias(self, parameters: npt.ArrayLike) -> Robot:
         """
-        Return the robot with other rigid-body parameters.
+        Return the robot with other inertial parameters.
 
         Parameters
         ----------
@@ -367,7 +367,7 @@ class JointGeometry:
 
     @classmethod
     def of(cls, model: pin.Model, number: int) -> JointGeometry:
-        """Return the geometry of the joint with a given number, from 0, in a Pinocchio model."""
+        """Return the geometry of a joint of a Pinocchio model, by its number from 0."""
         joint, placement = model.joints[number + 1], model.jointPlacements[number + 1]
         data = joint.createData()
         joint.calc(data, np.zeros(joint.nq))
@@ -386,7 +386,7 @@ class JointGeometry:
 
 
 def joint_fields(joints: Sequence[Joint]) -> dict[str, Any]:
-    """Return names, limits and friction of joints as the fields of a `Robot`."""
+    """Return names, limits and friction of joints as a dictionary of `Robot` fields."""
     return {
         'joints': tuple(joint.name for joint in joints),
         'lower': np.array([joint.lower for joint in joints]),
@@ -401,7 +401,7 @@ def joint_fields(joints: Sequence[Joint]) -> dict[str, Any]:
 
 
 def position_range(lower: FloatArray, upper: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return position limits, (n,); +-`UNLIMITED_HALF_RANGE` for an unlimited joint."""
+    """Replace infinite position limits, (n,), by +-`UNLIMITED_HALF_RANGE`."""
     return (
         np.where(np.isfinite(lower), lower, -UNLIMITED_HALF_RANGE),
         np.where(np.isfinite(upper), upper, UNLIMITED_HALF_RANGE),
@@ -410,7 +410,7 @@ def position_range(lower: FloatArray, upper: FloatArray) -> tuple[FloatArray, Fl
 
 def parse_gravity(value: str | Sequence[float] | FloatArray) -> FloatArray:
     """
-    Return the gravity vector of a name, a string 'x,y,z' or three numbers.
+    Return the gravity vector (3,) for a name, a string 'x,y,z' or three numbers.
 
     Parameters
     ----------

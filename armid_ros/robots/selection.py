@@ -15,7 +15,7 @@ from armid_ros.robots.robot import Robot
 @dataclass(frozen=True)
 class HeldJoint:
     """
-    Movable joint that is not driven, and its locked position.
+    Movable joint that the model locks, and its position.
 
     Attributes
     ----------
@@ -41,7 +41,7 @@ class HeldJoint:
 
 def driven_joints(description: Description, names: Sequence[str] | None) -> tuple[Joint, ...]:
     """
-    Return the driven joints: the named joints, or all except those of a gripper.
+    Return the joints to drive: the named ones, or all but those of a gripper.
 
     A joint that mimics others, or that a loop moves, is never driven. By default, a joint of a
     gripper is not driven either: this is a joint with a single mimic joint, or with finger,
@@ -83,7 +83,7 @@ def driven_joints(description: Description, names: Sequence[str] | None) -> tupl
 
 
 def several_arms(description: Description, driven: Sequence[str]) -> tuple[str, ...]:
-    """Return a note that lists the arms if driven joints belong to several arms, or no note."""
+    """Return a note that lists the arms if the driven joints belong to more than one."""
     arms = _arms(description, driven)
     if len(arms) < 2:
         return ()
@@ -109,7 +109,7 @@ def _arms(description: Description, joints: Sequence[str]) -> list[list[str]]:
 
 
 def driven_in_words(robot: Robot) -> tuple[str, ...]:
-    """Return notes on joints that are not driven, and on driven joints of several arms."""
+    """Return notes on undriven joints, and on driven joints of several arms."""
     locked = [
         f'{joint.name} (follows {joint.follows})' if joint.follows else joint.name
         for joint in held_joints(robot)
@@ -125,7 +125,7 @@ def driven_in_words(robot: Robot) -> tuple[str, ...]:
 
 def joints_beside_arms(robot: Robot) -> tuple[str, ...]:
     """
-    Return the driven joints outside all arms, such as wheels, a head or a torso.
+    Return driven joints that belong to no arm, such as wheels, a head or a torso.
 
     The result is empty for a robot without an arm.
 
@@ -137,7 +137,7 @@ def joints_beside_arms(robot: Robot) -> tuple[str, ...]:
 def load_arms(
     load: Callable[[Sequence[str] | None], Robot], joints: Sequence[str] | None
 ) -> tuple[Robot, tuple[str, ...]]:
-    """Load a robot with only the joints of its arms driven; return the joints left out as well."""
+    """Load a robot with only the joints of its arms driven; also return the other joints."""
     robot = load(joints)
     others = () if joints else joints_beside_arms(robot)
     if others:
@@ -146,7 +146,7 @@ def load_arms(
 
 
 def held_joints(robot: Robot) -> tuple[HeldJoint, ...]:
-    """Return the movable joints of the description that the model locks in place."""
+    """Return the movable joints that the model locks, with their positions."""
     description = robot.description
     carriers = {name: _carriers(description, [name]) for name in robot.joints}
     return tuple(
@@ -163,7 +163,7 @@ def held_joints(robot: Robot) -> tuple[HeldJoint, ...]:
 
 
 def standing_position(description: Description, joint: Joint, known: Mapping[str, float]) -> float:
-    """Return the position of a locked joint [rad or m]: as given, or else nearest to zero."""
+    """Return the position of a locked joint: the given one, or nearest to zero [rad or m]."""
     factors, position = leaders(description, joint, known)
     for name, factor in factors.items():
         leader = description.by_name[name]
@@ -175,7 +175,7 @@ def leaders(
     description: Description, joint: Joint, stop: Collection[str], above: tuple[str, ...] = ()
 ) -> tuple[dict[str, float], float]:
     """
-    Return the position of a mimic joint as a weighted sum of independent joints and an offset.
+    Express a mimic joint's position as weighted sum of independent joints plus offset.
 
     Parameters
     ----------
@@ -219,7 +219,7 @@ def leaders(
 
 
 def _free(description: Description) -> list[Joint]:
-    """Return the movable joints that follow no other joint and belong to no closed loop."""
+    """Return movable joints that are neither mimic joints nor in a closed loop."""
     passive = description.passive
     return [j for j in description.movable() if not j.mimic and j.name not in passive]
 
@@ -249,7 +249,7 @@ def _by_name(description: Description, names: Sequence[str]) -> tuple[Joint, ...
 
 
 def _carriers(description: Description, joints: Iterable[str]) -> set[str]:
-    """Return the joints between the base and any of the given joints."""
+    """Return all joints between the base and the given joints."""
     by_child = {joint.child: joint for joint in description.joints}
     found: set[str] = set()
     for joint in joints:

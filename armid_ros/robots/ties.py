@@ -19,7 +19,7 @@ _MOVED_BY = ('swing_knee', 'swing_hip', 'stance_knee', 'stance_ankle')
 @dataclass(frozen=True)
 class Tie:
     """
-    Spring between links of two machines, given by its end points.
+    Spring between links of two machines, described by its end points.
 
     Attributes
     ----------
@@ -41,7 +41,7 @@ class Tie:
 
 def centroid_ties(robot: Robot, other: Robot, joints: Sequence[tuple[str, str]]) -> list[Tie]:
     """
-    Return ties between the centroids of links.
+    Return springs between the centres of mass of pairs of links.
 
     Parameters
     ----------
@@ -70,7 +70,7 @@ def centroid_ties(robot: Robot, other: Robot, joints: Sequence[tuple[str, str]])
 
 def leg_ties(exo: Robot, human: Robot, segments: Sequence[str] = SEGMENTS) -> tuple[Tie, ...]:
     """
-    Return the ties between the shipped exoskeleton and its wearer.
+    Return the springs between the shipped exoskeleton and its wearer.
 
     Raises
     ------

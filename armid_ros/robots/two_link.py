@@ -24,7 +24,7 @@ ROBOT = 'two_link_elastic'
 @dataclass(frozen=True, eq=False)
 class TwoLinkParameters:
     """
-    Parameters of two links in a plane, each driven by a motor through a spring and a damper.
+    Parameters of a planar two-link arm whose motors drive the links by springs and dampers.
 
     Motors: Mm v_m' + Dm v_m + fm sgn(v_m) = E u - n tau_g, motor side, n = 1 / gear.
     Springs: tau_g = Kg (n th_m - th_l) + Dg (n v_m - v_l).
@@ -82,32 +82,32 @@ class TwoLinkParameters:
 
     @property
     def inertia(self) -> FloatArray:
-        """Constant part of the inertia at each joint, alpha and beta, shape (2,) [kg m^2]."""
+        """Constant part of the inertia at each joint: alpha and beta, (2,) [kg m^2]."""
         return np.array([self.alpha, self.beta])
 
     @property
     def rotor(self) -> FloatArray:
-        """Motor inertia at the joint, shape (2,) [kg m^2]."""
+        """Motor inertia, converted to the joint side, shape (2,) [kg m^2]."""
         return np.asarray(self.motor_inertia * self.gear**2)
 
     @property
     def joint_motor_damping(self) -> FloatArray:
-        """Motor damping at the joint, shape (2,) [N m s/rad]."""
+        """Motor damping, converted to the joint side, shape (2,) [N m s/rad]."""
         return np.asarray(self.motor_damping * self.gear**2)
 
     @property
     def joint_coulomb(self) -> FloatArray:
-        """Coulomb friction at the joint, shape (2,) [N m]."""
+        """Coulomb friction, converted to the joint side, shape (2,) [N m]."""
         return np.asarray(self.coulomb * self.gear)
 
     @property
     def torque_per_volt(self) -> FloatArray:
-        """Torque at the joint per command voltage, shape (2,) [N m/V]."""
+        """Joint torque per command voltage, shape (2,) [N m/V]."""
         return np.asarray(self.torque_constant * self.gear)
 
     @property
     def total_damping(self) -> FloatArray:
-        """Viscous friction of motor and link together, dl + dm gear^2, shape (2,) [N m s/rad]."""
+        """Viscous friction of link and motor at the joint, dl + dm gear^2, (2,) [N m s/rad]."""
         return np.asarray(self.link_damping + self.joint_motor_damping)
 
     def mass_matrix(self, angle: float) -> FloatArray:
@@ -118,7 +118,7 @@ class TwoLinkParameters:
 
     def body(self, robot: Robot) -> Robot:
         """
-        Return a two-link robot with inertias that agree with alpha, beta and gamma.
+        Return a robot whose link inertias agree with alpha, beta and gamma.
 
         Masses, lengths and the centroid of the first link do not change. The centroid and inertia
         of the second link and the inertia of the first link are adapted.
@@ -135,7 +135,7 @@ class TwoLinkParameters:
 @dataclass(frozen=True, eq=False)
 class TwoLinkSet:
     """
-    A shipped parameter set of the two-link arm, with the assumptions for a simulation.
+    Shipped parameter set of the two-link arm, with further assumptions for simulation.
 
     Attributes
     ----------

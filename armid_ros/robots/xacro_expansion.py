@@ -131,7 +131,7 @@ def package_folders(
 
 
 def _packages(root: Path, name: str) -> Iterator[Path]:
-    """Yield folders with the package.xml of a package, in a folder and two levels below."""
+    """Yield folders, at most two levels deep, that contain a package.xml with this name."""
     folders = [root]
     if root != root.parent:
         with suppress(OSError):
@@ -152,7 +152,7 @@ def _paths(variable: str) -> list[str]:
 
 
 def main() -> None:
-    """Expand the xacro file that stdin requests, with limited memory and processor time."""
+    """Expand the xacro file requested on stdin; memory and processor time are limited."""
     request = json.load(sys.stdin)
     answers = os.fdopen(os.dup(1), 'w', encoding='utf-8')
     os.dup2(2, 1)  # output of the expansion must not mix with the answer
@@ -165,7 +165,7 @@ def main() -> None:
 
 
 class _Arguments(dict[str, str]):
-    """Arguments of a xacro file, with the argument names that the file declares or uses."""
+    """Arguments of a xacro file, and all argument names that it declares or uses."""
 
     def __init__(self, given: Mapping[str, str]) -> None:
         super().__init__(given)
@@ -181,7 +181,7 @@ class _Arguments(dict[str, str]):
 
 
 def expanded(request: dict[str, Any]) -> dict[str, str]:
-    """Return the expanded text of the requested xacro file, or an error message."""
+    """Expand the requested xacro file; return its text, or an error message."""
     answer: dict[str, str] = {}
     missing: dict[str, str] = {}
     arguments = _Arguments(request['arguments'])
@@ -213,7 +213,7 @@ def expanded(request: dict[str, Any]) -> dict[str, str]:
 
 
 def _find_packages(xacro: Any, request: dict[str, Any], missing: dict[str, str]) -> None:
-    """Make xacro find packages without ROS and skip packages of drives and simulators."""
+    """Make xacro find packages without ROS, and skip packages that a robot model does not need."""
     # a missing package is an error only if its files are read, because drivers only name paths
     arguments = xacro.substitution_args
     include_files, macro_call = xacro.get_include_files, xacro.handle_macro_call
@@ -247,7 +247,7 @@ def _find_packages(xacro: Any, request: dict[str, Any], missing: dict[str, str])
 
 
 def _reason(error: Exception, request: dict[str, Any], missing: dict[str, str]) -> str:
-    """Return the reason why a file cannot be expanded, and a remedy."""
+    """Return why a xacro file cannot be expanded, with a remedy."""
     import xacro.substitution_args
 
     text = ' '.join(str(error).split()) or type(error).__name__
@@ -269,7 +269,7 @@ def _reason(error: Exception, request: dict[str, Any], missing: dict[str, str]) 
 
 
 def _place(xacro: Any) -> str:
-    """Return the path of the file, or of the macro's file, that xacro expands at present."""
+    """Return the path of the file or macro that xacro expands at present."""
     macros, files = xacro.macrostack, xacro.filestack
     return str(macros[-1].history[-1][-1] if macros else files[-1])
 
