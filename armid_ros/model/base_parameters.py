@@ -32,7 +32,7 @@ _KEEP_ORDER = ('Ixx', 'Ixy', 'Ixz', 'Iyy', 'Iyz', 'Izz', 'mx', 'my', 'mz', 'm')
 @dataclass(frozen=True)
 class BaseParameters:
     """
-    Identifiable combinations of a list of standard parameters, named by expressions.
+    Identifiable combinations of standard parameters, named by expressions.
 
     Attributes
     ----------
@@ -54,12 +54,12 @@ class BaseParameters:
 
     @property
     def rank(self) -> int:
-        """Return the number of base parameters r."""
+        """Number r of base parameters."""
         return len(self.parameters)
 
     @property
     def terms(self) -> tuple[dict[str, float], ...]:
-        """Return the factor of each standard parameter in each base parameter, by symbol."""
+        """Factors of the standard parameters in each base parameter, by name."""
         symbols = [symbol(parameter) for parameter in self.standard]
         return tuple(
             {symbols[column]: float(row[column]) for column in np.flatnonzero(row)}
@@ -70,7 +70,7 @@ class BaseParameters:
         self, standard: tuple[ParameterName, ...], columns: npt.NDArray[np.intp]
     ) -> BaseParameters:
         """
-        Return these base parameters as functions of a longer list of standard parameters.
+        Express these base parameters by a longer list of standard parameters.
 
         Parameters
         ----------
@@ -86,12 +86,12 @@ class BaseParameters:
         return BaseParameters(standard, self.parameters, independent, read_only(grouping))
 
     def values(self, theta: npt.ArrayLike) -> FloatArray:
-        """Return the values of the base parameters (r,), given standard parameters (P,)."""
+        """Compute the base parameters (r,) from standard parameters theta (P,)."""
         return np.asarray(self.grouping @ np.asarray(theta, dtype=float))
 
     def lift(self, beta: npt.ArrayLike, prior: npt.ArrayLike) -> FloatArray:
         """
-        Return the standard parameters nearest to a prior that have given base parameters.
+        Return standard parameters that have given base parameters, nearest to a prior.
 
         Parameters
         ----------
@@ -118,7 +118,7 @@ def group_columns(
     w: FloatArray, standard: tuple[ParameterName, ...], tolerance: float = RANK_TOLERANCE
 ) -> BaseParameters:
     """
-    Group linearly dependent columns of a regressor, and return the base parameters.
+    Group linearly dependent columns of a regressor; return the base parameters.
 
     Parameters
     ----------
@@ -174,7 +174,7 @@ def group_columns(
 
 def regroup(theory: BaseParameters, data: BaseParameters) -> BaseParameters:
     """
-    Combine the grouping of parameters for any motion with the further grouping by given data.
+    Combine two groupings of parameters: for any motion, and for the given data.
 
     Parameters
     ----------
@@ -192,7 +192,7 @@ def regroup(theory: BaseParameters, data: BaseParameters) -> BaseParameters:
 def _named(
     standard: tuple[ParameterName, ...], independent: npt.NDArray[np.intp], grouping: FloatArray
 ) -> BaseParameters:
-    """Name base parameters by their grouping matrix, in which rounding errors become zero."""
+    """Return base parameters with names, from their grouping matrix without rounding errors."""
     grouping = np.where(np.abs(grouping) < RANK_TOLERANCE, 0.0, grouping)
     parameters = tuple(
         replace(standard[leader], name=_expression(row, leader, standard))
@@ -203,7 +203,7 @@ def _named(
 
 def levelled(robot: Robot) -> Robot:
     """
-    Return the robot without tiny components of gravity due to a rounded base orientation.
+    Set tiny gravity components, due to rounding of the base orientation, to zero.
 
     Components of gravity below 0.2 %, across the axes of the first joint, become zero. A hanging
     base with a rounded angle of 3.1416 excites first moments by 7e-6 of their weight, far below
@@ -217,18 +217,18 @@ def levelled(robot: Robot) -> Robot:
 
 
 def _symbol_of(parameter: ParameterName) -> str:
-    """Return the name of a parameter without the number of its link: 'mx' for 'mx2'."""
+    """Return a parameter's name without the number of its link: 'mx' for 'mx2'."""
     return parameter.name.rstrip('0123456789')
 
 
 def symbol(parameter: ParameterName) -> str:
-    """Return the name of a parameter, with its joint unless the name ends with a link number."""
+    """Return a parameter's name, followed by its joint unless the name has a link number."""
     numbered = parameter.name[-1:].isdigit() or not parameter.joint
     return parameter.name if numbered else f'{parameter.name}[{parameter.joint}]'
 
 
 def _expression(row: FloatArray, leader: int, standard: tuple[ParameterName, ...]) -> str:
-    """Return a linear combination of parameters as text: 'Izz1 + 0.25 (m2 + m3)'."""
+    """Format a linear combination of parameters, such as 'Izz1 + 0.25 (m2 + m3)'."""
     text = standard[leader].name
     factors: dict[float, list[tuple[float, str]]] = {}
     # angles rounded to four digits make factors of 4e-6

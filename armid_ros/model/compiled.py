@@ -39,7 +39,7 @@ _JOINT = np.dtype(
 
 class Structure(ctypes.Structure):
     """
-    Base class of the C structures that the compiled kernel reads.
+    Base class of C structures that the compiled kernel reads.
 
     Attributes
     ----------
@@ -54,12 +54,12 @@ class Structure(ctypes.Structure):
 
     @property
     def address(self) -> int:
-        """Return the address of the structure in memory."""
+        """Memory address of the structure."""
         return ctypes.addressof(self)
 
 
 class BodyOfKernel(Structure):
-    """Rigid body of n joints in the format of the kernel."""
+    """Rigid body of n joints, in the data format of the compiled kernel."""
 
     _fields_ = (
         ('n', COUNT),
@@ -70,7 +70,7 @@ class BodyOfKernel(Structure):
 
     def along(self, motion: Motion, quantity: str, out: FloatArray) -> None:
         """
-        Compute the torques or regressors of the rigid body along a motion.
+        Compute torques or the regressor of the rigid body along a motion, into `out`.
 
         Parameters
         ----------
@@ -106,7 +106,7 @@ def kernel_body(
     robot: Robot, added_inertia: FloatArray | None = None, weighs: bool = True
 ) -> BodyOfKernel | None:
     """
-    Convert the rigid body of a robot to the format of the kernel.
+    Convert the rigid body of a robot to the kernel's format; None without kernel.
 
     Parameters
     ----------

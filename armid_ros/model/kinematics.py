@@ -16,7 +16,7 @@ def points_motion(
     robot: Robot, joints: Sequence[str], offsets: FloatArray, q: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """
-    Return the positions and Jacobians of points on links, at given joint positions.
+    Return positions and Jacobians of points on links for given joint positions.
 
     Parameters
     ----------
@@ -42,7 +42,7 @@ def points_motion(
 
 @dataclass(frozen=True)
 class _Frame:
-    """Frame of a link at N samples: rotation (3, 3, N), origin (3, N), and joints that move it."""
+    """Link frame in N samples: rotation (3, 3, N), origin (3, N), and joints that move it."""
 
     rotation: FloatArray
     origin: FloatArray
@@ -59,7 +59,7 @@ class _Frame:
 @dataclass(frozen=True)
 class LinkFrames:
     """
-    Frames of links and twists of joints along a motion.
+    Link frames and joint twists along a motion.
 
     Samples are on the last axis of attributes, and on the first axis of results.
 
@@ -86,7 +86,7 @@ class LinkFrames:
     @classmethod
     def of(cls, robot: Robot, q: FloatArray, joints: Sequence[str] | None = None) -> LinkFrames:
         """
-        Compute the frames of the links that some joints move.
+        Compute the frames of the links that the given joints move.
 
         Parameters
         ----------
@@ -124,16 +124,16 @@ class LinkFrames:
 
     @classmethod
     def in_the_middle(cls, robot: Robot) -> LinkFrames:
-        """Compute the frames with all joints in mid-range; joints without limits are at 0."""
+        """Compute the link frames with all joints in mid-range, or at 0 without limits."""
         return cls.of(robot, robot.middle_pose[np.newaxis])
 
     def places(self, joint: str, offset: FloatArray) -> FloatArray:
-        """Return the positions (N, 3) [m] of a point (3,) on the link that a joint moves."""
+        """Return the positions (N, 3) [m] of a link point `offset` (3,), in the base frame."""
         frame = self.frames[self.joints.index(joint)]
         return np.asarray((frame.origin + frame.turned(offset)).T)
 
     def points(self, joints: Sequence[str], offsets: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return the positions (N, k, 3) and Jacobians (N, k, 3, n) of points on links."""
+        """Return positions (N, k, 3) and Jacobians (N, k, 3, n) of k points on links."""
         positions = np.empty((len(joints), 3, self.lines.shape[2]))
         jacobians = np.zeros((len(joints), *self.lines.shape))
         for k, (joint, offset) in enumerate(zip(joints, offsets, strict=True)):
@@ -151,7 +151,7 @@ class LinkFrames:
 
     def torques(self, joint: str, places: FloatArray, forces: FloatArray) -> FloatArray:
         """
-        Return the joint torques J^T f of forces that act on a link.
+        Return the joint torques J^T f that result from forces f on a link.
 
         Parameters
         ----------
@@ -174,7 +174,7 @@ class LinkFrames:
 
 
 def _cross(a: FloatArray, b: FloatArray) -> FloatArray:
-    """Return the cross products of the columns of two arrays, (3, N)."""
+    """Return the cross products of the columns of two arrays (3, N)."""
     result = np.empty(b.shape)
     for x, y, z in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
         result[x] = a[y] * b[z] - a[z] * b[y]

@@ -33,7 +33,7 @@ def export_mjcf(
     robot: Robot, values: Mapping[str, Mapping[str, float]], remarks: Sequence[str] = ()
 ) -> tuple[str, tuple[str, ...]]:
     """
-    Return a MuJoCo model of a robot with its links, shapes, joints and motors.
+    Return a MuJoCo model (MJCF) of a robot: links, shapes, joints and motors.
 
     Parameters
     ----------
@@ -111,7 +111,7 @@ def export_mjcf(
 
 
 def _couplings(root: ElementTree.Element, robot: Robot) -> list[str]:
-    """Add couplings and loops of joints as constraints; return couplings that MuJoCo lacks."""
+    """Add joint couplings and closed loops as constraints; return those MuJoCo cannot model."""
     if robot.mechanism is None:
         return []
     tendons = ElementTree.SubElement(root, 'tendon')
@@ -145,7 +145,7 @@ def _couplings(root: ElementTree.Element, robot: Robot) -> list[str]:
 def _shapes(
     robot: Robot, bodies: Mapping[int, ElementTree.Element], assets: ElementTree.Element
 ) -> list[str]:
-    """Add the geometric shapes of links to MJCF bodies; return meshes that MuJoCo cannot read."""
+    """Add the shapes of links to MJCF bodies; return the meshes that MuJoCo cannot read."""
     left_out: dict[str, None] = {}
     files: dict[tuple[Path, tuple[float, ...]], str] = {}
     for of in _CLASSES:
@@ -172,13 +172,13 @@ def _shapes(
 
 
 def _place(placement: pin.SE3) -> dict[str, str]:
-    """Return the MJCF attributes of a placement: position and quaternion."""
+    """Return a placement as MJCF attributes: position and quaternion."""
     x, y, z, w = pin.Quaternion(placement.rotation).coeffs()
     return {'pos': _numbers(placement.translation), 'quat': _numbers([w, x, y, z])}
 
 
 def _joint(robot: Robot, index: int) -> dict[str, str]:
-    """Return the MJCF attributes of a joint: type, axis and limits."""
+    """Return a joint as MJCF attributes: type, axis and limits."""
     slides = bool(robot.prismatic[index])
     geometry = robot.geometry[index]
     attributes = {
@@ -195,5 +195,5 @@ def _joint(robot: Robot, index: int) -> dict[str, str]:
 
 
 def _numbers(values: Sequence[float] | FloatArray) -> str:
-    """Return numbers as text, separated by blanks."""
+    """Format numbers, separated by blanks."""
     return ' '.join(repr(float(value)) for value in values)

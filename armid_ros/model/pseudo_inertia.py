@@ -24,7 +24,7 @@ import numpy.typing as npt
 
 
 def _basis() -> FloatArray:
-    """Return the derivatives of pseudo-inertia by inertial parameters, shape (10, 4, 4)."""
+    """Return derivatives of the pseudo-inertia by the inertial parameters, shape (10, 4, 4)."""
     basis = np.zeros((PER_LINK, 4, 4))
     basis[0, 3, 3] = 1.0
     for axis in range(3):
@@ -44,7 +44,7 @@ BASIS = _basis()
 
 def pseudo_inertia(parameters: npt.ArrayLike) -> FloatArray:
     """
-    Return the 4x4 pseudo-inertia matrix of one or several links.
+    Return the 4 x 4 pseudo-inertia matrix of one or several links.
 
     Parameters
     ----------
@@ -63,7 +63,7 @@ def pseudo_inertia(parameters: npt.ArrayLike) -> FloatArray:
 
 def link_parameters(matrix: npt.ArrayLike) -> FloatArray:
     """
-    Return the ten inertial parameters of a pseudo-inertia matrix, inverse of `pseudo_inertia`.
+    Return the ten inertial parameters of a pseudo-inertia; inverse of `pseudo_inertia`.
 
     Parameters
     ----------
@@ -86,7 +86,7 @@ def link_parameters(matrix: npt.ArrayLike) -> FloatArray:
 @dataclass(frozen=True)
 class Consistency:
     """
-    Mass, centre of mass, principal moments and pseudo-inertia eigenvalues of a link.
+    Quantities of a link that decide whether its inertial parameters are possible.
 
     Attributes
     ----------
@@ -112,7 +112,7 @@ class Consistency:
 
     @staticmethod
     def of(link: str, parameters: npt.ArrayLike) -> Consistency:
-        """Compute all attributes from the ten inertial parameters of a link."""
+        """Compute these quantities from the ten inertial parameters of a link."""
         matrix = pseudo_inertia(parameters)
         mass = float(matrix[3, 3])
         center = moments = np.full(3, np.nan)
@@ -132,7 +132,7 @@ class Consistency:
 
 def require_consistent(links: tuple[str, ...], parameters: npt.ArrayLike) -> None:
     """
-    Raise ModelError if no body can have the inertial parameters of a link.
+    Raise ModelError if no body can have a link's inertial parameters.
 
     Parameters
     ----------

@@ -30,7 +30,7 @@ LINK_UNITS = ('kg', 'kg m', 'kg m', 'kg m') + ('kg m^2',) * 6
 
 def rigid_parameter_names(robot: Robot) -> tuple[ParameterName, ...]:
     """
-    Return the names of the ten inertial parameters of each moving joint.
+    Return names and units of the ten inertial parameters of each moving joint's body.
 
     Returns
     -------
@@ -51,19 +51,19 @@ def link_unit(name: str) -> str:
 
 
 class _Prepared(threading.local):
-    """Cache of each thread, by robot: Pinocchio's work space, and the body in kernel format."""
+    """Cache of each thread, by robot: Pinocchio's work space and the kernel's body."""
 
     def __init__(self) -> None:
         self.data: WeakKeyDictionary[Robot, pin.Data] = WeakKeyDictionary()
         self.bodies: WeakKeyDictionary[Robot, BodyOfKernel | None] = WeakKeyDictionary()
 
     def data_of(self, robot: Robot) -> pin.Data:
-        """Return the work space of Pinocchio for a robot."""
+        """Return Pinocchio's work space for a robot."""
         data = self.data.get(robot)
         return self.data.setdefault(robot, robot.model.createData()) if data is None else data
 
     def body_of(self, robot: Robot) -> BodyOfKernel | None:
-        """Return a robot in the format of the compiled kernel; None without this kernel."""
+        """Return a robot in the compiled kernel's format; None if there is no kernel."""
         if robot not in self.bodies:
             self.bodies[robot] = kernel_body(robot)
         return self.bodies[robot]
@@ -74,7 +74,7 @@ _PREPARED = _Prepared()
 
 def inverse_dynamics(robot: Robot, motion: Motion) -> FloatArray:
     """
-    Compute the joint torques of the rigid body along a motion, by recursive Newton-Euler.
+    Compute rigid-body joint torques along a motion by recursive Newton-Euler.
 
     Returns
     -------
@@ -146,12 +146,12 @@ def inverse_dynamics_derivatives(
 
 
 def _projected(jacobian: FloatArray, torques: FloatArray) -> FloatArray:
-    """Convert torques of moving joints, (N, m, ...), to torques of driven joints, by J^T."""
+    """Convert torques (N, m, ...) of moving joints to torques of driven joints by J^T."""
     return np.asarray(np.einsum('kmn,km...->kn...', jacobian, torques))
 
 
 def _difference(robot: Robot, motion: Motion, name: str) -> FloatArray:
-    """Differentiate joint torques by q or dq of each joint, by central differences, (N, n, n)."""
+    """Differentiate joint torques by q or dq with central differences, (N, n, n)."""
     step = 1e-5
     slopes = []
     for shift in step * np.eye(robot.n_joints):
@@ -167,7 +167,7 @@ def _difference(robot: Robot, motion: Motion, name: str) -> FloatArray:
 
 def regressor(robot: Robot, motion: Motion) -> FloatArray:
     """
-    Compute the regressor Y of tau = Y pi for every sample of a motion.
+    Compute the regressor Y, with tau = Y pi, in each sample of a motion.
 
     Parameters
     ----------
@@ -213,7 +213,7 @@ def regressor(robot: Robot, motion: Motion) -> FloatArray:
 
 def gravity_sensitivity(robot: Robot, q: FloatArray) -> FloatArray:
     """
-    Differentiate the joint torques by the gravity vector.
+    Differentiate joint torques by the components of the gravity vector.
 
     Parameters
     ----------
@@ -242,7 +242,7 @@ def gravity_sensitivity(robot: Robot, q: FloatArray) -> FloatArray:
 
 def random_motion(robot: Robot, rng: np.random.Generator, n_samples: int | None = None) -> Motion:
     """
-    Draw independent random joint states that excite every identifiable parameter.
+    Draw random joint states that make every identifiable parameter visible.
 
     Positions are uniform within the limits (one turn without limits), velocities and accelerations
     are normal with a standard deviation of 1 rad/s and 1 rad/s^2 (or m). Temperatures rise from

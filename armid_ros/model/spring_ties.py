@@ -30,7 +30,7 @@ _DIFFERENCE_STEP = 1e-5
 @dataclass(frozen=True)
 class TiedMachines:
     """
-    Two machines and the end points of the springs that tie them together.
+    Two machines, and the end points of the springs (ties) between them.
 
     Attributes
     ----------
@@ -48,7 +48,7 @@ class TiedMachines:
 
 class TieGeometry(NamedTuple):
     """
-    End points, vectors and Jacobians of ties along a motion of both machines.
+    End points, vectors and Jacobians of springs along a motion of both machines.
 
     Attributes
     ----------
@@ -71,7 +71,7 @@ class TieGeometry(NamedTuple):
 
     def pulled(self, slack: float | FloatArray) -> FloatArray:
         """
-        Return the first machine's torques per stiffness of each tie, J^T D, (N, n, S) [m^2].
+        Return the first machine's torques per unit stiffness of each spring, (N, n, S) [m^2].
 
         A spring pulls only if it is longer than its slack [m].
 
@@ -81,7 +81,7 @@ class TieGeometry(NamedTuple):
 
 
 def extension(way: FloatArray, slack: float | FloatArray) -> FloatArray:
-    """Shorten tie vectors (..., 3) by a slack (...) [m]; shorter vectors become 0."""
+    """Shorten spring vectors (..., 3) by a slack [m]; vectors shorter than it become 0."""
     # the direction of a vector shorter than this [m] is undefined
     length = np.maximum(np.linalg.norm(way, axis=-1), 1e-12)
     return np.asarray(np.maximum(1.0 - slack / length, 0.0)[..., np.newaxis] * way)
@@ -91,7 +91,7 @@ def tie_geometry(
     robot: Robot, q: FloatArray, other: Robot, other_q: FloatArray, ties: Sequence[Tie]
 ) -> TieGeometry:
     """
-    Compute end points and Jacobians of ties at positions (N, n) and (N, m) of two machines.
+    Compute end points and Jacobians of springs at positions of two machines.
 
     Raises
     ------

@@ -32,7 +32,7 @@ def export_urdf(
     robot: Robot, values: Mapping[str, Mapping[str, float]], remarks: Sequence[str] = ()
 ) -> str:
     """
-    Return the URDF of a robot with its present inertial parameters and new friction.
+    Return the URDF of a robot, with its present inertial parameters and given friction.
 
     Parameters
     ----------
@@ -90,21 +90,19 @@ def export_urdf(
 
 
 def _parsed(urdf: str) -> tuple[minidom.Document, minidom.Element]:
-    """Parse a URDF with its comments and namespace prefixes; return document and root element."""
+    """Parse a URDF, keeping comments and namespaces; return document and root element."""
     document = expatbuilder.parseString(urdf, namespaces=False)
     assert document.documentElement is not None
     return document, document.documentElement
 
 
 def _text(document: minidom.Document) -> str:
-    """Return an XML document as text with a declaration."""
     return '\n'.join(
         ['<?xml version="1.0"?>', *(node.toxml() for node in document.childNodes), '']
     )
 
 
 def _children(parent: minidom.Element, name: str) -> Iterator[minidom.Element]:
-    """Return the child elements of an XML element that have a given tag."""
     return (
         child
         for child in parent.childNodes
@@ -113,7 +111,7 @@ def _children(parent: minidom.Element, name: str) -> Iterator[minidom.Element]:
 
 
 def _child(parent: minidom.Element, name: str) -> minidom.Element:
-    """Return the first child element with a tag; if there is none, add it with indentation."""
+    """Return the first child element with a tag; add an empty one if there is none."""
     found = next(_children(parent, name), None)
     if found is None:
         document = minidom.Document()
@@ -132,13 +130,13 @@ def _child(parent: minidom.Element, name: str) -> minidom.Element:
 
 
 def _parameters(robot: Robot, urdf: str) -> FloatArray:
-    """Return the inertial parameters of each driven joint in a URDF, shape (n, 10)."""
+    """Return the inertial parameters of each driven joint's body in a URDF, shape (n, 10)."""
     read = robot_from_urdf(urdf, joints=robot.joints, source=robot.name)
     return read.rigid_parameters.reshape(-1, PER_LINK)
 
 
 def _without_inertials(urdf: str, links: Sequence[str]) -> str:
-    """Return a URDF in which the mass and inertia of some links are zero."""
+    """Return a URDF in which the masses and inertias of some links are zero."""
     document, root = _parsed(urdf)
     for link in _children(root, 'link'):
         for inertial in _children(link, 'inertial'):
@@ -149,7 +147,7 @@ def _without_inertials(urdf: str, links: Sequence[str]) -> str:
 
 
 def _share(body: FloatArray, others: FloatArray) -> float:
-    """Return a factor for the inertias of other links, so that the child link stays consistent."""
+    """Return a factor on the inertias of attached links that keeps the child link consistent."""
     if not np.any(others):
         return 1.0
     if not Consistency.of('', others).eigenvalues[0] > -1e-12:
@@ -159,7 +157,7 @@ def _share(body: FloatArray, others: FloatArray) -> float:
 
 
 def _scaled(robot: Robot, shares: FloatArray) -> str:
-    """Scale mass and inertia of the links that are attached to child links of driven joints."""
+    """Return a URDF with scaled masses and inertias of links attached to moving links."""
     document, root = _parsed(robot.urdf)
     carriers = {joint.child: joint for joint in robot.description.joints}
     for link in _children(root, 'link'):
@@ -180,7 +178,7 @@ def _scaled(robot: Robot, shares: FloatArray) -> str:
 
 
 def _set_inertial(link: minidom.Element, parameters: FloatArray) -> None:
-    """Write inertial parameters to a URDF link: mass, centre of mass, and inertia about this."""
+    """Write inertial parameters to a URDF link as mass, centre of mass and inertia."""
     body = pin.Inertia.FromDynamicParameters(parameters)
     values = {
         'origin': {'xyz': ' '.join(map(repr, body.lever.tolist())), 'rpy': '0 0 0'},
@@ -198,7 +196,7 @@ def _set_inertial(link: minidom.Element, parameters: FloatArray) -> None:
 
 
 def _check(robot: Robot, urdf: str) -> None:
-    """Raise ModelError if a URDF, read again, does not have the inertial parameters of a robot."""
+    """Raise ModelError if a written URDF has other inertial parameters than the robot."""
     found, wanted = _parameters(robot, urdf), robot.rigid_parameters.reshape(-1, PER_LINK)
     worst = np.max(np.abs(found - wanted), axis=1)
     scale = float(np.max(np.abs(wanted)))
