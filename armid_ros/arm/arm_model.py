@@ -44,7 +44,7 @@ import numpy.typing as npt
 @dataclass(frozen=True, repr=False)
 class ArmModel:
     """
-    A rigid body plus effects: tau = Y pi + sum over effects of tau_e(motion; theta_e).
+    Rigid body with effects: tau = Y pi + sum over effects of tau_e(motion; theta_e).
 
     Motions are sensor readings, and the model includes the errors of these sensors.
 
@@ -99,7 +99,7 @@ class ArmModel:
         joints: Sequence[str] | None = None,
     ) -> ArmModel:
         """
-        Make an arm model from a robot description and a list of effects.
+        Create an arm model from a robot description and a list of effects.
 
         Parameters
         ----------
@@ -148,7 +148,7 @@ class ArmModel:
         return '\n'.join(lines)
 
     def with_effect(self, effect: Effect, values: npt.ArrayLike | None = None) -> ArmModel:
-        """Return the arm with a further effect, whose parameters are zero by default."""
+        """Return the arm with an additional effect, whose parameters are zero by default."""
         if values is None:
             values = np.zeros(len(effect.parameters(self.robot)))
         array = np.asarray(values, dtype=float)
@@ -156,7 +156,7 @@ class ArmModel:
 
     @property
     def parameters(self) -> tuple[ParameterName, ...]:
-        """Return the names of the P standard parameters: rigid body first, then effects."""
+        """Names of the P standard parameters: of the rigid body, then of the effects."""
         names = list(rigid_parameter_names(self.robot))
         for effect in self.effects:
             names.extend(effect.parameters(self.robot))
@@ -164,7 +164,7 @@ class ArmModel:
 
     @property
     def theta(self) -> FloatArray:
-        """Return the values of the standard parameters, shape (P,)."""
+        """Values of the P standard parameters, shape (P,)."""
         return np.concatenate([self.robot.rigid_parameters, *self.values])
 
     def with_theta(self, theta: npt.ArrayLike) -> ArmModel:
@@ -176,23 +176,23 @@ class ArmModel:
         return replace(self, robot=self.robot.with_inertias(parts[0]), values=tuple(parts[1:]))
 
     def values_of(self, effect: Effect) -> FloatArray:
-        """Return the parameter values of an effect (P_e,); zeros if the arm lacks the effect."""
+        """Return the parameter values of an effect; zeros if the arm does not have it."""
         for own, values in zip(self.effects, self.values, strict=True):
             if own == effect:
                 return values
         return np.zeros(len(effect.parameters(self.robot)))
 
     def action(self) -> Action:
-        """Return the merged action of all effects on robot, joint torques and sensors."""
+        """Return the terms that all effects together add to robot, torques and sensors."""
         return self._acting
 
     def __getstate__(self) -> dict[str, Any]:
-        """Return the fields for pickling, without cached functions, which cannot be pickled."""
+        """Return the fields for pickling, without cached functions."""
         return {part.name: getattr(self, part.name) for part in fields(self)}
 
     @cached_property
     def _acting(self) -> Action:
-        """Return the merged action of all effects, computed once."""
+        """Return the combined action of all effects, computed once."""
         robot = self.robot
         pairs = list(zip(self.effects, self.values, strict=True))
         for effect, values in pairs:
@@ -204,7 +204,7 @@ class ArmModel:
 
     @property
     def body(self) -> Robot:
-        """Return the rigid body, including effects that change it, such as a payload."""
+        """Return the rigid body including effects that change it, such as a payload."""
         assert self._acting.robot is not None
         return self._acting.robot
 
@@ -215,7 +215,7 @@ class ArmModel:
         return self if known else replace(self, effects=effects)
 
     def link_motion(self, motion: Motion) -> Motion:
-        """Return the true motion of the links, given the motion that sensors recorded."""
+        """Return the true motion of the links for a motion that sensors recorded."""
         displacement = self._acting.displacement
         if displacement is None:
             return motion
@@ -225,11 +225,11 @@ class ArmModel:
         )
 
     def link_frames(self, motion: Motion) -> LinkFrames:
-        """Return the frames of all links along a recorded motion."""
+        """Return the frames of all links in each sample of a recorded motion."""
         return LinkFrames.of(self.robot, self.link_motion(motion).q)
 
     def load(self, motion: Motion) -> FloatArray:
-        """Return the rigid-body torque along a motion of the links, shape (N, n) [N m]."""
+        """Return the rigid-body torque for a motion of the links, shape (N, n) [N m]."""
         return inverse_dynamics(self.body, self.rigid_body_motion(motion))
 
     def body_columns(self, motion: Motion) -> FloatArray:
@@ -237,19 +237,19 @@ class ArmModel:
         return regressor(self.body, self.rigid_body_motion(self.link_motion(motion)))
 
     def gravity_columns(self, motion: Motion) -> FloatArray:
-        """Differentiate the rigid-body torque by the gravity vector, shape (N, n, 3)."""
+        """Return the derivatives of the rigid-body torque by the gravity vector, (N, n, 3)."""
         return gravity_sensitivity(self.body, self.link_motion(motion).q)
 
     def smoothed(self, motion: Motion) -> Motion:
-        """Return a recorded motion without frequencies above its ``band_hz``."""
+        """Return a recorded motion without frequencies above its band limit ``band_hz``."""
         return smoothed(motion)
 
     def load_derivatives(self, motion: Motion) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Differentiate the rigid-body torque by q, dq and ddq, each (N, n, n)."""
+        """Return the derivatives of the rigid-body torque by q, dq and ddq, (N, n, n) each."""
         return inverse_dynamics_derivatives(self.body, self.rigid_body_motion(motion))
 
     def link_torque_derivatives(self, motion: Motion) -> tuple[FloatArray, FloatArray] | None:
-        """Differentiate torques of effects on the links by q and dq; None without such effects."""
+        """Return derivatives of the effects' torques on links by q and dq; None without any."""
         law = self.along(motion).action().link_torque
         return None if law is None else law_derivatives(law, self.link_motion(motion))
 
@@ -298,13 +298,13 @@ class ArmModel:
         return tau if reading is None else reading(motion, tau)
 
     def rigid_columns(self, motion: Motion) -> FloatArray:
-        """Differentiate the torque readings by the rigid-body parameters, (N, n, 10 n)."""
+        """Return derivatives of the torque readings by the rigid-body parameters, (N, n, 10 n)."""
         columns = self.body_columns(motion)
         return self._as_read(motion, self.with_load_friction(motion, columns))
 
     def columns_of(self, effect: Effect, motion: Motion) -> FloatArray:
         """
-        Differentiate the torque readings by the parameters of one effect.
+        Return derivatives of the torque readings by the parameters of one effect.
 
         Parameters
         ----------
@@ -325,14 +325,14 @@ class ArmModel:
         return self._as_read(motion, columns, effect)
 
     def effect_columns(self, motion: Motion) -> FloatArray:
-        """Differentiate the torque readings by the parameters of all effects, (N, n, P - 10 n)."""
+        """Return derivatives of the torque readings by all effect parameters, (N, n, P - 10 n)."""
         blocks = [self.columns_of(effect, motion) for effect in self.effects]
         empty = np.empty((len(motion), motion.n_joints, 0))
         return np.concatenate([empty, *blocks], axis=2)
 
     def columns(self, motion: Motion) -> FloatArray:
         """
-        Differentiate the torque readings by all ``parameters``, shape (N, n, P).
+        Return derivatives of the torque readings by all ``parameters``, shape (N, n, P).
 
         The result is the derivative of ``torque``. Effects that depend on the load of a joint use
         the load at the present parameter values.
@@ -342,7 +342,7 @@ class ArmModel:
 
     def torque_change(self, motion: Motion, change: Displacement) -> FloatArray:
         """
-        Return the change of the true joint torque due to a change of the links' motion.
+        Return how the true joint torque changes with a small change of the links' motion.
 
         Parameters
         ----------
@@ -368,7 +368,7 @@ class ArmModel:
         return columns
 
     def torque_before(self, effect: Effect, motion: Motion) -> FloatArray:
-        """Return the torque that a sensor effect converts to a reading, shape (N, n) [N m]."""
+        """Return the torque that a sensor effect turns into a reading, shape (N, n) [N m]."""
         tau = self.joint_torque(motion)
         for own, values in self._readings:
             if own == effect:
@@ -377,7 +377,7 @@ class ArmModel:
         return tau
 
     def neighbours(self, period: float) -> int:
-        """Return the number of samples on each side of a sample that affect its torque reading."""
+        """Return how many samples on each side of a sample influence its torque reading."""
         action = self._acting
         if action.displacement is None and action.reading_memory == 0.0:  # noqa: RUF069 - of laws, never computed
             return 0
@@ -386,7 +386,7 @@ class ArmModel:
 
     @cached_property
     def _readings(self) -> list[tuple[TorqueReading, FloatArray]]:
-        """Return the effects that act on torque readings, with their parameter values."""
+        """Return the sensor effects on torque, with their parameter values."""
         pairs = zip(self.effects, self.values, strict=True)
         return [(e, values) for e, values in pairs if isinstance(e, TorqueReading)]
 
@@ -410,7 +410,7 @@ class ArmModel:
         return columns
 
     def with_load_friction(self, motion: Motion, columns: FloatArray) -> FloatArray:
-        """Add derivatives of load-dependent friction to derivatives of the load, (N, n, P)."""
+        """Add to derivatives of the load those of load-dependent friction, (N, n, P)."""
         friction = self._acting.dry_friction
         if friction is None or friction.load_share is None:
             return columns
@@ -420,14 +420,14 @@ class ArmModel:
         return np.asarray(columns + along @ (gain[:, :, np.newaxis] * (along.T @ columns)))
 
     def rigid_body_motion(self, motion: Motion) -> Motion:
-        """Return the motion, with zero velocity and acceleration if the arm is quasi-static."""
+        """Return the motion; if the arm is quasi-static, with zero velocity and acceleration."""
         return motion.at_rest() if self.quasi_static else motion
 
     def base_parameters(
         self, rng: np.random.Generator, free: npt.NDArray[np.intp] | None = None
     ) -> BaseParameters:
         """
-        Find the combinations of parameters that a suitable motion can identify.
+        Return the combinations of parameters that a suitable motion can identify.
 
         Parameters
         ----------

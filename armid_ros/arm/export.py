@@ -22,7 +22,7 @@ import numpy as np
 @dataclass(frozen=True)
 class Exported:
     """
-    Content of an exported URDF or MJCF, and parts of the arm that the format cannot contain.
+    Exported URDF or MJCF text, and what the arm has that the format cannot contain.
 
     Attributes
     ----------
@@ -90,7 +90,7 @@ def place_values(
     arm: ArmModel, attribute: Callable[[Effect], str]
 ) -> tuple[dict[str, dict[str, float]], tuple[str, ...]]:
     """
-    Return the effect parameters that a file format has, by attribute, and all others as text.
+    Return effect values by attribute of a file format, and values without attribute as text.
 
     The function ``attribute`` returns the attribute of the format for an effect, or an empty text.
     Effects that change the rigid body are part of its inertial parameters, and appear in neither
@@ -116,7 +116,7 @@ def place_values(
 
 def torque_check(exported: Exported, arm: ArmModel) -> dict[str, Any]:
     """
-    Compare joint torques that MuJoCo computes from an exported file with those of the arm.
+    Compare MuJoCo's joint torques for an exported file with the torques of the arm.
 
     Parameters
     ----------

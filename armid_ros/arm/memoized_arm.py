@@ -19,7 +19,7 @@ _Result = TypeVar('_Result')
 
 @dataclass
 class _Regressor:
-    """Cache entry: a recorded motion, its rigid-body regressor, and the filtered regressor."""
+    """Cache entry: a motion, its rigid-body regressor, and that regressor filtered."""
 
     motion: Motion
     columns: FloatArray
@@ -29,7 +29,7 @@ class _Regressor:
 @dataclass(frozen=True, repr=False)
 class _Memoized(ArmModel):
     """
-    Arm model that caches its torques and regressors for each motion.
+    Arm model that caches torques and regressors for each motion.
 
     Regressors depend on motion and gravity, not on inertial parameters, so copies share them.
 
@@ -39,11 +39,11 @@ class _Memoized(ArmModel):
 
     @cached_property
     def _known(self) -> dict[tuple[str, int], tuple[Motion, Any]]:
-        """Return the cached results, by name of the quantity and identity of the motion."""
+        """Return the cached results, by quantity and motion."""
         return {}
 
     def _once(self, name: str, motion: Motion, compute: Callable[[Motion], _Result]) -> _Result:
-        """Return a quantity along a motion from the cache; compute it at the first call."""
+        """Return a cached quantity along a motion; compute it at the first call."""
         key = name, id(motion)
         if key not in self._known:
             self._known[key] = motion, compute(motion)
@@ -51,17 +51,17 @@ class _Memoized(ArmModel):
         return result
 
     def link_motion(self, motion: Motion) -> Motion:
-        """Return the true motion of the links, given the motion that sensors recorded."""
+        """Return the true motion of the links for a motion that sensors recorded."""
         if self.action().displacement is None:
             return motion
         return self._once('link', motion, super().link_motion)
 
     def link_frames(self, motion: Motion) -> LinkFrames:
-        """Return the frames of all links along a recorded motion."""
+        """Return the frames of all links in each sample of a recorded motion."""
         return self._once('frames', motion, super().link_frames)
 
     def regressor(self, motion: Motion) -> _Regressor | None:
-        """Return and cache the rigid-body regressor of a motion; None if it cannot be cached."""
+        """Return the rigid-body regressor of a motion from the cache; None if not cacheable."""
         if self.action().displacement is not None:
             return None
         key = self._key(motion)
@@ -76,12 +76,12 @@ class _Memoized(ArmModel):
         return self.regressors[key]
 
     def _key(self, motion: Motion) -> tuple[object, ...]:
-        """Return the cache key of a regressor, made of motion, gravity and ``quasi_static``."""
+        """Return the cache key of a regressor: motion, gravity and ``quasi_static``."""
         places = (array.ctypes.data for array in (motion.q, motion.dq, motion.ddq))
         return *places, len(motion), tuple(self.body.gravity.tolist()), self.quasi_static
 
     def load(self, motion: Motion) -> FloatArray:
-        """Return the rigid-body torque along a motion of the links, shape (N, n) [N m]."""
+        """Return the rigid-body torque for a motion of the links, shape (N, n) [N m]."""
         known = self.regressors.get(self._key(motion))
         if known is not None:
             return known.columns @ self.body.rigid_parameters
@@ -93,19 +93,19 @@ class _Memoized(ArmModel):
         return self._once('body', motion, super().body_columns) if known is None else known.columns
 
     def gravity_columns(self, motion: Motion) -> FloatArray:
-        """Differentiate the rigid-body torque by the gravity vector, shape (N, n, 3)."""
+        """Return the derivatives of the rigid-body torque by the gravity vector, (N, n, 3)."""
         return self._once('gravity', motion, super().gravity_columns)
 
     def smoothed(self, motion: Motion) -> Motion:
-        """Return a recorded motion without frequencies above its ``band_hz``."""
+        """Return a recorded motion without frequencies above its band limit ``band_hz``."""
         return self._once('smooth', motion, super().smoothed)
 
     def load_derivatives(self, motion: Motion) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Differentiate the rigid-body torque by q, dq and ddq, each (N, n, n)."""
+        """Return the derivatives of the rigid-body torque by q, dq and ddq, (N, n, n) each."""
         return self._once('derivatives', motion, super().load_derivatives)
 
     def link_torque_derivatives(self, motion: Motion) -> tuple[FloatArray, FloatArray] | None:
-        """Differentiate torques of effects on the links by q and dq; None without such effects."""
+        """Return derivatives of the effects' torques on links by q and dq; None without any."""
         return self._once('holding', motion, super().link_torque_derivatives)
 
     def joint_torque(self, motion: Motion) -> FloatArray:
@@ -114,21 +114,21 @@ class _Memoized(ArmModel):
 
 
 def memoized_arm(arm: ArmModel) -> ArmModel:
-    """Return the arm model with caches of torques and regressors."""
+    """Return an equal arm model that caches torques and regressors."""
     if isinstance(arm, _Memoized):
         return arm
     return _Memoized(arm.robot, arm.effects, arm.values, arm.quasi_static)
 
 
 def plain_arm(arm: ArmModel) -> ArmModel:
-    """Return the arm model without caches."""
+    """Return an equal arm model without caches."""
     return ArmModel(arm.robot, arm.effects, arm.values, arm.quasi_static)
 
 
 def rigid_rows(
     arm: ArmModel, motion: Motion, reduce: Callable[[FloatArray], FloatArray]
 ) -> FloatArray:
-    """Return filtered derivatives of torque readings by rigid-body parameters, (M, n, 10 n)."""
+    """Return filtered derivatives of torque readings by inertial parameters, (M, n, 10 n)."""
     columns = arm.rigid_columns(motion)
     known = arm.regressor(motion) if isinstance(arm, _Memoized) else None
     if known is None or known.columns is not columns:

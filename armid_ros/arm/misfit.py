@@ -28,7 +28,7 @@ _DATA = ('held-out', 'training')
 
 class RowFilters(NamedTuple):
     """
-    Filters of the identification data: sampling rate and cut-off [Hz], and decimation.
+    Filters that an identification used: sampling rate and cut-off [Hz], and decimation.
 
     The fields are those of `armid_ros.identification.rows.signals.Conditioning`.
 
@@ -42,7 +42,7 @@ class RowFilters(NamedTuple):
 @dataclass(frozen=True)
 class Misfit:
     """
-    Residual of a model on the recordings of its identification, by joint.
+    Residual of a model on the recordings from which it was identified, for each joint.
 
     Attributes
     ----------
@@ -73,7 +73,7 @@ class Misfit:
     filters: RowFilters | None = None
 
     def document(self) -> dict[str, Any]:
-        """Return the block ``misfit`` of model.yaml as a dictionary."""
+        """Return the misfit as the block ``misfit`` of model.yaml."""
         block = {
             'unit': 'N m',
             'data': self.data,
@@ -88,7 +88,7 @@ class Misfit:
 
     def of(self, robot: Robot, torque_rms: FloatArray | None = None) -> FloatArray:
         """
-        Return the root mean square residual of each joint of a robot, shape (n,) [N m].
+        Return the rms residual of each joint of a robot, shape (n,) [N m].
 
         Parameters
         ----------
@@ -117,12 +117,12 @@ class Misfit:
 
 
 def growth(now: FloatArray, before: FloatArray) -> FloatArray:
-    """Return the ratio of the present to an earlier rms torque of each joint, at least 1."""
+    """Return the ratio (at least 1) of present to earlier rms torque of each joint."""
     return np.asarray(np.maximum(now / np.maximum(before, 1e-12), 1.0))
 
 
 def misfit_of_block(block: Any) -> Misfit:
-    """Return the misfit in the block ``misfit`` of a model.yaml."""
+    """Read the misfit from the block ``misfit`` of a model.yaml."""
     try:
         rms, torque = _torques(block['rms']), block.get('torque_rms')
         loud = None if torque is None else _torques(torque)
@@ -144,7 +144,7 @@ def misfit_of_block(block: Any) -> Misfit:
 
 
 def _torques(block: Any) -> dict[str, float]:
-    """Return rms torques by joint from a block of model.yaml; ModelError if any is negative."""
+    """Read rms torques by joint from a block of model.yaml; ModelError if one is negative."""
     torques = {
         str(joint): finite(value, f"misfit of joint '{joint}'") for joint, value in block.items()
     }

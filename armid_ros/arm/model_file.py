@@ -45,7 +45,7 @@ def model_text(
     arm: ArmModel, robot: str, estimate: Estimate | None = None, misfit: Misfit | None = None
 ) -> str:
     """
-    Return the content of model.yaml for an arm model.
+    Return an arm model as the text of a model.yaml.
 
     Parameters
     ----------
@@ -99,7 +99,7 @@ def save_model(
     misfit: Misfit | None = None,
 ) -> None:
     """
-    Write an arm model to model.yaml.
+    Write an arm model to a file model.yaml.
 
     Parameters
     ----------
@@ -133,7 +133,7 @@ def save_model(
 
 def load_model(path: str | Path, robot: Robot | ArmModel | str | Path | None = None) -> ArmModel:
     """
-    Read an arm model from model.yaml.
+    Read an arm model from a file model.yaml.
 
     Parameters
     ----------
@@ -184,7 +184,7 @@ def load_model(path: str | Path, robot: Robot | ArmModel | str | Path | None = N
 
 def load_misfit(path: str | Path) -> Misfit | None:
     """
-    Read the misfit of a model from model.yaml; None if the file has no misfit.
+    Read the misfit in a model.yaml; None if the file has none.
 
     Parameters
     ----------
@@ -228,7 +228,7 @@ def read_model(text: str, robot: Robot, source: str) -> ArmModel:
 
 
 def add_effect(arm: ArmModel, effect: Effect, values: FloatArray) -> ArmModel:
-    """Add an effect to an arm, or add its values to those of the same effect in the arm."""
+    """Add an effect to an arm; if the arm has this effect already, add the values."""
     there = _find_effect(arm, effect)
     if there is None:
         named = effect.named_as(values, arm)
@@ -244,7 +244,7 @@ def add_effect(arm: ArmModel, effect: Effect, values: FloatArray) -> ArmModel:
 
 
 def _find_effect(arm: ArmModel, effect: Effect) -> tuple[int, list[int]] | None:
-    """Return indices of an effect and its parameters in the arm; None if the effect is missing."""
+    """Return the index of an effect in the arm and those of its parameters, or None."""
     wanted = [(p.name, p.joint) for p in effect.parameters(arm.robot)]
     for position, own in enumerate(arm.effects):
         if isinstance(effect, type(own)) and not own.shapes and not own.points:
@@ -255,7 +255,7 @@ def _find_effect(arm: ArmModel, effect: Effect) -> tuple[int, list[int]] | None:
 
 
 def _with_catalogue_effects(arm: ArmModel) -> ArmModel:
-    """Replace effects that only searches use, such as a gravity vector, by catalogue effects."""
+    """Replace effects that only searches use by equivalent effects of the catalogue."""
     # a gravity vector, for example, becomes a tilt of the base and a magnitude of gravity
     converted = replace(arm, effects=(), values=())
     for effect, values in zip(arm.effects, arm.values, strict=True):
@@ -302,7 +302,7 @@ def checked_model(text: str) -> dict[str, Any]:
 
 
 def _wrong_unit(row: Mapping[str, Any], units: Collection[str]) -> str:
-    """Return an error message if the unit of a parameter is wrong; empty if right or missing."""
+    """Return a message if the unit of a parameter is wrong; empty if right or not given."""
     if not units or row.get('unit', next(iter(units))) in units:
         return ''
     expected = ' or '.join(f"'{unit}'" for unit in units)
@@ -312,7 +312,7 @@ def _wrong_unit(row: Mapping[str, Any], units: Collection[str]) -> str:
 def _rows(
     document: Mapping[str, Any], text: str
 ) -> Iterator[tuple[tuple[str | int, ...], Any, tuple[str, ...]]]:
-    """Yield the keys, the entry and the permitted units of each parameter in model.yaml."""
+    """Yield the keys, the content and the permitted units of each parameter of model.yaml."""
     for k, row in enumerate(document['rigid_parameters']):
         unit = link_unit(_name(row))
         yield ('rigid_parameters', k), row, (unit,) if unit else ()
@@ -330,7 +330,7 @@ def _rows(
 
 
 def _problem(row: Any, units: tuple[str, ...]) -> tuple[str, str]:
-    """Return key and message of a fault in a parameter's entry; without fault, no message."""
+    """Return key and message of a fault in a parameter's entry; empty texts if no fault."""
     keys = ', '.join(_KEYS_OF_PARAMETER)
     if not isinstance(row, dict):
         return '', f'a parameter has {keys}, but this entry is {str(row)[:40]!r}'
@@ -356,17 +356,17 @@ def _require(content: Mapping[str, Any], keys: Collection[str], part: str) -> No
 
 
 def _name(row: Any) -> str:
-    """Return the parameter name in an entry of model.yaml; empty if the entry has no keys."""
+    """Return the parameter name in an entry of model.yaml; empty if it is not a mapping."""
     return str(row.get('name')) if isinstance(row, dict) else ''
 
 
 def _called(row: Mapping[str, Any]) -> str:
-    """Return the parameter name and joint in an entry of model.yaml as text for error messages."""
+    """Return an entry's parameter name and joint as text for error messages."""
     return f"parameter '{row.get('name')}' of joint '{row.get('joint')}'"
 
 
 def _arm(document: dict[str, Any], robot: Robot) -> ArmModel:
-    """Return the arm model that the document of a checked model.yaml describes."""
+    """Return the arm model that the content of a checked model.yaml describes."""
     try:
         gravity = [finite(part, 'gravity') for part in document['gravity']]
         arm = ArmModel(robot.with_gravity(np.array(gravity).reshape(3)))
@@ -391,7 +391,7 @@ def _arm(document: dict[str, Any], robot: Robot) -> ArmModel:
 
 
 def _values(rows: Sequence[dict[str, Any]], names: Sequence[ParameterName]) -> FloatArray:
-    """Return parameter values from entries of model.yaml; each parameter has to occur once."""
+    """Return parameter values from entries of model.yaml; each name must occur exactly once."""
     table: dict[tuple[str, str], dict[str, Any]] = {}
     units = {(name.name, name.joint): [name.unit] for name in names}
     for row in rows:

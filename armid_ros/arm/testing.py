@@ -36,7 +36,7 @@ _STEP = 1e-6
 @dataclass(frozen=True)
 class EffectCase:
     """
-    Test case: an effect on a robot, with parameter values and a motion.
+    Test case of an effect: robot, parameter values and motion.
 
     Attributes
     ----------
@@ -66,7 +66,7 @@ class EffectCase:
         seed: int = 3,
     ) -> EffectCase:
         """
-        Make a test case of a class of effects, with random values and a smooth motion.
+        Create a test case for an effect class, with random values and a smooth motion.
 
         Parameters
         ----------
@@ -96,16 +96,16 @@ class EffectCase:
         return cls(effect, robot, motion, np.clip(values, *effect.bounds()))
 
     def arm(self, values: npt.ArrayLike) -> ArmModel:
-        """Return the arm model with the effect at given parameter values."""
+        """Return the arm model that has the effect with given parameter values."""
         return ArmModel(self.robot).with_effect(self.effect, values)
 
     def torque(self, values: FloatArray) -> FloatArray:
-        """Return the torque of the arm with the effect along the motion, shape (N, n)."""
+        """Return the arm's torque with the effect along the motion, shape (N, n)."""
         return np.asarray(self.arm(values).torque(self.motion))
 
 
 def sines(robot: Robot, duration: float = 0.5, rate: float = 200.0) -> Motion:
-    """Return a motion in which each joint follows a different sine within its limits."""
+    """Return a motion in which each joint follows a sine of its own within its limits."""
     t = np.arange(0.0, duration, 1.0 / rate)
     frequency = 2.0 * np.pi * np.linspace(0.4, 2.1, robot.n_joints)
     phase = frequency * t[:, np.newaxis] + np.arange(robot.n_joints)
@@ -123,7 +123,7 @@ def sines(robot: Robot, duration: float = 0.5, rate: float = 200.0) -> Motion:
 
 def check_effect(kind: type[Effect], robot: Robot | None = None) -> None:
     """
-    Check that an effect class keeps the contract of `Effect`; raise AssertionError if not.
+    Raise AssertionError if an effect class does not fulfil the contract of `Effect`.
 
     Parameters
     ----------
@@ -240,7 +240,7 @@ def effect_can_be_pickled(trial: EffectCase) -> None:
 
 
 def _compare(trial: EffectCase, values: FloatArray, columns: FloatArray) -> None:
-    """Compare an effect's columns with finite differences of torque, one-sided at lower bounds."""
+    """Fail if an effect's columns differ from finite differences of the torque."""
     lower, _ = trial.effect.bounds()
     for parameter, step in enumerate(_STEP * np.eye(len(values))):
         if values[parameter] - _STEP > lower[parameter]:

@@ -16,7 +16,7 @@ import numpy as np
 @dataclass(frozen=True)
 class TorqueSlope:
     """
-    Derivatives of the true joint torque of an arm by q, dq and ddq along a motion.
+    Derivatives of an arm's true joint torque by q, dq and ddq along a motion.
 
     The torque is that of ``ArmModel.joint_torque``. The direction of motion in dry friction, and
     the twist between motors and links, are held constant.
@@ -59,7 +59,7 @@ class TorqueSlope:
 
     def pullback(self, weights: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """
-        Differentiate a weighted sum of all joint torques by q, dq and ddq.
+        Return the derivatives by q, dq and ddq of a weighted sum of all joint torques.
 
         Parameters
         ----------
