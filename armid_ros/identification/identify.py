@@ -90,7 +90,7 @@ class IdentificationSettings:
     prefers_bodies: bool = False
 
     def __post_init__(self) -> None:
-        """Check that the method exists, and that it permits physical constraints if requested."""
+        """Check that the method exists, and that it allows physical constraints if requested."""
         if self.method not in ESTIMATORS:
             raise IdentificationError(
                 f"method '{self.method}' does not exist; use {', '.join(ESTIMATORS)}"
@@ -102,7 +102,7 @@ class IdentificationSettings:
 
     @property
     def least_squares(self) -> Method:
-        """Return the method of least squares, also of the first fit for instrumental variables."""
+        """Return the least-squares method, also that before instrumental variables."""
         return 'wls' if self.method == 'iv' else self.method
 
     @property
@@ -302,7 +302,7 @@ def _fit_consistent_links(
     settings: IdentificationSettings,
     rng: np.random.Generator,
 ) -> tuple[IdentificationSettings, BaseParameters, FittedValues, PhysicalCertificate] | None:
-    """Fit physically consistent links; None if not requested, or if optional and infeasible."""
+    """Fit physically consistent links; None if not requested, or optional but infeasible."""
     if settings.method == 'iv' or not (settings.physical or settings.prefers_bodies):
         return None
     constraints = settings.physical or PhysicalSettings()
@@ -324,7 +324,7 @@ def _fitted(
     settings: IdentificationSettings,
     rng: np.random.Generator,
 ) -> tuple[BaseParameters, FittedValues]:
-    """Return the identifiable base parameters, and a fit of the parameters that data determine."""
+    """Return the identifiable base parameters, and a fit of those that the data determine."""
     base, problem, recordings, used = data
     method, rigid = settings.least_squares, len(arm.robot.rigid_parameters)
     refitted = False
@@ -351,7 +351,7 @@ def _fit_quasi_static(
     method: Method,
     rng: np.random.Generator,
 ) -> tuple[FittedValues, tuple[str, ...]]:
-    """Fit weight and friction to slow motions with the described inertia; return fit and notes."""
+    """Fit weight and friction to slow motions; inertia is as described. Return fit and notes."""
     base, problem, recordings, used = data
     problem = exact_at(problem, torques(arm, recordings, used), base.values(arm.theta))
     free = unidentifiable_directions(arm, arm.base_parameters(rng))
@@ -395,7 +395,7 @@ def _require_samples(
     columns: Sequence[Regression],
     used: Conditioning,
 ) -> None:
-    """Raise an error if a recording is too short, or for fewer than two torques per parameter."""
+    """Raise an error if a recording is too short, or all have too few torques for the fit."""
     filtered = {part.source for part in columns}
     for recording in recordings:
         if recording.source not in filtered:
@@ -411,7 +411,7 @@ def _require_samples(
 
 
 def _remarks(fit: FittedValues, theory: BaseParameters) -> tuple[str, ...]:
-    """Return notes on grouped parameters, outliers and missing convergence of a fit."""
+    """Return notes on grouped parameters, outliers and failed convergence of a fit."""
     remarks = []
     if fit.base.rank < theory.rank:
         remarks.append(

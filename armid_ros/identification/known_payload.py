@@ -33,7 +33,7 @@ from scipy.stats import t as student
 @dataclass(frozen=True)
 class DriveGains:
     """
-    Gain of each drive: measured effort over the torque of the drive.
+    Gain of each drive: ratio of measured effort to joint torque.
 
     Attributes
     ----------
@@ -88,7 +88,7 @@ def payloads_of(
     texts: Sequence[str], recordings: Sequence[Recording], robot: Robot
 ) -> Mapping[str, Robot]:
     """
-    Return the robot with payload for each recording with a payload, by the recording's path.
+    Return the robot model with its payload for each recording made with one, by path.
 
     Raises
     ------
@@ -219,7 +219,7 @@ def drive_gains(
 def _gain(
     columns: FloatArray, known: FloatArray, tau: FloatArray, blocks: FloatArray
 ) -> tuple[float, float, float]:
-    """Return the gain of a drive, its standard deviation, and the 95 % interval's half width."""
+    """Return gain of a drive, its standard deviation, and half the width of its 95 % interval."""
     scale = np.linalg.norm(columns, axis=0)
     columns = columns[:, scale > 0.0] / scale[scale > 0.0]
     # regression of the effort's residual on that of the payload's torque (Frisch and Waugh)
@@ -246,7 +246,7 @@ def corrected(
     gains: DriveGains,
     signals: SignalSettings,
 ) -> list[Recording]:
-    """Return recordings with torques of the bare arm: efforts over gains, minus payload torque."""
+    """Convert efforts to torques of the bare arm: divide by gains, subtract payload torques."""
     result = []
     for recording in recordings:
         assert recording.tau is not None

@@ -113,7 +113,7 @@ def identification_document(
 
 def kinematics_digest(robot: Robot) -> str:
     """
-    Return a hexadecimal digest of the kinematics of a robot, equal for all its descriptions.
+    Return a hexadecimal digest of a robot's kinematics, equal for equivalent descriptions.
 
     The digest covers names, kinds, axes and placements of joints, and names of links, to a
     micrometre. It does not cover masses and gravity, which may be corrected later.
@@ -145,7 +145,7 @@ def write_document(path: str | Path, document: Mapping[str, Any]) -> None:
 
 
 def with_digests(document: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the content of identification.json with size and digest of each recording."""
+    """Add size and digest of each recording to the content of identification.json."""
     there = [(name, Path(name)) for name in _names(document)]
     rows = [{'bag': name, **_content(path)} for name, path in there if path.exists()]
     return {**document, 'recordings': rows}
@@ -153,7 +153,7 @@ def with_digests(document: Mapping[str, Any]) -> dict[str, Any]:
 
 def identified_from(path: str | Path) -> tuple[Path, ...]:
     """
-    Return the paths of the recordings that a model was identified from, if they exist.
+    Return the paths of the recordings that gave a model, if they still exist.
 
     Parameters
     ----------
@@ -173,7 +173,7 @@ def identified_from(path: str | Path) -> tuple[Path, ...]:
 
 def require_as_identified(path: str | Path) -> None:
     """
-    Raise an error if a recording that a model was identified from has changed since then.
+    Raise an error if a recording has changed since a model was identified from it.
 
     Parameters
     ----------
@@ -197,7 +197,7 @@ def require_as_identified(path: str | Path) -> None:
 
 
 def _content(path: Path) -> dict[str, Any]:
-    """Return the size of a recording [bytes], and a digest of both ends of its files."""
+    """Return size [bytes] and digest of a recording; the digest is of both ends of its files."""
     inside = sorted(path.rglob('*')) if path.is_dir() else [path]
     digest, total = hashlib.sha256(), 0
     end = 1 << 20  # bytes; enough for the time stamps at the beginning and the index at the end
@@ -215,7 +215,7 @@ def _content(path: Path) -> dict[str, Any]:
 
 
 def _found(model: Path) -> dict[Path, dict[str, Any] | None]:
-    """Return existing recordings that a model.yaml is identified from, with digests if known."""
+    """Return the existing recordings that gave a model.yaml, with digests if known."""
     file = model.with_name('identification.json')
     if not is_file(file):
         return {}
@@ -241,7 +241,7 @@ def _names(document: Mapping[str, Any]) -> list[str]:
 
 
 def _noise(result: Identification, noise: NoiseCheck) -> dict[str, Any]:
-    """Return the test of encoder noise as written to identification.json."""
+    """Return the test of encoder noise in the form of identification.json."""
     return {
         'statistic': noise.statistic,
         'degrees_of_freedom': noise.freedom,
@@ -254,7 +254,7 @@ def _noise(result: Identification, noise: NoiseCheck) -> dict[str, Any]:
 
 
 def _score(result: Identification, fits: Sequence[Fit]) -> dict[str, Any]:
-    """Return the torque errors of fits as written to identification.json."""
+    """Return the torque errors of fits in the form of identification.json."""
     score = Score.of(fits)
     return {
         'relative_error_percent': score.relative_error_percent,
@@ -264,5 +264,5 @@ def _score(result: Identification, fits: Sequence[Fit]) -> dict[str, Any]:
 
 
 def _by_joint(result: Identification, values: FloatArray) -> dict[str, float]:
-    """Return values of all joints, (n,), by the names of the joints."""
+    """Return values (n,) as a dictionary by joint name."""
     return dict(zip(result.arm.robot.joints, values.tolist(), strict=True))

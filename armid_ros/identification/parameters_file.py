@@ -34,7 +34,7 @@ _SCHEMAS = (SCHEMA, MODEL)
 @dataclass(frozen=True)
 class KnownFit:
     """
-    Torque error and grade of a model, from its identification.json.
+    Torque error and grade of a model, read from its identification.json.
 
     Attributes
     ----------
@@ -56,14 +56,14 @@ class KnownFit:
 
     @property
     def unusable(self) -> bool:
-        """Whether the grade of the model is unusable, as the model does not describe the arm."""
+        """Whether the model is graded unusable, so that it does not describe the arm."""
         return self.grade == 'unusable'
 
 
 @dataclass(frozen=True)
 class ParameterFile:
     """
-    Identified parameters of an arm with their uncertainty, from a file.
+    Identified parameters of an arm with their uncertainties, read from a file.
 
     Attributes
     ----------
@@ -106,13 +106,13 @@ class ParameterFile:
     fit: KnownFit | None = None
 
     def covariance_of(self, names: Sequence[ParameterName]) -> FloatArray:
-        """Return the covariance of the values of given parameters, shape (p, p)."""
+        """Return the covariance matrix (p, p) of given parameters."""
         assert self.covariance is not None
         chosen = self._positions(names)
         return np.asarray(self.covariance[np.ix_(chosen, chosen)])
 
     def scatter_of(self, names: Sequence[ParameterName]) -> FloatArray:
-        """Return the jackknife changes of the values of given parameters, shape (K, p)."""
+        """Return the jackknife changes (K, p) of given parameters, one row per recording."""
         if not len(self.scatter):
             return np.zeros((0, len(names)))
         return np.asarray(self.scatter[:, self._positions(names)])
@@ -138,7 +138,7 @@ class ParameterFile:
 
     def regrouped_as(self, other: ParameterFile) -> ParameterFile:
         """
-        Return this file's parameters, and base parameters of another file that follow from these.
+        Return the parameters, with another file's base parameters that follow from them.
 
         A motion with less excitation groups more standard parameters. Its base parameters are
         combinations of the base parameters of a motion with more excitation.
@@ -212,7 +212,7 @@ def read_parameters(path: str | Path) -> ParameterFile:
 
 
 def _identification_of(path: Path, model: Mapping[str, Any]) -> ParameterFile | None:
-    """Read the identification.json in the folder of a model.yaml; None if of a different model."""
+    """Read the identification.json beside a model.yaml; None if it is of another model."""
     # identification.json has the base parameters of the model and their covariance. It is of this
     # model if the model reproduces the value of every base parameter.
     file = path.with_name('identification.json')
@@ -242,7 +242,7 @@ def _identification_of(path: Path, model: Mapping[str, Any]) -> ParameterFile | 
 
 def read_misfit(path: str | Path, arm: ArmModel) -> Misfit | None:
     """
-    Read the misfit of a model: the residual on its training data; None if unknown.
+    Read a model's residual on its training data; None if it is unknown.
 
     Parameters
     ----------
@@ -333,7 +333,7 @@ def _matrix(rows: Sequence[Mapping[str, float]], keys: Sequence[str]) -> FloatAr
 
 def known_fit(document: Mapping[str, Any]) -> KnownFit | None:
     """
-    Return torque error and grade in the content of identification.json; None if they are absent.
+    Return torque error and grade from the content of identification.json; None if absent.
 
     Raises
     ------
@@ -358,7 +358,7 @@ def known_fit(document: Mapping[str, Any]) -> KnownFit | None:
 
 
 def _covariance(rows: list[list[float]] | None, size: int) -> FloatArray | None:
-    """Return the covariance matrix from the rows of its lower triangle; None if `rows` is None."""
+    """Return a covariance matrix from the rows of its lower triangle; None if `rows` is None."""
     if rows is None:
         return None
     if [len(row) for row in rows] != list(range(1, size + 1)):

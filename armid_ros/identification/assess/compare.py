@@ -110,7 +110,7 @@ def compare(before: ParameterFile, after: ParameterFile) -> Comparison:
 
 
 def _check_comparable(before: ParameterFile, after: ParameterFile) -> None:
-    """Raise an error unless two results are of the same robot, differ and have covariances."""
+    """Raise an error unless two results are of one robot, differ, and have covariances."""
     for file in (before, after):
         if file.covariance is None:
             raise ModelError(
@@ -136,7 +136,7 @@ def _check_comparable(before: ParameterFile, after: ParameterFile) -> None:
 
 
 def _only_in(one: ParameterFile, other: ParameterFile) -> Iterator[NotCompared]:
-    """Yield parameters of a result that another result lacks, with the reason of each absence."""
+    """Yield the parameters that only one of two results has, with the reasons."""
     for name in one.values:
         if name in other.values:
             continue
@@ -150,7 +150,7 @@ def _single_changes(
     before: ParameterFile, after: ParameterFile, names: Sequence[ParameterName]
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """
-    Return values and standard deviations of parameters in two results, and p-values of changes.
+    Return values and standard deviations of parameters in two results, and p-values.
 
     The shapes are (2, p), (2, p) and (p,). Standard deviations are those of noise. If the scatter
     between recordings exceeds the noise of a joint, they are multiplied by the ratio.
@@ -187,7 +187,7 @@ def _single_changes(
 def _common_change(
     before: ParameterFile, after: ParameterFile, names: Sequence[ParameterName]
 ) -> tuple[FloatArray, FloatArray, float]:
-    """Return parameter changes, covariance, and the p-value of the hypothesis of no change."""
+    """Return parameter changes, their covariance, and the p-value if nothing has changed."""
     files = before, after
     difference = np.array([after.values[name][0] - before.values[name][0] for name in names])
     covariance = sum((one.covariance_of(names) for one in files), np.zeros(()))
@@ -217,7 +217,7 @@ def _common_change(
 def _find_load(
     terms: Sequence[Mapping[str, float]], difference: FloatArray, covariance: FloatArray
 ) -> LoadChange | None:
-    """Return the payload, on the outermost possible link, that explains all changes, or None."""
+    """Return the payload that explains all changes, on the outermost possible link, or None."""
     std = np.sqrt(np.diag(covariance))
     if not len(std) or not np.all(std > 0.0):
         return None
@@ -259,7 +259,7 @@ def residual_changes(
     before: KnownFit | None, after: KnownFit | None
 ) -> tuple[ResidualChange, ...]:
     """
-    Return the change of each joint's root mean square residual between two identified models.
+    Return how each joint's root mean square residual differs between two models.
 
     Empty if a file has no residuals. Model errors vary slowly, so even many samples contain few
     independent values of them.

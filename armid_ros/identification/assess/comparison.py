@@ -45,7 +45,7 @@ class ParameterChange:
 
     @property
     def std(self) -> float:
-        """Return the standard deviation of the difference between the two values."""
+        """Return the standard deviation of the difference between both values."""
         return float(np.hypot(self.before_std, self.after_std))
 
     @property
@@ -140,7 +140,7 @@ class ResidualChange:
 @dataclass(frozen=True)
 class NotCompared:
     """
-    Parameter of one result that the other result lacks, with the reason of its absence.
+    Parameter that only one of two results has, with the reason.
 
     Attributes
     ----------
@@ -200,7 +200,7 @@ class Comparison:
     @property
     def factors(self) -> dict[str, float]:
         """
-        Return the median ratio of new to old parameters per joint, if most ratios are similar.
+        Return each joint's median ratio of new to old parameters, if these ratios agree.
 
         No load and no wear multiplies masses and friction of all joints by several times: the
         torques of one result are in another unit, or currents. Empty if the ratios differ.

@@ -47,7 +47,7 @@ def check_data(
     before: Sequence[Recording] = (),
 ) -> tuple[list[str], list[str]]:
     """
-    Return faults of recordings that make a diagnosis meaningless, and notes on smaller faults.
+    Return faults of recordings that prevent a diagnosis, and notes on smaller faults.
 
     Both contain remedies. `data` are the regression rows of the recordings. The torques of the
     baseline `before` have the unit of the model.
@@ -93,7 +93,7 @@ def mistaken_recordings(
     used: Conditioning,
 ) -> list[str]:
     """
-    Return the mistakes of single recordings in joint names, signs or units, with remedies.
+    Return mistakes in joint names, signs or units of single recordings, with remedies.
 
     Each recording is paired with a mask of joints, (n,), in which it differs from the other
     recordings. `check_data` finds a mistake that all recordings share.
@@ -150,7 +150,7 @@ def unit_faults(
 def _torque_ratios(
     arm: ArmModel, motions: Sequence[Motion], before: Sequence[Motion]
 ) -> FloatArray:
-    """Return each joint's measured over modelled torque, relative to any baseline; 0: unknown."""
+    """Return each joint's ratio of measured to modelled torque; 0 if unknown."""
     best, factors = np.full((2, arm.robot.n_joints), 0.0)
     if not motions:
         return factors
@@ -199,7 +199,7 @@ def _missing_friction(arm: ArmModel) -> list[str]:
 
 
 def _limit_notes(robot: Robot, recording: Recording) -> Iterator[str]:
-    """Yield notes on joints whose torque saturates, or exceeds the limit of the drive."""
+    """Yield notes on joints whose torque saturates or exceeds the drive's limit."""
     if recording.tau is None:
         return
     source = recording.source or 'recording'

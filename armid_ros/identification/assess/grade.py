@@ -142,7 +142,7 @@ def grade(
 def _torque_errors(
     result: Identification, worst: Mapping[str | None, _WorstJoint], held_out: Sequence[Fit]
 ) -> Iterator[Fault]:
-    """Yield reasons of a grade: largest torque error, and torques that are hardly predicted."""
+    """Yield reasons of a grade: the largest torque error, and hardly predicted torques."""
     use = {
         'good': '',
         'poor': ', too large to compute torques',
@@ -233,7 +233,7 @@ def _resting(result: Identification, validation: Mapping[str, Sequence[Fit]]) ->
 
 def beyond_noise(errors: FloatArray, fits: Sequence[Fit], used: Conditioning) -> FloatArray:
     """
-    Return the relative torque error of each joint after subtraction of white sensor noise [%].
+    Return each joint's relative torque error after subtraction of white sensor noise [%].
 
     The noise is computed from the median of second differences (Gasser, Sroka and Jennen-Steinmetz
     1986): torques of motion change little from row to row, and friction jumps in few rows only.

@@ -19,7 +19,7 @@ FREEDOM = 8
 @dataclass(frozen=True)
 class GradeLimits:
     """
-    Limits of the grades of an identification, and of the tests for mistakes in recordings.
+    Limits for the grades of an identification, and for tests of mistakes in recordings.
 
     Attributes
     ----------

@@ -31,7 +31,7 @@ QUANTITIES: tuple[Quantity, ...] = ('position and torque', 'position', 'torque')
 @dataclass(frozen=True, eq=False)
 class Hypothesis:
     """
-    Possible mistake in a recording, with functions that correct the data or the description.
+    Possible mistake in a recording, and how to correct the data or the description.
 
     Attributes
     ----------
@@ -63,12 +63,12 @@ class Hypothesis:
 
     @property
     def of_masses(self) -> bool:
-        """Whether one wrong factor of all described masses would explain the data equally well."""
+        """Whether one common factor on all described masses would explain the data as well."""
         return self.kind in ('gravity', 'scale', 'units')
 
     @property
     def of_data(self) -> bool:
-        """Whether only an error of the data, and no change of the arm, explains the torques."""
+        """Whether only faulty data, and not a changed arm, would explain the torques."""
         return self.kind in ('units', 'unit', 'degrees', 'sign', 'exchange')
 
 
@@ -83,7 +83,7 @@ WITHOUT_BODY = Hypothesis(
 
 def hypotheses(robot: Robot, motions: Sequence[Motion]) -> Iterator[Hypothesis]:
     """
-    Yield the hypotheses of mistakes to test in recorded motions, except torque delays.
+    Yield possible mistakes in recorded motions as hypotheses to test, but no torque delay.
 
     Only values beyond 2 pi are tested for degrees: even small angles in degrees exceed this.
 
@@ -121,7 +121,7 @@ def hypotheses(robot: Robot, motions: Sequence[Motion]) -> Iterator[Hypothesis]:
 
 
 def _gravity_and_scale(robot: Robot, motions: Sequence[Motion]) -> Iterator[Hypothesis]:
-    """Yield the hypotheses of another gravity and of a wrong factor of all torques."""
+    """Yield the hypotheses that gravity differs, and that all torques have a wrong factor."""
     motion = thinned(motions, 600)
     if motion is None:
         return
@@ -157,7 +157,7 @@ def _gravity_and_scale(robot: Robot, motions: Sequence[Motion]) -> Iterator[Hypo
 
 
 def in_unit(robot: Robot, joint: int, unit: str) -> Hypothesis:
-    """Return the hypothesis that the torque of a joint is recorded in a given wrong unit."""
+    """Return the hypothesis that a joint's torque was recorded in a given wrong unit."""
     wrong = FORCE_UNITS[unit] if robot.prismatic[joint] else unit
     right = robot.torque_units[joint]
     return Hypothesis(
@@ -170,7 +170,7 @@ def in_unit(robot: Robot, joint: int, unit: str) -> Hypothesis:
 
 
 def delayed(seconds: float, half_width: float) -> Hypothesis:
-    """Return the hypothesis that torques are delayed, with the 95 % interval of the delay [s]."""
+    """Return the hypothesis that torques lag by a delay with a given half-width [s]."""
     side = 'later' if seconds > 0.0 else 'earlier'
     return Hypothesis(
         'delay',
@@ -182,7 +182,7 @@ def delayed(seconds: float, half_width: float) -> Hypothesis:
 
 def shifted(motion: Motion, seconds: float) -> Motion:
     """
-    Return a motion with its positions shifted in time by the delay of the torque [s].
+    Shift the positions of a motion in time by the delay of the torque [s].
 
     The torque is not interpolated, as this would reduce its noise.
 
@@ -257,7 +257,7 @@ def other_gravity(robot: Robot, vector: FloatArray) -> Hypothesis | None:
 
 
 def _zero_off(robot: Robot, joint: int, degrees: float) -> Hypothesis:
-    """Return the hypothesis that the zero position of a joint's encoder is wrong by an angle."""
+    """Return the hypothesis that a joint's encoder zero is wrong by an angle [deg]."""
     shift = np.zeros(robot.n_joints)
     shift[joint] = -np.deg2rad(degrees)
     wrong = 180.0 - (180.0 - degrees) % 360.0
@@ -282,7 +282,7 @@ def _in_degrees(robot: Robot, joint: int | None = None) -> Hypothesis:
 
 
 def _beyond_masses(factor: float) -> bool:
-    """Return whether a factor of all torques is too large or small to be due to wrong masses."""
+    """Return whether a factor on all torques is too large or small for wrong masses."""
     return not 1.0 / LIMITS.torque_factor < factor < LIMITS.torque_factor
 
 

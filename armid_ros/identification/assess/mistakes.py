@@ -55,7 +55,7 @@ _MIN_SAMPLES = 40
 @dataclass(frozen=True)
 class Mistake:
     """
-    Mistake found in a recording, with the torque errors before and after its correction.
+    Mistake found in a recording, with torque errors before and after its correction.
 
     Attributes
     ----------
@@ -80,16 +80,16 @@ class Mistake:
 
     @property
     def of_data(self) -> bool:
-        """Whether only an error of the data, and no change of the arm, explains the torques."""
+        """Whether only faulty data, and not a changed arm, would explain the torques."""
         return all(one.of_data for one in self.hypotheses)
 
     @property
     def text(self) -> str:
-        """Return a text with the mistake and its remedy, without a full stop."""
+        """Return the mistake and its remedy as text, without a full stop."""
         return ', or '.join(one.text for one in self.hypotheses)
 
     def sentence(self, robot: Robot) -> str:
-        """Return a text with the mistake, its remedy and torque errors, without a full stop."""
+        """Return the mistake, its remedy and its torque errors as text, without a full stop."""
         before, after = (
             100.0 * min(float(error.joints[self.joint]), 9.99)
             for error in (self.before, self.after)
@@ -128,7 +128,7 @@ def shared_mistakes(
 
 
 class _Tested(NamedTuple):
-    """Tested hypothesis: torque prediction errors, and likelihood ratios divided by limits."""
+    """Tested hypothesis: torque errors, and likelihood ratios relative to their limits."""
 
     hypothesis: Hypothesis
     described: PredictionError  # with the described links
@@ -163,7 +163,7 @@ def find_mistake(
         return None
 
     def rows(some: Sequence[Hypothesis]) -> list[_Tested]:
-        """Evaluate hypotheses; also fit links if errors of the links may change the decision."""
+        """Test hypotheses; also fit the links if errors of the links may change the decision."""
         found = []
         for one in some:
             after = _error(robot, slow, one, near=False)
@@ -209,7 +209,7 @@ def find_mistake(
 def _error(
     robot: Robot, slow: Sequence[Motion], one: Hypothesis, *, near: bool
 ) -> PredictionError | None:
-    """Return the torque error with the correction of a hypothesis; None for too few samples."""
+    """Return the torque error after the correction of a hypothesis; None for too few samples."""
     # 200 samples: twenty for each of the ten parameters of a link
     motion = thinned([one.motion(motion) for motion in slow], 200)
     if motion is None or len(motion) < _MIN_SAMPLES:
@@ -218,7 +218,7 @@ def _error(
 
 
 def _most_likely(rows: Sequence[_Tested], ratio: str, before: PredictionError) -> Mistake:
-    """Return the most likely mistake, with about equally likely mistakes of other kinds."""
+    """Return the most likely mistake, together with other kinds that are about as likely."""
     value = attrgetter(ratio)
     first, *others = sorted(rows, key=value, reverse=True)
     likely = {first.hypothesis.kind: first.hypothesis}
@@ -232,7 +232,7 @@ def _most_likely(rows: Sequence[_Tested], ratio: str, before: PredictionError) -
 
 
 def slow_motions(recordings: Sequence[Recording], used: Conditioning) -> list[Motion]:
-    """Return uninterrupted parts of recordings, low-passed to the frequencies of the motion."""
+    """Return gap-free sections of recordings, low-passed to the frequencies of the motion."""
     result = []
     for motion in (part for one in recordings for part in segments(one, used)):
         kept = np.array(decimated_samples(len(motion), used), dtype=np.intp)
@@ -287,7 +287,7 @@ def torque_delay(robot: Robot, recording: Recording, used: Conditioning) -> Dela
 
 
 def _delay_rows(robot: Robot, motion: Motion, used: Conditioning) -> tuple[FloatArray, ...]:
-    """Return regressors of nuisance, link and delay parameters, (n, M, k), and the torques."""
+    """Return regressors of nuisance, link and delay parameters, (n, M, k), and torques."""
     # presliding lengths of friction [rad or m], as in gears of arms, in steps of three to cover
     # all lengths between. On 63 recordings with lengths of 1 to 3 mrad, the delay errs by -1 to 6
     # ms (5 to 95 %). Lengths of 1 and 3 mrad alone err by 0 to 6 ms, 0.1 to 30 mrad by -3 to 6 ms.

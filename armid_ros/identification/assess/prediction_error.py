@@ -49,7 +49,7 @@ class PredictionError:
     off: float = 0.0
 
     def overall(self, robot: Robot) -> float:
-        """Return the larger of two torque errors: of all prismatic and of all revolute joints."""
+        """Return the larger of two relative torque errors: of prismatic and of revolute joints."""
         residual = self.joints * self.torque
         return max(
             float(np.linalg.norm(residual[own]) / np.linalg.norm(self.torque[own]))
@@ -59,7 +59,7 @@ class PredictionError:
 
     def gain(self, better: PredictionError) -> float:
         """
-        Return the likelihood ratio of `better` to this prediction, per independent sample.
+        Return by which likelihood ratio another prediction is better, per independent sample.
 
         The likelihood ratio of models with unknown noise is multiplied by the ratio of the
         priors of their links. Errors are limited to the range from the floor to the torque itself.
@@ -68,7 +68,7 @@ class PredictionError:
         return self.of_data(better) * float(np.exp((self.off - better.off) / (2.0 * FREEDOM)))
 
     def of_data(self, better: PredictionError) -> float:
-        """Return the likelihood ratio of `better` to this prediction, without priors of links."""
+        """Return the likelihood ratio as `gain` does, but without priors on the links."""
         before, after = (np.clip(x.joints, LIMITS.floor, 1.0) for x in (self, better))
         return float(np.prod(before / after))
 
@@ -84,7 +84,7 @@ def thinned(stretches: Sequence[Motion], rows: int) -> Motion | None:
 
 def prediction_error(robot: Robot, motion: Motion, *, near: bool) -> PredictionError:
     """
-    Return the torque error after a fit of each joint's friction, torque offset and drive inertia.
+    Return torque errors after a fit of each joint's friction, offset and drive inertia.
 
     Friction and drive inertia are bounded below by zero, so they cannot explain a torque of the
     opposite sign.
@@ -132,7 +132,7 @@ def prediction_error(robot: Robot, motion: Motion, *, near: bool) -> PredictionE
 
 def _nonnegative_fit(own: FloatArray, target_torque: FloatArray) -> FloatArray:
     """
-    Fit nonnegative friction and drive inertia, and a torque offset, to the torque of each joint.
+    Fit each joint's friction and drive inertia (nonnegative) and torque offset to torques.
 
     The columns of each joint have shape (N, n, 4), the torques (N, n) and the values (n, 4). The
     joints are independent. The best feasible solution of eight sets of active bounds is used.
@@ -169,7 +169,7 @@ def shared_values(
     own: FloatArray, shared: FloatArray, near: FloatArray | None = None
 ) -> tuple[FloatArray, FloatArray]:
     """
-    Fit parameters that all joints share, together with nuisance parameters of each joint.
+    Fit parameters that all joints share, and nuisance parameters of each joint.
 
     Columns of single joints are projected out (Frisch and Waugh 1933). Joints are weighted by
     their residuals, down to the floor. The interval allows for residuals that are correlated in

@@ -53,7 +53,7 @@ class Fault:
 
     @property
     def text(self) -> str:
-        """Return a text with the fault and the name of its recording."""
+        """Return the fault as text, with the name of its recording."""
         return (
             self.what if self.source is None else f'in {self.source or "a recording"} {self.what}'
         )
@@ -63,7 +63,7 @@ def sensor_faults(
     arm: ArmModel, recordings: Sequence[Recording], rows: Sequence[Stretch], used: Conditioning
 ) -> Iterator[Fault]:
     """
-    Yield faults of clocks and sensors, and undriven joints that are not at modelled positions.
+    Yield faults of clocks and sensors, and undriven joints that are at unexpected positions.
 
     The recordings have torques and no damaged samples (see `damage`); `rows` are the regression
     rows of the same recordings.
@@ -92,7 +92,7 @@ def sensor_faults(
 
 
 def _jumps(robot: Robot, recording: Recording) -> Iterator[Fault]:
-    """Yield the first impossible, lasting jump of a position; `damage` repairs single samples."""
+    """Yield a fault for the first impossible jump of a position after which it stays there."""
     if len(recording) < 2:
         return
     # a step is no motion if it is ten times as fast as the limit and as 99 % of all steps
@@ -113,7 +113,7 @@ def _jumps(robot: Robot, recording: Recording) -> Iterator[Fault]:
 
 
 def encoder_faults(recording: Recording, units: Sequence[str] | None) -> Iterator[Fault]:
-    """Yield faults of position or velocity channels that stay constant while the joint moves."""
+    """Yield faults of recorded positions or velocities that are constant while the joint moves."""
     if recording.dq is None:
         return
     t, units = recording.t, units or ('rad',) * recording.n_joints
@@ -157,7 +157,7 @@ def encoder_faults(recording: Recording, units: Sequence[str] | None) -> Iterato
 def torque_faults(
     arm: ArmModel, recording: Recording, motions: Sequence[Motion]
 ) -> Iterator[Fault]:
-    """Yield faults of torque channels that stay constant while the load of the joint varies."""
+    """Yield faults of recorded torques that are constant while the load on the joint varies."""
     assert recording.tau is not None
     if np.all(np.ptp(recording.tau, axis=0) < NOTHING):
         yield Fault(SILENT, 'unusable', recording.source)
@@ -190,7 +190,7 @@ def units_beyond_drives(
     robot: Robot, recordings: Sequence[Recording], motions: Sequence[Motion]
 ) -> Iterator[str]:
     """
-    Yield notes on joints whose torques exceed the drive limit so far that the unit must be wrong.
+    Yield notes on torques so far above the drive limit that their unit must be wrong.
 
     There is no note if most joints exceed their limits, or if the described links need as much
     torque along the filtered motions: then the described limits are wrong.
@@ -224,7 +224,7 @@ def _constant_channel(
     why: str,
     remedy: str,
 ) -> Fault:
-    """Return the fault of a sensor channel that is constant for some time or throughout."""
+    """Return the fault that a recorded quantity is constant for some time or throughout."""
     when = 'throughout'
     if run != (0, len(recording)):
         first, last = recording.t[run[0]], recording.t[run[1] - 1]
@@ -234,7 +234,7 @@ def _constant_channel(
 
 
 def _longest_constant(reading: FloatArray, step: float = 0.0) -> tuple[int, int]:
-    """Return the index range of the longest run of samples without a change above ``step``."""
+    """Return the index range of the longest run in which a signal changes by at most ``step``."""
     edges = np.flatnonzero(np.abs(np.diff(reading)) > step) + 1
     bounds = np.concatenate([[0], edges, [len(reading)]])
     longest = int(np.argmax(np.diff(bounds)))
@@ -287,7 +287,7 @@ def velocity_ratio(recording: Recording) -> tuple[FloatArray, FloatArray]:
 
 def velocity_faults(recording: Recording) -> Iterator[Fault]:
     """
-    Yield faults of velocities that disagree with the positions in time base, unit or sign.
+    Yield faults of recorded velocities that contradict the positions in time, unit or sign.
 
     Identification differentiates the positions, so a wrong unit or sign of velocities is harmless.
     A wrong time base needs at least two joints that agree, and no moving joint that disagrees.
@@ -330,7 +330,7 @@ def held_elsewhere(
     robot: Robot, recordings: Sequence[Recording], motions: Sequence[Motion]
 ) -> Iterator[Fault]:
     """
-    Yield undriven joints that are not at their modelled position, if this changes torques.
+    Yield undriven joints that are away from their modelled position, if torques depend on it.
 
     If such a joint moves, or carries driven joints at another position, the arm differs from the
     model. The size of this error is the change of the described torque along the recorded motions

@@ -38,7 +38,7 @@ Progress = Callable[[float, str], None]
 @dataclass(frozen=True)
 class ForwardScore:
     """
-    Position error of a simulated arm that is driven by recorded torques.
+    Position errors in a simulation of the arm that recorded torques drive.
 
     Attributes
     ----------
@@ -70,7 +70,7 @@ class ForwardScore:
 
     @property
     def worst(self) -> str:
-        """Return a text with the largest position error and its joint."""
+        """Return the largest position error and its joint as text."""
         joint = int(np.argmax(self.position_error))
         return (
             f'{1e3 * self.position_error[joint]:.3g} m{self.units[joint]} ({self.joints[joint]})'
@@ -91,7 +91,7 @@ class ForwardScore:
 
 @dataclass(frozen=True, eq=False)
 class _RecordedTorque(Controller):
-    """Controller that adds inertia-scaled feedback to the recorded torque of a motion."""
+    """Controller that adds feedback, scaled by inertia, to recorded torques."""
 
     motion: Motion
     feedback: LinearFeedback
@@ -106,7 +106,7 @@ class _RecordedTorque(Controller):
 def _forward_score(
     arm: ArmModel, recording: Recording, used: Conditioning, nominal: ArmModel, duration: float
 ) -> ForwardScore:
-    """Simulate an arm driven by recorded torques, with a feedback that a nominal model defines."""
+    """Simulate an arm driven by recorded torques, with feedback from a nominal model."""
     motion = next(iter(segments(recording, used)), None)
     if motion is None:
         raise IdentificationError(f'{recording.source}: no stretch is long enough to be filtered')
@@ -142,7 +142,7 @@ def _forward_score(
 @dataclass(frozen=True)
 class ForwardValidation:
     """
-    Simulation errors of the models before and after the identification, on held-out data.
+    Errors in simulations of a held-out recording, with the models before and after identification.
 
     Attributes
     ----------
@@ -165,12 +165,12 @@ class ForwardValidation:
 
     @property
     def same(self) -> bool:
-        """Whether both models give the same simulated motion."""
+        """Whether both models lead to the same simulated motion."""
         before = self.before
         return before is not None and np.array_equal(before.simulated, self.after.simulated)
 
     def errors(self) -> str:
-        """Return a text with the largest position error of each model."""
+        """Return the largest position error of each model as text."""
         if self.before is None or self.same:
             return self.after.worst
         return f'{self.before.worst} with the given model, {self.after.worst} with the new one'
@@ -205,7 +205,7 @@ class ForwardValidation:
 @dataclass(frozen=True)
 class Verification:
     """
-    Results of the tests of an identified model: bias by encoder noise, and simulations.
+    Results of tests of an identified model: bias by encoder noise, and simulations.
 
     Attributes
     ----------
@@ -233,7 +233,7 @@ def verify(
     progress: Progress = lambda share, what: None,
 ) -> Verification:
     """
-    Test an identified model for bias by encoder noise, and simulate held-out recordings with it.
+    Test an identified model for bias by encoder noise, and by simulation of held-out recordings.
 
     Parameters
     ----------
@@ -281,7 +281,7 @@ def simulate_held_out(
     progress: Progress = lambda share, what: None,
 ) -> tuple[tuple[ForwardValidation, ...], tuple[str, ...]]:
     """
-    Simulate two models in closed loop along held-out recordings, and return their errors.
+    Simulate two models in closed loop along held-out recordings; return their errors.
 
     Returns a result for each simulated recording, and omitted tests with reasons. The second model
     defines the feedback of both. `progress` is called with the finished share, 0 to 1, and the

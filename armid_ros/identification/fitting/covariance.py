@@ -25,7 +25,7 @@ MIN_RESIDUAL_SHARE = 0.1
 
 
 def sandwich(bread: FloatArray, middle: FloatArray) -> FloatArray:
-    """Return the sandwich covariance B M B' of bread B and middle M, positive semi-definite."""
+    """Return the sandwich covariance B M B' of B (bread) and M (middle)."""
     covariance = bread @ middle @ bread.T
     std = np.sqrt(np.maximum(np.abs(np.diag(covariance)), 1e-300))
     sizes, axes = np.linalg.eigh(covariance / np.outer(std, std))
@@ -62,7 +62,7 @@ def score_products(scores: Sequence[FloatArray], lags: int) -> FloatArray:
 
 
 def widened(covariance: FloatArray, bread: FloatArray, middle: FloatArray) -> FloatArray:
-    """Raise variances of a covariance to those of a sandwich B M B' where these are larger."""
+    """Raise the variances of a covariance to those of a sandwich B M B' that are larger."""
     ratio = np.diag(bread @ middle @ bread) / np.diag(covariance)
     factor = np.sqrt(np.maximum(ratio, 1.0))
     return np.asarray(covariance * np.outer(factor, factor))
@@ -76,7 +76,7 @@ def noise_products(
     instruments: Sequence[FloatArray] | None = None,
 ) -> FloatArray:
     """
-    Return the covariance of the products W' e of weighted columns W and torque noise e.
+    Return the covariance of W' e, for weighted regressor W and torque noise e.
 
     The noise of each joint is coloured, with a spectrum Phi that is estimated from its residual.
     Noise is taken as independent between joints and between stretches. A fit removes noise at
@@ -128,7 +128,7 @@ def noise_products(
 def _noise_spectrum(
     residual: FloatArray, informative: npt.NDArray[np.bool_], leverage: FloatArray
 ) -> FloatArray:
-    """Return the power spectrum of a joint's torque noise, (M + 1,), from its residuals, (M,)."""
+    """Estimate the power spectrum (M + 1,) of a joint's torque noise from residuals (M,)."""
     count = len(residual)
     size = 2 * count
     # the autocovariance of the informative samples is divided by the number of their pairs
@@ -161,7 +161,7 @@ def _noise_spectrum(
 
 
 def _smoothed(spectrum: FloatArray, reach: int) -> FloatArray:
-    """Return a power spectrum smoothed by Parzen's window over the first `reach` lags."""
+    """Smooth a power spectrum by Parzen's window over the first `reach` lags."""
     size = 2 * (len(spectrum) - 1)
     lags = np.fft.irfft(spectrum, size)
     x = np.arange(reach) / reach

@@ -44,7 +44,7 @@ def halves_error(
     spread: FloatArray | None = None,
 ) -> Score:
     """
-    Return the torque error with which a fit to each half of the data predicts the other half.
+    Return the torque error with which fits to each half of the data predict the other half.
 
     Parameters
     ----------
@@ -88,7 +88,7 @@ def jackknife(
     problem: Sequence[Regression], weights: FloatArray, values: FloatArray
 ) -> FloatArray:
     """
-    Return the change of each fitted value when each recording in turn is left out (jackknife).
+    Return how fitted values change when each recording in turn is left out (jackknife).
 
     The squared changes of a value sum to its variance. The weight of a change is the precision
     with which the other recordings determine the value. For white noise, the sum of squares then
@@ -144,7 +144,7 @@ def cutoff_of_torques(
     used: Conditioning,
 ) -> Conditioning:
     """
-    Return filters whose position cut-off gives the best prediction of held-out torques.
+    Choose the position cut-off that predicts held-out torques best; return the filters.
 
     The cut-off is halved while held-out torques are predicted better. The result is the highest
     cut-off whose held-out loss is within a tenth, or one standard error, of the smallest loss. The
@@ -215,7 +215,7 @@ def cutoff_of_torques(
 def _losses(
     problem: Sequence[Sequence[Regression]], lowest: Sequence[Sequence[Regression]]
 ) -> FloatArray:
-    """Return each fold's held-out loss: the logarithm of the rms error, averaged over joints."""
+    """Return the held-out loss of each fold: the mean logarithm of the joints' rms errors."""
     # Odd folds are predicted from even ones, and vice versa; their losses give the standard error
     # of the mean. Every joint counts by the ratio of its errors: a light joint, whose torque is
     # mostly noise, gains by a low cut-off and must not hide that a heavy one loses.
@@ -244,7 +244,7 @@ def _losses(
 
 
 def _rms(values: FloatArray, informative: npt.NDArray[np.bool_]) -> FloatArray:
-    """Return the root mean square of values at each joint's informative samples, shape (n,)."""
+    """Return the root mean square of each joint's values at informative samples, shape (n,)."""
     count = np.maximum(informative.sum(axis=0), 1)
     return np.asarray(np.sqrt(np.sum(values**2, axis=0, where=informative) / count))
 
@@ -255,7 +255,7 @@ def _fit(
     weights: npt.NDArray[np.floating] | npt.NDArray[np.bool_],
     precision: FloatArray | float = 0.0,
 ) -> FloatArray:
-    """Fit weighted least-squares parameters, (r,), with a prior of mean 0 and given precision."""
+    """Fit r parameters by weighted least squares, with a prior of mean 0 and given precision."""
     rows = (x * weights[:, :, np.newaxis]).reshape(-1, x.shape[2])
     normal = rows.T @ rows
     normal[np.diag_indices_from(normal)] += precision
@@ -265,7 +265,7 @@ def _fit(
 def _some_rows(
     problem: Sequence[Regression], most: int
 ) -> tuple[int, FloatArray, FloatArray, FloatArray, npt.NDArray[np.bool_]]:
-    """Thin samples to about `most`; return stride, columns, torque, target, informative mask."""
+    """Take about `most` samples; return stride, columns, torque, target and informative mask."""
     step = max(1, sum(len(part.tau) for part in problem) // most)
     columns, tau, target = (
         np.concatenate([getattr(part, name) for part in problem])[::step]

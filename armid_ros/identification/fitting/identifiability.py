@@ -50,7 +50,7 @@ Reason = Literal[
 @dataclass(frozen=True)
 class Unidentified:
     """
-    A parameter that the data do not identify.
+    Parameter that the data do not identify.
 
     Attributes
     ----------
@@ -74,7 +74,7 @@ def excited(
     theory: BaseParameters, problem: Sequence[Regression]
 ) -> tuple[BaseParameters, tuple[Regression, ...]]:
     """
-    Group the parameters that a motion does not separate, such as those of a joint at rest.
+    Group parameters that a motion does not separate, such as those of a joint at rest.
 
     Parameters
     ----------
@@ -99,7 +99,7 @@ def identifiable_base(
     theory: BaseParameters, normal: NormalEquations
 ) -> tuple[BaseParameters, list[int]]:
     """
-    Group the parameters that normal equations do not separate.
+    Group the parameters that the normal equations do not separate.
 
     Parameters
     ----------
@@ -140,7 +140,7 @@ def fit_determined(
     arm: ArmModel, base: BaseParameters, problem: Sequence[Regression], method: Method
 ) -> tuple[BaseParameters, tuple[Regression, ...], Solution]:
     """
-    Fit base parameters, but keep described values that are more certain than a fit of the data.
+    Fit base parameters; keep described values that are more certain than the data.
 
     Parameters are fixed one at a time, as each fixed parameter makes the others more certain.
 
@@ -195,7 +195,7 @@ def fit_determined(
 
 def base_spread(arm: ArmModel, base: BaseParameters) -> FloatArray:
     """
-    Return the largest expected error of the described value of each base parameter, shape (r,).
+    Return the largest expected error of each base parameter in the description, shape (r,).
 
     The error is infinite for an effect of unknown size, and if no link has a mass.
 

@@ -47,7 +47,7 @@ from scipy.stats import chi2
 
 
 class _Instrumented(NamedTuple):
-    """Estimate of r parameters by instrumental variables, and its difference to least squares."""
+    """Instrumental-variable estimate of r parameters, and its difference to least squares."""
 
     values: FloatArray
     covariance: FloatArray  # correlation of the residuals included
@@ -59,7 +59,7 @@ def fit_by_instruments(
     fit: FittedValues, recordings: Sequence[Recording], used: Conditioning
 ) -> FittedValues:
     """
-    Fit base parameters by instrumental variables from the smoothed motion.
+    Fit base parameters by instrumental variables, computed from the smoothed motion.
 
     Parameters
     ----------
@@ -137,7 +137,7 @@ def _by_instruments(
 
 
 def _smoothed(recordings: Sequence[Recording], used: Conditioning) -> list[Recording]:
-    """Return recordings whose positions are low-passed far below the cut-off of the regressor."""
+    """Low-pass the positions of recordings far below the cut-off of the regressor."""
     calm = []
     for recording in recordings:
         # band of the instruments over that of the regressor, which is ten times the band of the
@@ -156,7 +156,7 @@ def _smoothed(recordings: Sequence[Recording], used: Conditioning) -> list[Recor
 @dataclass(frozen=True)
 class NoiseCheck:
     """
-    Result of the test whether encoder noise biases an identification, and size of the bias.
+    Test result whether encoder noise biases an identification, and size of the bias.
 
     Attributes
     ----------
@@ -196,7 +196,7 @@ class NoiseCheck:
 
     @property
     def relative_bias(self) -> FloatArray:
-        """Bias of parameters by encoder noise, over the parameters' standard deviations, (r,)."""
+        """Bias of each parameter by encoder noise, divided by its standard deviation, (r,)."""
         return np.asarray(self.bias / np.where(self.std > 0.0, self.std, np.inf))
 
     @property
@@ -207,7 +207,7 @@ class NoiseCheck:
 
     def findings(self) -> tuple[tuple[str, bool], tuple[str, bool]]:
         """
-        Return sentences on the test and on the bias, each with whether the result is satisfactory.
+        Return a sentence on the test and one on the bias, each with whether it is satisfactory.
 
         If the test is significant and the bias by noise is negligible, the two fits differ for
         another reason: a missing effect of the model changes the two fits differently.

@@ -80,7 +80,7 @@ class Solution:
 @dataclass(frozen=True, eq=False)
 class NormalEquations:
     """
-    Normal equations of each joint: products of its regressor columns and torque with each other.
+    Normal equations of each joint: inner products of its regressor columns and torque.
 
     Attributes
     ----------
@@ -126,26 +126,26 @@ class NormalEquations:
         return cls(products, counts)
 
     def __add__(self, other: NormalEquations) -> NormalEquations:
-        """Return the normal equations of two sets of samples together."""
+        """Add the normal equations of two sets of samples."""
         return NormalEquations(self.products + other.products, self.counts + other.counts)
 
     def restrict(self, columns: Sequence[int] | npt.NDArray[np.intp]) -> NormalEquations:
-        """Return the normal equations of the columns with the given indices."""
+        """Return the normal equations of only the regressor columns at given indices."""
         kept = np.append(np.asarray(columns, dtype=np.intp), self.rank)
         return NormalEquations(self.products[:, kept[:, np.newaxis], kept], self.counts)
 
     @property
     def rank(self) -> int:
-        """Return the number of columns r."""
+        """Number r of regressor columns."""
         return int(self.products.shape[2]) - 1
 
     def summed(self, scale: npt.ArrayLike = 1.0) -> FloatArray:
-        """Sum the products of joints, each divided by a squared scale, shape (r + 1, r + 1)."""
+        """Sum the products over joints, each divided by its squared scale, (r + 1, r + 1)."""
         weight = np.broadcast_to(np.asarray(scale, dtype=float), self.counts.shape) ** -2.0
         return np.asarray(np.tensordot(weight, self.products, axes=1))
 
     def squares(self, values: FloatArray) -> FloatArray:
-        """Return the sum of squared residuals of each joint, given parameters, (n,) [(N m)^2]."""
+        """Return the sum of squared residuals of each joint, for parameters `values`, (n,)."""
         ends = np.append(values, -1.0)
         # smaller values are rounding errors of the products
         return np.asarray(
@@ -153,26 +153,26 @@ class NormalEquations:
         )
 
     def relative_error_percent(self, values: FloatArray) -> float:
-        """Return the relative torque error of given parameters, 100 |residual| / |torque| [%]."""
+        """Return the relative torque error for given parameters, 100 |residual| / |torque| [%]."""
         whole = self.products[:, -1, -1].sum()
         return float(100.0 * np.sqrt(self.squares(values).sum() / whole))
 
     def joint_std(self, values: FloatArray) -> FloatArray:
-        """Return the standard deviation of each joint's residual, given parameters, (n,) [N m]."""
+        """Return the standard deviation of each joint's residual for parameters `values`, (n,)."""
         counts = np.maximum(self.counts, 1.0)
         rows = float(counts.sum())
         freedom = rows / max(1.0, rows - len(values))  # correction for degrees of freedom
         return np.asarray(np.sqrt(freedom * self.squares(values) / counts))
 
     def packed(self) -> FloatArray:
-        """Return an array: number of joints, counts of samples, upper triangles of products."""
+        """Return all numbers in one array: joints, sample counts, upper triangles of products."""
         upper = np.triu_indices(self.rank + 1)
         numbers = self.products[:, upper[0], upper[1]].ravel()
         return np.concatenate([[len(self.counts)], self.counts, numbers])
 
     @classmethod
     def unpacked(cls, numbers: FloatArray) -> NormalEquations:
-        """Return the normal equations from an array that `packed` returned."""
+        """Restore normal equations from an array of `packed`."""
         joints = int(numbers[0])
         triangles = numbers[1 + joints :].reshape(joints, -1)
         size = int(np.sqrt(2 * triangles.shape[1]))
@@ -229,7 +229,7 @@ def solve(
 def _robust(
     problem: Sequence[Regression], used: npt.NDArray[np.bool_], fit: WeightedFit
 ) -> tuple[WeightedFit, FloatArray]:
-    """Return a fit with outliers weighted down, and the weights without joint scales, (N, n)."""
+    """Reduce weights of outliers; return the fit and the weights before joint scaling, (N, n)."""
     relative: FloatArray = used.astype(float)
     for _ in range(_MAX_ITERATIONS):
         before = (fit.scale, relative)
@@ -251,7 +251,7 @@ def _robust(
 @dataclass(frozen=True, eq=False)
 class WeightedFit:
     """
-    Solution of weighted normal equations.
+    Solution of weighted normal equations: parameters, scales and factors.
 
     Attributes
     ----------
@@ -292,14 +292,14 @@ def weighted_fit(normal: NormalEquations, *, weighted: bool = True) -> WeightedF
 
 
 def scaled_fit(normal: NormalEquations, scale: FloatArray) -> WeightedFit:
-    """Solve normal equations with columns and torque of each joint divided by a scale, (n,)."""
+    """Solve normal equations, with columns and torque of each joint divided by a scale (n,)."""
     products = normal.summed(scale)
     factor, inverse = factored(products[:-1, :-1])
     return WeightedFit(inverse @ (inverse.T @ products[:-1, -1]), scale, factor, inverse)
 
 
 def _positive(scale: FloatArray) -> FloatArray:
-    """Return residual scales, (n,), with a lower bound for joints that are fitted exactly."""
+    """Return residual scales (n,), kept above zero for joints that are fitted exactly."""
     return np.maximum(scale, max(1e-9 * float(np.max(scale)), 1e-100))
 
 
@@ -322,7 +322,7 @@ def within_bounds(
     values: FloatArray, factor: FloatArray, bounds: tuple[FloatArray, FloatArray]
 ) -> FloatArray:
     """
-    Return the parameters within bounds whose torques are nearest to those of an unbounded fit.
+    Return the parameters within bounds that give the torques nearest to the unbounded fit's.
 
     Parameters
     ----------
@@ -374,7 +374,7 @@ def informative_basis(products: FloatArray) -> FloatArray:
 
 def informative_solution(products: FloatArray, aim: FloatArray) -> FloatArray:
     """
-    Solve normal equations, with zero in the unidentifiable directions of parameter space.
+    Solve normal equations; the solution is zero in unidentifiable directions.
 
     Parameters
     ----------

@@ -97,7 +97,7 @@ def fit_values(
     solution: Solution | None = None,
 ) -> FittedValues:
     """
-    Fit base parameters by a linear solution, or by Gauss-Newton steps if the arm is nonlinear.
+    Fit base parameters: by one linear solution, or by Gauss-Newton if the arm is nonlinear.
 
     Parameters
     ----------
@@ -145,7 +145,7 @@ def fit_values(
 
 def is_nonlinear(before: ArmModel, after: ArmModel, motions: Sequence[Motion]) -> bool:
     """
-    Return whether the torque is nonlinear in the parameters between the values of two arm models.
+    Return whether torque is nonlinear in the parameters between the values of two models.
 
     Parameters
     ----------
@@ -173,7 +173,7 @@ def with_base_values(
     arm: ArmModel, base: BaseParameters, values: FloatArray, free: FloatArray
 ) -> ArmModel:
     """
-    Return the arm model with new values of its base parameters.
+    Return the arm model with given values of its base parameters.
 
     In unidentifiable directions, effects keep their values and inertial parameters change as
     little as possible: these directions are unidentifiable with any effects.
@@ -211,7 +211,7 @@ def linearised(
     arm: ArmModel, base: BaseParameters, recordings: Sequence[Recording], used: Conditioning
 ) -> tuple[tuple[Regression, ...], Torques]:
     """
-    Linearise the torque of an arm model about its present values.
+    Linearise the torque of an arm model at its present parameters.
 
     Returns
     -------
@@ -227,14 +227,14 @@ def linearised(
 
 
 def torques(arm: ArmModel, recordings: Sequence[Recording], used: Conditioning) -> Torques:
-    """Return the filtered torque of an arm model along each stretch of recordings."""
+    """Return the filtered torque of an arm model along each gap-free section of recordings."""
     return tuple(part.predicted for part in predictions(arm, recordings, used))
 
 
 def exact_at(
     problem: Sequence[Regression], predicted: Torques, values: FloatArray
 ) -> tuple[Regression, ...]:
-    """Return linear problems whose constants make given parameters predict given torques."""
+    """Set the constants of linear problems so that given parameters predict given torques."""
     return tuple(
         replace(part, constant=torque - part.columns @ values)
         for part, torque in zip(problem, predicted, strict=True)
@@ -244,7 +244,7 @@ def exact_at(
 def agree(
     problem: Sequence[Regression], weights: FloatArray, linear: Torques, predicted: Torques
 ) -> bool:
-    """Return whether torques of a linear model agree with those of the nonlinear model."""
+    """Return whether torques of the linear model agree with those of the nonlinear model."""
     measured = [part.tau for part in problem]
     difference, torque, residual = (
         float(np.linalg.norm(weights * np.concatenate(parts)))
@@ -314,7 +314,7 @@ def _iterate(
 
 
 class _State:
-    """State of a Gauss-Newton iteration: arm model, parameters, linear problem and residual."""
+    """State of a Gauss-Newton iteration: arm model, parameters, linear problem, residual."""
 
     def __init__(self, arm: ArmModel, values: FloatArray, problem: Sequence[Regression]) -> None:
         self.arm, self.values, self.problem = arm, values, tuple(problem)
@@ -327,7 +327,7 @@ class _State:
         self._weights = self._used / np.maximum(rms, _MIN_TORQUE_SHARE * max(rms.max(), 1e-100))
 
     def gain(self, predicted: Torques) -> float:
-        """Return by how much given torques reduce the cost; zero if the fit is exact already."""
+        """Return how much given torques reduce the cost; zero if the fit is already exact."""
         # a smaller residual torque is a rounding error
         if np.linalg.norm(self._used * self._residual) <= 1e-6 * np.linalg.norm(
             self._used * self._tau
@@ -336,7 +336,7 @@ class _State:
         return self.cost() - self.cost(predicted)
 
     def damped(self, damping: float, limits: tuple[FloatArray, FloatArray]) -> FloatArray:
-        """Return the parameters after a Levenberg-Marquardt step, within limits of parameters."""
+        """Return the parameters after a Levenberg-Marquardt step, kept within their limits."""
         w, _ = weighted_rows(self.problem, self._weights)
         size = np.linalg.norm(w, axis=0)
         scaled = w / np.where(size > 0.0, size, 1.0)
@@ -353,5 +353,5 @@ class _State:
 
 
 def unidentifiable_directions(arm: ArmModel, base: BaseParameters) -> FloatArray:
-    """Return orthonormal changes of inertial parameters that change no torque, (10 n, k)."""
+    """Return orthonormal changes (10 n, k) of inertial parameters that change no torque."""
     return np.asarray(scipy.linalg.null_space(base.grouping[:, : len(arm.robot.rigid_parameters)]))

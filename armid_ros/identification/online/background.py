@@ -24,7 +24,7 @@ Pieces = Generator[None, None, Result]
 
 
 def at_once(work: Pieces[Result]) -> Result:
-    """Run all pieces of a background computation without a pause, and return its result."""
+    """Run a background computation to its end without pauses; return its result."""
     while True:
         try:
             next(work)

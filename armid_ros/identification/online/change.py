@@ -21,7 +21,7 @@ _MIN_SINGULAR_VALUE = 1e-6
 @dataclass(frozen=True, eq=False)
 class ChangeCandidate:
     """
-    Possible change of an arm, such as a payload, as directions in the space of base parameters.
+    Possible change of an arm, such as a payload: directions in the base parameters' space.
 
     Attributes
     ----------
@@ -59,14 +59,14 @@ class ChangeCandidate:
         return f'{text} at {self.joint}' if self.joint else text
 
     def includes(self, other: ChangeCandidate) -> bool:
-        """Whether this change includes all parameters of another change."""
+        """Whether this change covers all parameters of another change."""
         return set(other.parameters) <= set(self.parameters)
 
 
 @dataclass(frozen=True, eq=False)
 class Change:
     """
-    Change of the arm that was detected in the torques.
+    Change of the arm that the torques reveal: cause, time and size.
 
     Attributes
     ----------
@@ -89,14 +89,14 @@ class Change:
 
     @property
     def changed_directions(self) -> FloatArray:
-        """Return independent directions in which base parameters may have changed, (P, k)."""
+        """Return independent directions (P, k) in which base parameters may have changed."""
         columns = np.hstack([c.changed_directions for c in (self.candidate, *self.rivals)])
         columns = columns / np.linalg.norm(columns, axis=0)
         directions, size, _ = np.linalg.svd(columns, full_matrices=False)
         return np.asarray(directions[:, size > _MIN_SINGULAR_VALUE * size[0]])
 
     def __str__(self) -> str:
-        """Return a sentence with the cause and the size of the change, and with rival causes."""
+        """Return a sentence with the cause of the change, its size, and rival causes."""
         sizes = ', '.join(
             f'{p.name} by {value:+.3g} {p.unit} ({lower:.3g} to {upper:.3g})'
             if 0.0 < upper - lower < np.inf
@@ -111,7 +111,7 @@ class Change:
 
 def change_candidates(arm: ArmModel, base: BaseParameters) -> tuple[ChangeCandidate, ...]:
     """
-    Return the possible changes of an arm: of an effect, of all friction of a joint, of a payload.
+    Return possible changes of an arm: effects, all friction of a joint, payloads.
 
     Parameters
     ----------

@@ -48,7 +48,7 @@ _MIN_EIGENVALUE = 1e-9
 @dataclass(frozen=True, eq=False)
 class Block:
     """
-    Normal equations of a block: regression rows of a quarter of a second, scaled to unit noise.
+    Normal equations of a block of samples, a quarter of a second, scaled to unit noise.
 
     Attributes
     ----------
@@ -85,7 +85,7 @@ class Block:
 @dataclass(frozen=True, eq=False)
 class ScoreStatistics:
     """
-    Information matrix and score vector of Q possible changes in a window of blocks.
+    Information matrix and scores of Q possible changes, from a window of blocks.
 
     Attributes
     ----------
@@ -104,7 +104,7 @@ class ScoreStatistics:
 
     def ratios(self, sets: npt.NDArray[np.intp]) -> FloatArray:
         """
-        Return twice the log-likelihood ratio of each of G sets of changes, shape (G,).
+        Return twice the log likelihood ratio for each of G sets of changes, shape (G,).
 
         Parameters
         ----------
@@ -123,7 +123,7 @@ class ScoreStatistics:
 
     def size(self, some: slice) -> tuple[FloatArray, FloatArray]:
         """
-        Return the estimated sizes of some changes, and their covariance for white noise.
+        Return the estimated sizes of some changes, with their covariance for white noise.
 
         The variance of a change is infinite if this window alone does not determine the change.
 
@@ -144,7 +144,7 @@ def score_statistics(
     residual_scale: float = 1.0,
 ) -> Pieces[ScoreStatistics]:
     """
-    Compute information matrix and score of possible changes in a window, in short pieces.
+    Compute information and scores of possible changes in a window, in short pieces.
 
     Parameters
     ----------
@@ -227,11 +227,11 @@ class ChangeSearch:
         self.reset()
 
     def set_chance(self, chance: float) -> None:
-        """Set the probability of a false alarm in a block; 0 switches the detection off."""
+        """Set the false-alarm probability of a block; 0 switches the detection off."""
         self._chance = chance / (len(self._sizes) * len(_WINDOW_LENGTHS))
 
     def reset(self) -> None:
-        """Clear the calibrated critical values and all blocks of samples."""
+        """Clear the calibrated critical values and all blocks."""
         places = {c.joint for c in self._candidates}
         self._calibrations = {
             m: NullCalibration(self._sizes.tolist(), m, len(places)) for m in _WINDOW_LENGTHS
@@ -240,13 +240,13 @@ class ChangeSearch:
         self.interrupt()
 
     def interrupt(self) -> None:
-        """Discard the blocks before an interruption of the stream."""
+        """Discard the blocks from before an interruption of the stream."""
         self._blocks: deque[Block] = deque(maxlen=_WINDOW_LENGTHS[-1] + 1)
         self._waiting: deque[dict[int, tuple[FloatArray, FloatArray]]] = deque()
 
     def take(self, block: Block, residual_scale: float) -> Pieces[FoundChange | None]:
         """
-        Add a block of samples, and return a significant change of the arm; None without a change.
+        Add a block; return a change of the arm if one is significant, else None.
 
         Parameters
         ----------
@@ -288,7 +288,7 @@ class ChangeSearch:
         after: Sequence[Block],
         residual_scale: float,
     ) -> Pieces[Estimate]:
-        """Return the estimated size of a candidate change between a block and later blocks."""
+        """Return the estimated size of a candidate change after a given block."""
         window = yield from score_statistics(after, before, self.directions, residual_scale)
         yield
         number = self._candidates.index(candidate)
@@ -299,7 +299,7 @@ class ChangeSearch:
         return Estimate(candidate.parameters, values, covariance * usual)
 
     def _find_onset(self, residual_scale: float) -> Pieces[FoundChange | None]:
-        """Return the change with its onset and cause; None while onset or cause is ambiguous."""
+        """Return the change with its start and cause; None while these are ambiguous."""
         # difference of log-likelihoods from which one explanation is clearly better
         clear = 5.0
         rows, blocks = [], list(self._blocks)

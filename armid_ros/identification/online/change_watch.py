@@ -43,7 +43,7 @@ Item = TypeVar('Item')
 
 class Row(NamedTuple):
     """
-    Filtered sample for the estimator, with the motion from which friction columns are computed.
+    Filtered sample for the estimator, and the motion from which friction columns follow.
 
     Attributes
     ----------
@@ -72,7 +72,7 @@ class Row(NamedTuple):
 
 class NuisanceRows:
     """
-    Regressor columns of friction that the model lacks, used as nuisance parameters.
+    Regressor columns for friction that the model lacks, fitted as nuisance parameters.
 
     Such friction biases the identified parameters, and the bias varies with the motion. A search
     for changes would attribute this variation to a change. The friction law itself does not vary,
@@ -135,7 +135,7 @@ class NuisanceRows:
 
 @dataclass(eq=False)
 class _Stretch:
-    """Samples of a block not yet searched; the time `end` is None before an interruption."""
+    """Samples of a block that was not searched yet; `end` is None before an interruption."""
 
     begin: float
     end: float | None = None
@@ -144,7 +144,7 @@ class _Stretch:
 
 class ChangeWatch:
     """
-    Estimator update that also detects changes of the parameters.
+    Recursive estimator that also detects changes of the parameters.
 
     Parameters
     ----------
@@ -188,7 +188,7 @@ class ChangeWatch:
         self.reset()
 
     def reset(self) -> None:
-        """Clear noise level and detected changes; no background computation may be pending."""
+        """Clear noise level and detected changes; must not be called during a computation."""
         self.changes: list[Change] = []
         self._wider.reset()
         self._search.reset()
@@ -202,7 +202,7 @@ class ChangeWatch:
 
     def use(self, false_alarm_time: float | None, forgetting: float) -> None:
         """
-        Set the mean time between false alarms and the forgetting factor, and keep the estimate.
+        Set mean time between false alarms and forgetting factor; the estimate is kept.
 
         Parameters
         ----------
@@ -232,12 +232,12 @@ class ChangeWatch:
         self._estimator.update(*row.sample)
 
     def _with_nuisance(self, directions: FloatArray) -> FloatArray:
-        """Return directions of the parameters, extended by zeros for the nuisance parameters."""
+        """Extend directions of parameters by zeros for the nuisance parameters."""
         more = len(self._wider.parameters) - self._count
         return np.vstack([directions, np.zeros((more, directions.shape[1]))])
 
     def _queue(self, end: float | None) -> None:
-        """Queue the present block for the change search, and start the search if it is idle."""
+        """Queue the present block for the change search; start the search if it is idle."""
         assert self._open is not None
         self._open.end = end
         self._queued.append(self._open)
@@ -267,7 +267,7 @@ class ChangeWatch:
             self._searching = False
 
     def _unsearched(self) -> list[Row]:
-        """Remove and return all samples that were not yet searched for changes."""
+        """Remove and return all samples that have not been searched for changes."""
         stretches = (*self._queued, *([self._open] if self._open else ()))
         self._queued.clear()
         self._open = None
@@ -285,7 +285,7 @@ class ChangeWatch:
         return 4 if self._estimator.forgetting < 1.0 else _SAMPLES_PER_PIECE
 
     def _widened(self, rows: Sequence[Row]) -> Pieces[list[WeightedSample]]:
-        """Return samples whose regressor rows also have the columns of the nuisance parameters."""
+        """Return samples whose regressor rows include the columns of nuisance parameters."""
         samples: list[WeightedSample] = []
         if not rows:
             return samples

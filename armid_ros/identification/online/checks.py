@@ -29,13 +29,13 @@ class StreamChecks:
         self.reset()
 
     def reset(self) -> None:
-        """Restart the checks with a new stream."""
+        """Start the checks anew for a new stream."""
         self._moved: float | None = None
         self._moving = 0.0
         self._judged: tuple[bytes, str] | None = None
 
     def take(self, t: float) -> None:
-        """Update the duration of motion with the timestamp of an undamaged sample [s]."""
+        """Add the time stamp of an undamaged sample [s] to the duration of motion."""
         if self._moved is None:
             lowest, highest = self._positions
             self._moved = t if np.any(highest - lowest > REST_RANGE) else None
@@ -43,19 +43,18 @@ class StreamChecks:
 
     @property
     def _positions(self) -> tuple[FloatArray, FloatArray]:
-        """Return the smallest and the largest position of each joint."""
         n = self._robot.n_joints
         return self._gate.lowest[:n], self._gate.highest[:n]
 
     @property
     def silent(self) -> bool:
-        """Whether all torques have been constant since the start."""
+        """Whether all measured torques have been constant since the start."""
         n = self._robot.n_joints
         return bool((self._gate.highest[-n:] <= self._gate.lowest[-n:]).all())
 
     @property
     def error(self) -> str:
-        """Return the fault that prevents identification; empty without fault."""
+        """Return the fault that prevents identification; empty if there is none."""
         if self.silent and abs(self._moving) > MIN_DURATION:
             return SILENT
         # the ranges are checked at each row, but seldom increase
@@ -68,7 +67,7 @@ class StreamChecks:
 
 class MissingSamples:
     """
-    Number of missing samples of a stream, computed from the timestamps.
+    Count of missing samples in a stream, computed from time stamps.
 
     A delayed sample that is followed by early samples is not missing.
 
@@ -89,7 +88,7 @@ class MissingSamples:
         self._doubtful = 0
 
     def take(self, t: float, period: float | None) -> None:
-        """Update the count with a timestamp [s] and, if it is known, the sampling period [s]."""
+        """Update the count with a time stamp [s] and, once known, the sampling period [s]."""
         last = self._last
         # a timestamp more than 1 s before the last one belongs to a restarted clock
         if last is not None and last - 1.0 < t <= last:
@@ -110,7 +109,7 @@ class MissingSamples:
             self._doubtful = 0
 
     def _subtract_late(self) -> None:
-        """Reduce the count of missing samples by 1 for a sample that arrives late."""
+        """Reduce the count by 1 for a sample that arrives late."""
         if self._doubtful:
             self._doubtful -= 1
             self.count -= 1

@@ -55,7 +55,7 @@ _SMALLEST = float(np.finfo(float).tiny)
 
 class OnlineIdentifier:
     """
-    Recursive estimate of the base parameters of an arm and its effects while the arm moves.
+    Recursive estimator of base and effect parameters, while the arm moves.
 
     Parameters
     ----------
@@ -157,7 +157,7 @@ class OnlineIdentifier:
         self._noise: RowNoise | None = None
 
     def reset(self) -> None:
-        """Clear the estimate and all counters, and keep the settings."""
+        """Clear the estimate and all counters; keep the settings."""
         self._work.clear()
         self._clear_estimate()
         self._filter.reset()
@@ -182,7 +182,7 @@ class OnlineIdentifier:
         self, t: float, q: npt.ArrayLike, dq: npt.ArrayLike | None, tau: npt.ArrayLike
     ) -> OnlineSample | None:
         """
-        Update the estimate with one joint state.
+        Update the estimate with one joint state; return its torque prediction if used.
 
         Parameters
         ----------
@@ -225,7 +225,7 @@ class OnlineIdentifier:
         return self.latest[-1] if self.latest else None
 
     def __getstate__(self) -> dict[str, Any]:
-        """Finish pending computations, as generators cannot be copied, and return the state."""
+        """Finish pending computations, which cannot be copied; return the state for a copy."""
         self._add_pending_row()
         self._work.finish()
         return self.__dict__
@@ -268,7 +268,7 @@ class OnlineIdentifier:
         return self._new_row(motion, step, used & usable, begins)
 
     def estimate(self) -> Estimate:
-        """Return the base parameters with a covariance that allows for autocorrelated errors."""
+        """Estimate of the base parameters; its covariance allows for autocorrelated errors."""
         self._add_pending_row()
         estimate = self._estimator.estimate
         covariance = self._scores.covariance(self._estimator.root)
@@ -350,17 +350,17 @@ class OnlineIdentifier:
 
     @property
     def rejected(self) -> Mapping[str, int]:
-        """Return the number of joint states that the filters left out, by reason."""
+        """Number of joint states that the filters rejected, by reason."""
         return Counter(self._filter.rejected) + self._gate.rejected
 
     @property
     def error(self) -> str:
-        """Return the fault that prevents identification, such as zero torques; empty if none."""
+        """Fault that prevents identification, such as zero torques; empty if there is none."""
         return self._checks.error
 
     @property
     def spikes(self) -> Mapping[tuple[str, str], int]:
-        """Return, for each joint and signal, the number of joint states left out for a spike."""
+        """Number of joint states rejected for a spike, by joint and signal."""
         joints = self.arm.robot.joints
         signals = ('position', *(['velocity'] * self.settings.measured_velocity), 'effort')
         names = [(joint, signal) for signal in signals for joint in joints]
@@ -368,7 +368,7 @@ class OnlineIdentifier:
 
     @property
     def restarts(self) -> Mapping[str, int]:
-        """Return the number of restarts of the filters for each reason; see CausalFilter."""
+        """Number of filter restarts, by reason; see CausalFilter."""
         return self._filter.restarts
 
     @property
@@ -432,7 +432,7 @@ class OnlineIdentifier:
 
     @property
     def _negligible_error(self) -> FloatArray:
-        """Return the largest negligible error of each signal, which is 0 except for torques."""
+        """Return the largest negligible error of each signal: positive for torques, else 0."""
         n = self.arm.robot.n_joints
         if self._filter.pole is None:
             return np.zeros((3 if self.settings.measured_velocity else 2) * n)

@@ -25,7 +25,7 @@ _OF_BODY = {
 @dataclass(frozen=True)
 class Unlearned:
     """
-    Parameters of one joint that the motion does not identify.
+    Parameters of one joint that the motion does not make identifiable.
 
     Attributes
     ----------
@@ -40,7 +40,7 @@ class Unlearned:
     parameters: tuple[ParameterName, ...]
 
     def __str__(self) -> str:
-        """Return a text with the unidentified quantities, and the motion that identifies them."""
+        """Return the unidentified quantities as text, with the motion that would identify them."""
         friction = {
             'viscous_coefficient': 'viscous friction',
             'coulomb_torque': 'Coulomb friction',
@@ -56,7 +56,7 @@ class Unlearned:
 
 class LearningProgress:
     """
-    Detector of parameters that the motion does not identify, from the latest estimates.
+    Detector of parameters whose estimates the motion does not improve.
 
     Parameters
     ----------
@@ -83,7 +83,7 @@ class LearningProgress:
 
     def unidentified(self, t: float, estimate: Estimate) -> tuple[Unlearned, ...]:
         """
-        Return each joint's parameters whose standard deviation has hardly fallen for ten seconds.
+        Return parameters whose standard deviations have hardly fallen in ten seconds, by joint.
 
         Parameters
         ----------

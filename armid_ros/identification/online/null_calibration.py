@@ -28,7 +28,7 @@ MAX_BLOCKS = 240
 
 class History:
     """
-    Buffer for the latest rows of a table of numbers, with a limited number of rows.
+    Buffer of the latest rows of numbers, limited to a number of rows.
 
     Parameters
     ----------
@@ -113,7 +113,7 @@ class NullCalibration:
 
     def update(self, ratios: FloatArray, strength: FloatArray) -> Job:
         """
-        Update the critical values with a window in which the arm did not change, in pieces.
+        Update the critical values with a window in which the arm did not change.
 
         Parameters
         ----------
@@ -140,7 +140,7 @@ class NullCalibration:
         yield from self._fit_factors(self._ratios.values[len(self._ratios) // 4 :])
 
     def _fit_factors(self, later: FloatArray) -> Job:
-        """Compute the factors of the test statistics from earlier windows; 0 means no data."""
+        """Compute the factors of the test statistics from earlier windows; 0 if there are none."""
         counts = np.sum(later > 0.0, axis=0)
         independent = counts / self._overlap
         valid = independent >= 12.0  # too few independent windows for a test
@@ -181,7 +181,7 @@ class NullCalibration:
 
     def excess(self, ratios: FloatArray, strength: FloatArray, chance: float) -> FloatArray:
         """
-        Return the test statistics divided by their critical values; 0 before the calibration.
+        Return test statistics divided by their critical values; 0 before calibration.
 
         Model discrepancy has biased the parameters, so the critical values are larger for motion
         that is stronger than usual.
@@ -207,7 +207,7 @@ class NullCalibration:
 
 
 def _in_pieces(values: FloatArray) -> Iterator[slice]:
-    """Yield slices of the columns of an array, each small enough for one piece of work."""
+    """Yield slices of an array's columns, each small enough for a short computation."""
     width = max(1, 4_000 // max(1, len(values)))
     for first in range(0, values.shape[1], width):
         yield slice(first, first + width)
@@ -215,7 +215,7 @@ def _in_pieces(values: FloatArray) -> Iterator[slice]:
 
 class ResidualScale:
     """
-    Standard deviation of the residuals of each joint, relative to the assumed noise.
+    Standard deviation of each joint's residual, relative to the assumed noise.
 
     Residuals are summed over a block, in which fast errors cancel. The scale is the median over
     blocks, so first blocks and a change that is not yet detected hardly affect it.
@@ -234,11 +234,11 @@ class ResidualScale:
 
     @property
     def value(self) -> FloatArray:
-        """Return the standard deviation of residuals over the assumed noise, (m,); initially 1."""
+        """Ratio of residual standard deviation to assumed noise of each joint, (m,); first 1."""
         return np.ones(1) if self._value is None else self._value
 
     def learn(self, residual: FloatArray, weights: FloatArray) -> None:
-        """Update the scale with residuals of a block, divided by assumed noise, shape (k, m)."""
+        """Update the ratio with the residuals of a block in units of assumed noise, (k, m)."""
         used = np.sum(weights > 0.0, axis=0)
         if not used.any():
             return  # residuals during motion are kept while the arm is at rest

@@ -19,7 +19,7 @@ import numpy as np
 
 def onset(arm: ArmModel, recording: Recording) -> float | None:
     """
-    Return the time at which the residual power of a model changed; None without a change.
+    Return the time [s] at which a model's residual in a recording changed, or None.
 
     The logarithm of the residual power of short blocks has different means before and after a
     change. The largest F ratio over time is tested for significance, corrected for all times and

@@ -121,7 +121,7 @@ class RecursiveLeastSquares:
         self.reset()
 
     def with_more(self, parameters: tuple[ParameterName, ...]) -> RecursiveLeastSquares:
-        """Return a restarted estimator with further parameters, which start at 0."""
+        """Return a restarted estimator with additional parameters, which start at 0."""
         wider = copy(self)
         wider.parameters = self.parameters + parameters
         wider._start = np.concatenate([self._start, np.zeros(len(parameters))])
@@ -129,7 +129,7 @@ class RecursiveLeastSquares:
         return wider
 
     def restricted(self, count: int) -> RecursiveLeastSquares:
-        """Return the estimator of the first `count` parameters, with all others fixed to zero."""
+        """Return the estimator of the first `count` parameters; the others are fixed to zero."""
         fewer = copy(self)
         fewer.parameters, fewer._start = self.parameters[:count], self._start[:count]
         root, right = self._root[:count, :count].copy('F'), self._root @ self._values
@@ -212,17 +212,17 @@ class RecursiveLeastSquares:
             self.update(*(np.concatenate(part) for part in zip(*samples, strict=True)))
 
     def scale(self, weights: FloatArray) -> FloatArray:
-        """Return the factors that scale the noise of weighted rows to 1, shape (m,) [1/(N m)]."""
+        """Return factors (m,) that scale weighted rows to unit noise [1/(N m)]."""
         return np.asarray(np.sqrt(weights) / self._noise)
 
     def copied(self) -> RecursiveLeastSquares:
-        """Return a copy of the estimator that later updates do not change."""
+        """Return an independent copy of the estimator."""
         other = copy(self)
         other._root, other._right = self._root.copy('F'), self._right.copy('F')
         return other
 
     def restore(self, other: RecursiveLeastSquares) -> None:
-        """Take over the state of another estimator of the same parameters."""
+        """Copy the state of another estimator of the same parameters."""
         self._take(other._root.copy('F'), other._values)
         self._squares, self._freedom = other._squares, other._freedom
         self.samples = other.samples
@@ -261,7 +261,7 @@ class RecursiveLeastSquares:
 
     @property
     def root(self) -> FloatArray:
-        """Return the triangular factor R of the information matrix R^T R; updates overwrite R."""
+        """Return the triangular factor R of the information R^T R; later updates change it."""
         return self._root
 
     @property
@@ -298,14 +298,14 @@ class RecursiveLeastSquares:
         return Estimate(self.parameters, self._values.copy(), self.covariance)
 
     def _take(self, root: FloatArray, values: FloatArray) -> None:
-        """Set the triangle R and the estimate theta, and compute R theta from them."""
+        """Set the triangular factor R and the estimate theta, and compute R theta."""
         self._root, self._values = root, values
         self._right = np.asfortranarray((root @ values)[:, np.newaxis])
 
 
 def forget_and_add(root: FloatArray, rows: FloatArray, forgetting: float) -> FloatArray:
     """
-    Add the information of rows to the triangle R, and forget old information in their directions.
+    Add rows to the triangular factor R, and forget old information in their directions.
 
     In the directions b of U = rows R^-1 = A diag(s) B^T the old information, 1, becomes
     1 - f + s^2 with f = min(s^2, level). It never falls, so the new triangle is the old one
@@ -344,7 +344,7 @@ def forget_and_add(root: FloatArray, rows: FloatArray, forgetting: float) -> Flo
 
 
 def check_forgetting(factor: float) -> None:
-    """Raise an IdentificationError for a forgetting factor out of range."""
+    """Raise an IdentificationError for a forgetting factor outside its range."""
     if not MIN_FORGETTING <= factor <= 1.0:
         raise IdentificationError(
             f'the forgetting factor is {factor}, but has to be from {MIN_FORGETTING} to 1'

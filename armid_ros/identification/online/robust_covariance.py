@@ -32,7 +32,7 @@ _RIDGE = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class _Bands:
-    """Products of Fourier transforms of regressor and torque, per joint and frequency band."""
+    """Products of Fourier transforms of regressor and torque, by joint and frequency band."""
 
     products: FloatArray  # (m, B, P + 1, P + 1), torques last
     counts: FloatArray  # number of real values summed up in every product, (m, B)
@@ -65,14 +65,14 @@ class RobustCovariance:
         self.reset()
 
     def reset(self) -> None:
-        """Clear all sums of Fourier products; no background computation may be pending."""
+        """Clear all Fourier products; must not be called during a computation."""
         self._settled: _Bands | None = None
         self._latest: _Bands | None = None
         self._shape: tuple[FloatArray, FloatArray] | None = None
         self.interrupt()
 
     def interrupt(self) -> None:
-        """Begin a new window after an interruption of the stream."""
+        """Start a new window after an interruption of the stream."""
         self._rows: FloatArray | None = None
         self._count = 0
 
@@ -117,7 +117,7 @@ class RobustCovariance:
         self._work.begin(self._subtract_change(directions, values))
 
     def _add_window(self, columns: FloatArray, values: FloatArray) -> Job:
-        """Add the products of a window of regressors and torques, (m, k, P + 1), to the sums."""
+        """Add the Fourier products of a window of regressors and torques, (m, k, P + 1)."""
         window = yield from _transformed(columns)
         if not window.counts.any():
             return
@@ -144,7 +144,7 @@ class RobustCovariance:
         self._latest = window
 
     def _subtract_change(self, directions: FloatArray, values: FloatArray) -> Job:
-        """Fit a parameter change in given directions; remove its torque from earlier sums."""
+        """Fit a parameter change in given directions, and remove it from earlier products."""
         self._latest = None
         if self._settled is None:
             return
@@ -165,7 +165,7 @@ class RobustCovariance:
 
     def covariance(self, root: FloatArray) -> FloatArray | None:
         """
-        Return the covariance of an estimate, shape (P, P); None before the second window.
+        Return the covariance (P, P) of an estimate; None before the second window.
 
         Few windows determine the noise only roughly. The standard deviations are increased so
         that normal intervals are as wide as Student's.
@@ -195,7 +195,7 @@ def _sum(some: _Bands, more: _Bands) -> Pieces[_Bands]:
 
 
 def _transformed(columns: FloatArray) -> Pieces[_Bands]:
-    """Return the Fourier products of a window of rows and torques, (m, k, P + 1), per octave."""
+    """Return the Fourier products by octave of a window of rows and torques, (m, k, P + 1)."""
     # number of columns transformed in one piece of work
     at_once = 24
     joints, count, size = columns.shape
@@ -223,7 +223,7 @@ def _transformed(columns: FloatArray) -> Pieces[_Bands]:
 
 
 def _shape(bands: _Bands, values: FloatArray) -> Pieces[tuple[FloatArray, FloatArray]]:
-    """Return a root of the score covariance J, whitened by M, and factors of the deviations."""
+    """Return a root of the covariance of scores, and factors for intervals by Student's t."""
     # level of the upper end of an interval
     level = 0.975
     # The noise power in a band is that of the residuals, corrected for the degrees of freedom of
@@ -271,7 +271,7 @@ def _shape(bands: _Bands, values: FloatArray) -> Pieces[tuple[FloatArray, FloatA
 
 
 def _triangle(information: FloatArray) -> FloatArray:
-    """Return triangular R, R^T R = information; eigenvalues below the ridge are raised to it."""
+    """Return triangular R with R^T R = information, whose small eigenvalues are raised."""
     try:
         return np.asarray(linalg.cholesky(information))
     except linalg.LinAlgError:

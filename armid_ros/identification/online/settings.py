@@ -82,7 +82,7 @@ class OnlineSettings:
 @dataclass(frozen=True)
 class OnlineSample:
     """
-    Measured and predicted torques of a sample, and the joints that the estimator used.
+    Measured and predicted torques of a sample, and a mask of the used joints.
 
     Attributes
     ----------

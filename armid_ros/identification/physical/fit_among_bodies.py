@@ -44,7 +44,7 @@ THINNEST = 0.05
 @dataclass(frozen=True)
 class PhysicalSettings:
     """
-    Known masses and shapes of links, as constraints of a physically consistent fit.
+    Known masses and shapes of links, which constrain a physically consistent fit.
 
     Attributes
     ----------
@@ -62,7 +62,7 @@ class PhysicalSettings:
     mass_range: float | None = None
 
     def __post_init__(self) -> None:
-        """Raise an error for a total mass, ratio of masses or box that no links can have."""
+        """Raise an error for a total mass, mass ratio or box that no links can have."""
         if self.total_mass is not None and not 0.0 < self.total_mass < np.inf:
             raise IdentificationError(
                 f'the total mass of the links, {self.total_mass} kg, has to be positive'
@@ -83,7 +83,7 @@ class PhysicalSettings:
 @dataclass(frozen=True)
 class PhysicalCertificate:
     """
-    Evidence that fitted links are physically consistent, and torque error by the constraints.
+    Proof that fitted links are physically consistent, and its cost in torque error.
 
     Attributes
     ----------
@@ -128,23 +128,23 @@ class PhysicalCertificate:
 
     @property
     def held_out_ratio(self) -> float:
-        """Torque error on held-out blocks, over that of unconstrained fits."""
+        """Ratio of held-out torque errors: with constraints over without constraints."""
         return dict(self.tried)[self.weight]
 
     @property
     def cost(self) -> float:
-        """Relative torque error that constraints add: the larger of training and held-out data."""
+        """Relative torque error added by constraints: the larger of training and held-out data."""
         return max(self.misfit_ratio, self.held_out_ratio) - 1.0
 
     @property
     def active(self) -> tuple[str, ...]:
-        """Links at the limit of physical consistency."""
+        """Links that are at the limit of physical consistency."""
         near = self.shares < _ACTIVE_SHARE
         return tuple(link.link for link, at in zip(self.links, near, strict=True) if at)
 
     @property
     def constraint_notes(self) -> tuple[str, ...]:
-        """Notes on constraints that change the fit or increase its torque error; empty if none."""
+        """Notes on constraints that change the fit or raise its torque error."""
         notes = []
         # held-out torque error, relative to an unconstrained fit, above which the constraints do
         # not fit the arm
@@ -172,7 +172,7 @@ class PhysicalCertificate:
         return tuple(notes)
 
     def sentences(self) -> tuple[str, ...]:
-        """Return sentences on physical consistency, cost of the constraints, and assumptions."""
+        """Return sentences on consistency, cost of the constraints, and assumptions."""
         least = min(self.links, key=lambda link: float(link.eigenvalues[0]))
         verdict = 'every link is' if self.consistent else 'not every link is'
         return (
@@ -187,7 +187,7 @@ class PhysicalCertificate:
         )
 
     def document(self) -> dict[str, Any]:
-        """Return the certificate as written to identification.json."""
+        """Return the certificate in the form of identification.json."""
         return {
             'consistent': self.consistent,
             'links': [
@@ -222,7 +222,7 @@ def fit_consistent_links(
     settings: PhysicalSettings,
 ) -> tuple[FittedValues, PhysicalCertificate]:
     """
-    Fit physically consistent links, starting at an unconstrained fit.
+    Fit physically consistent links, starting from an unconstrained fit.
 
     Parameters
     ----------
@@ -266,7 +266,7 @@ def fit_consistent_links(
 def _fit_links(
     arm: ArmModel, fit: FittedValues, settings: PhysicalSettings
 ) -> tuple[FittedValues, PhysicalCertificate]:
-    """Fit physically consistent links to the linear problem of an earlier fit."""
+    """Fit physically consistent links to the linearised problem of an earlier fit."""
     base, problem, weights = fit.base, fit.problem, fit.solution.weights
     program, notes = physical_program(arm, base, settings)
     # normal equations of blocks of successive samples, which are left out in turn
@@ -324,7 +324,7 @@ def _fit_links(
 
 
 def _walls_reached(parameters: FloatArray, box: Box) -> list[str]:
-    """Return the limits of its box that a link with given inertial parameters reaches."""
+    """Return the sides of its box that the mass of a link reaches, as text."""
     width = box[1] - box[0]
     largest = np.concatenate([width, width, 0.25 * width**2]) * parameters[0]
     near = box_conditions(box) @ parameters < _ACTIVE_SHARE * largest
@@ -333,7 +333,7 @@ def _walls_reached(parameters: FloatArray, box: Box) -> list[str]:
 
 
 def far_from_described(robot: Robot, masses: FloatArray) -> tuple[str, ...]:
-    """Return a note on links whose mass, (n,) [kg], is far from that described; empty if none."""
+    """Return a note on links whose fitted mass (n,) [kg] is far from the described mass."""
     # ratio of a mass to the described one above which a note is given
     heavy = 3.0
     described = robot.rigid_parameters[::PER_LINK]
@@ -353,7 +353,7 @@ def far_from_described(robot: Robot, masses: FloatArray) -> tuple[str, ...]:
 def physical_program(
     arm: ArmModel, base: BaseParameters, settings: PhysicalSettings
 ) -> tuple[PhysicalProgram, tuple[str, ...]]:
-    """Return the convex program of a physically consistent fit, and notes on its prior."""
+    """Return the convex program for physically consistent links, and notes on its prior."""
     prior, notes = consistent_prior(arm)
     ends = [effect.bounds() for effect in arm.effects]
     lower, upper = (np.concatenate([np.empty(0), *(b[k] for b in ends)]) for k in (0, 1))
@@ -369,7 +369,7 @@ def physical_program(
 
 def consistent_prior(arm: ArmModel) -> tuple[FloatArray, tuple[str, ...]]:
     """
-    Return the described standard parameters, with physically consistent values for each link.
+    Return the described parameters of all links, made physically consistent.
 
     A link without mass becomes a ball with the mean mass of the other links. A link may be a
     point, thinner than a twentieth of its length, or have impossible moments. Its second moments
@@ -421,7 +421,7 @@ def _held_out_errors(
     blocks: FloatArray,
     counts: FloatArray,
 ) -> tuple[tuple[float, float], ...]:
-    """Return held-out torque errors by weight of the prior, relative to unconstrained fits."""
+    """Return held-out torque errors relative to unconstrained fits, for each prior weight."""
     # compared weights of the divergence. The term of the torques is a mean square of about one.
     candidates = tuple(float(w) for w in 10.0 ** np.arange(-7.0, 0.5))
     free = 0.0
@@ -438,6 +438,6 @@ def _held_out_errors(
 
 
 def _misfit(products: FloatArray, values: FloatArray) -> float:
-    """Return the norm of the residual, given products of columns and target, (r + 1, r + 1)."""
+    """Return the norm of the residual for given values, from inner products (r + 1, r + 1)."""
     ends = np.append(values, -1.0)
     return float(np.sqrt(max(ends @ products @ ends, 0.0)))

@@ -45,7 +45,7 @@ Box = tuple[FloatArray, FloatArray]
 @dataclass(frozen=True)
 class PhysicalProgram:
     """
-    Convex program of a physically consistent fit: constraints and prior, without data.
+    Convex program for physically consistent links: constraints and prior, without data.
 
     Attributes
     ----------
@@ -79,7 +79,7 @@ class PhysicalProgram:
 
     def solve(self, products: FloatArray, count: float, weight: float) -> FloatArray:
         """
-        Return the standard parameters that minimise the program's cost under its constraints.
+        Return the standard parameters that minimise the cost under the constraints.
 
         Parameters
         ----------
@@ -147,7 +147,7 @@ class PhysicalProgram:
 
     @cached_property
     def _whitened_links(self) -> FloatArray:
-        """Linear map to inertial parameters from coordinates in which priors are the identity."""
+        """Linear map to inertial parameters from coordinates with unit prior covariance."""
         blocks = []
         for link in range(self.n_links):
             values = self.prior[PER_LINK * link : PER_LINK * (link + 1)]
@@ -171,7 +171,7 @@ class PhysicalProgram:
         rigid = len(self.prior) - len(self.lower)
 
         def linear(cone: Any, normal: FloatArray, offset: FloatArray) -> None:
-            """Add the constraint that the vector normal @ theta + offset is inside a cone."""
+            """Add the constraint that normal @ theta + offset is in a cone."""
             if len(normal):
                 side = sparse.vstack([empty] * len(normal))
                 blocks.append(sparse.hstack([-sparse.csr_matrix(normal @ change), side]))
@@ -226,7 +226,7 @@ class PhysicalProgram:
 
 def box_conditions(box: Box) -> FloatArray:
     """
-    Return linear conditions on the ten inertial parameters of a link inside a box.
+    Return linear conditions on a link's ten inertial parameters: its mass is inside a box.
 
     The centre of mass and all mass are between the corners: along every axis, the integral of
     (x - lower) (upper - x) dm is not negative.

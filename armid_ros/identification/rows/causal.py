@@ -36,7 +36,7 @@ MAX_MAGNITUDE = 1e6
 
 
 def check_gap(samples: int) -> None:
-    """Raise an error if the longest gap to interpolate across is below 1 sample."""
+    """Raise an error if the longest gap to be interpolated is below 1 sample."""
     if samples < 1:
         raise IdentificationError(
             f'the longest gap to interpolate across, {samples} samples, has to be 1 or more'
@@ -76,7 +76,7 @@ class TripleLag:
 
     def update(self, dt: float, signal: FloatArray) -> FloatArray:
         """
-        Filter the next sample of all signals.
+        Filter the next sample of all signals; return the filtered values.
 
         Parameters
         ----------
@@ -120,7 +120,7 @@ class TripleLag:
 
 class CausalMotion(NamedTuple):
     """
-    Motion and torque of all joints at one time, after the motion filter.
+    Filtered motion and torque of all joints at one time.
 
     Attributes
     ----------
@@ -198,13 +198,13 @@ class CausalFilter:
         self.reset()
 
     def reset(self) -> None:
-        """Restart the filter, and set the counts of left-out samples and restarts to zero."""
+        """Restart the filter; set the counts of rejected samples and restarts to zero."""
         self.rejected: Counter[str] = Counter()
         self.restarts: Counter[str] = Counter()
         self._begin()
 
     def restart(self, reason: str) -> None:
-        """Begin a new stretch of samples after an interruption of the stream."""
+        """Begin a new section of samples after an interruption of the stream."""
         self.restarts[reason] += 1
         self._begin()
 
@@ -226,7 +226,7 @@ class CausalFilter:
         self, t: float, q: npt.ArrayLike, dq: npt.ArrayLike | None, tau: npt.ArrayLike
     ) -> FloatArray | None:
         """
-        Return position, velocity if used, and torque of a valid joint state in one array.
+        Return a valid joint state as one array: positions, velocities if used, torques.
 
         Parameters
         ----------
@@ -259,7 +259,7 @@ class CausalFilter:
         return signal
 
     def advance(self, t: float, signal: FloatArray) -> CausalMotion | None:
-        """Filter the signals of a joint state; None until the initial filter state has decayed."""
+        """Filter the signals of a joint state; return None until the filter has settled."""
         dt = 0.0 if self._last is None else t - self._last
         longest = self.max_gap * self.period if self.period else np.inf
         if self._last is not None and not 0.0 < dt <= longest:
@@ -286,7 +286,7 @@ class CausalFilter:
         return CausalMotion(t, value[:n], dq[:n], ddq[:n], value[-n:])
 
     def _missing(self, t: float, dt: float, signal: FloatArray) -> list[FloatArray]:
-        """Return interpolated samples for the gap of length `dt` [s] before a sample."""
+        """Return interpolated samples for a gap of `dt` [s] before a sample."""
         # A straight line would have no acceleration in the gap. A cubic goes through the sample
         # after the gap and three samples before it. Their distances equal the gap, so the cubic
         # has hardly more noise than the samples.
@@ -305,7 +305,7 @@ class CausalFilter:
         return list(np.vander(inside, len(place)) @ factors)
 
     def _learn_period(self, dt: float) -> None:
-        """Add an interval between samples [s]; create the filter after 20 intervals."""
+        """Add a time step between samples [s]; create the filter after 20 time steps."""
         if dt > 0.0:
             self._intervals.append(dt)
         if len(self._intervals) < 20:  # too few for a median
@@ -329,7 +329,7 @@ class CausalFilter:
 @dataclass(frozen=True)
 class RowNoise:
     """
-    Noise of filtered torques (rows of the regression), relative to the noise of samples.
+    Noise of filtered torques (regression rows), relative to the noise of samples.
 
     Noise of samples, of standard deviation s and density s^2 T, has the variance s^2 T B after a
     filter H. The noise bandwidth B of the filter is the integral of |H|^2 over all frequencies.
@@ -352,7 +352,7 @@ class RowNoise:
 
     @classmethod
     def of(cls, period: float, motion_pole: float, row_pole: float) -> RowNoise:
-        """Return the noise of filtered torques, given the period [s] and filter poles [rad/s]."""
+        """Return the noise of filtered torques for a sample time [s] and filter poles [rad/s]."""
         # impulse response of both filters in series, over and in units of the row filter's pole;
         # its square has the integral of the squared gain over all frequencies (Parseval)
         ratio = motion_pole / row_pole
@@ -364,12 +364,12 @@ class RowNoise:
         return cls(bandwidth, gain, gain / (period * row_pole * float(np.max(response))))
 
     def independent(self, step: float) -> float:
-        """Return how many independent observations a row holds, `step` s after the row before."""
+        """Return the number of independent observations in a row, `step` s after the last row."""
         return min(1.0, self.bandwidth * step)
 
 
 def sensor_noise(robot: Robot, given: tuple[float, ...] | None) -> FloatArray:
-    """Return the torque noise of each joint, (n,): as given, or a share of its torque limit."""
+    """Return the torque noise of each joint, (n,): given, or a share of the torque limit."""
     if given is not None:
         noise = np.array(given, dtype=np.float64)
         if noise.shape != (robot.n_joints,):

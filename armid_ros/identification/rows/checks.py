@@ -73,25 +73,25 @@ def check_motion(robot: Robot, recordings: Sequence[Recording]) -> tuple[str, ..
 
 
 def check_held_out(robot: Robot, held_out: Sequence[Recording]) -> None:
-    """Raise an error if no joint moves in a held-out recording, which then validates no model."""
+    """Raise an error if no joint moves in a held-out recording: it validates nothing."""
     for recording in held_out:
         resting(robot, recording.source, np.ptp(recording.q, axis=0))
 
 
 def short_recording_note(recordings: Sequence[Recording]) -> tuple[str, ...]:
-    """Return a note if recordings are shorter than 5 s in total."""
+    """Return a note if the recordings last less than 5 s in total."""
     duration = sum(recording.duration for recording in recordings)
     return (f'{duration:.2g} s is short; record 20 s or more',) if duration < 5.0 else ()
 
 
 def moving(motions: Iterable[Motion]) -> npt.NDArray[np.bool_]:
-    """Return for each joint whether it moves in any of the given motions, shape (n,)."""
+    """Return a mask (n,) of the joints that move in any of the given motions."""
     ranges = np.max([np.ptp(motion.q, axis=0) for motion in motions], axis=0)
     return np.asarray(ranges >= REST_RANGE)
 
 
 def resting(robot: Robot, source: str, ranges: FloatArray) -> tuple[str, ...]:
-    """Return a note on joints at rest, by ranges of position, (n,); raise an error if all rest."""
+    """Return a note on joints at rest, from position ranges (n,); raise an error if all rest."""
     names = [name for name, size in zip(robot.joints, ranges, strict=True) if size < REST_RANGE]
     if len(names) == robot.n_joints:
         raise IdentificationError(
@@ -189,7 +189,7 @@ def laws_of_controllers(
     robot: Robot, motion: Motion, informative: npt.NDArray[np.bool_]
 ) -> tuple[str, ...]:
     """
-    Return a message per driven joint if all torques depend only on position and motion direction.
+    Return messages if torques depend only on position and direction, like a controller's output.
 
     Gravity compensation outputs the weight of the arm while a hand moves it; energy shaping
     outputs a constant torque in the direction of motion. Such a torque does not contain the torque
@@ -284,7 +284,7 @@ def position_problem(robot: Robot, lowest: FloatArray, highest: FloatArray) -> s
 
 
 def beyond_limits(robot: Robot, recordings: Sequence[Recording]) -> tuple[str, ...]:
-    """Return a note on joints that exceed their described position limits; empty if none does."""
+    """Return a note on joints that moved beyond their described position limits."""
     slack = _LIMIT_SLACK * (robot.upper - robot.lower)
     found = []
     for sign, limits, ends in (
@@ -305,7 +305,7 @@ def beyond_limits(robot: Robot, recordings: Sequence[Recording]) -> tuple[str, .
 
 def torque_factors(arm: ArmModel, motions: Sequence[Motion]) -> tuple[FloatArray, FloatArray]:
     """
-    Return ratio and correlation of the measured and the modelled torque of each joint.
+    Return ratio and correlation of measured and modelled torque for each joint.
 
     An offset is fitted too, and friction if the model has no effects. With effects, only samples
     in motion are used, as friction holds a joint at rest with any torque.
@@ -337,7 +337,7 @@ def torque_factors(arm: ArmModel, motions: Sequence[Motion]) -> tuple[FloatArray
 
 
 def joined(motions: Sequence[Motion]) -> Motion:
-    """Join several motions with torques into a single motion, in the given order."""
+    """Join several motions with torques into one motion."""
     names = ('t', 'q', 'dq', 'ddq', 'tau')
     arrays = [np.concatenate([getattr(motion, name) for motion in motions]) for name in names]
     return Motion(motions[0].joints, *arrays)
@@ -345,7 +345,7 @@ def joined(motions: Sequence[Motion]) -> Motion:
 
 def unit_of(factor: float, of_joints: Sequence[float] = (), near_force: float = 1.2) -> str:
     """
-    Return torque units, joined by 'or', that explain measured / expected torque; empty if none.
+    Return torque units that explain a factor of measured over expected torque; empty if none.
 
     Parameters
     ----------
@@ -371,5 +371,5 @@ def unit_of(factor: float, of_joints: Sequence[float] = (), near_force: float = 
 
 
 def residual_of_fit(values: FloatArray, columns: FloatArray) -> FloatArray:
-    """Return values, (N, ...), minus their least-squares fit by columns, (N, k)."""
+    """Return values (N, ...) minus their least-squares fit by columns (N, k)."""
     return np.asarray(values - columns @ np.linalg.lstsq(columns, values, rcond=None)[0])

@@ -38,7 +38,7 @@ _Columns = Callable[[Motion], FloatArray]
 @dataclass(frozen=True)
 class Stretch:
     """
-    Filtered, decimated motion and torque of a gap-free stretch of a recording.
+    Filtered and decimated motion and torque of a gap-free section of a recording.
 
     Attributes
     ----------
@@ -65,7 +65,7 @@ class Stretch:
 @dataclass(frozen=True)
 class Regression(Stretch):
     """
-    Linear problem of a stretch: measured torque = columns times parameters + constant.
+    Linear problem of a gap-free section: measured torque = columns @ parameters + constant.
 
     Attributes
     ----------
@@ -122,7 +122,7 @@ def regressions(
     progress: Callable[[float], None] | None = None,
 ) -> list[Regression]:
     """
-    Return the linear problem of chosen regressor columns of an arm, per stretch of recordings.
+    Return linear problems for chosen parameters of an arm, one per gap-free section.
 
     Parameters
     ----------
@@ -158,7 +158,7 @@ def regressions(
 @dataclass(frozen=True)
 class Fit(Stretch):
     """
-    Measured and predicted torque of a stretch of a recording.
+    Measured and predicted torque in a gap-free section of a recording.
 
     Attributes
     ----------
@@ -170,7 +170,7 @@ class Fit(Stretch):
     predicted: FloatArray
 
     def __repr__(self) -> str:
-        """Return recording, number of samples and relative error in one line."""
+        """Return recording name, number of samples and relative error in one line."""
         error = Score.of([self]).relative_error_percent
         return f'Fit of {self.source}: {len(self.motion)} samples, {error:.2f} % relative error'
 
@@ -183,7 +183,7 @@ class Fit(Stretch):
 @dataclass(frozen=True)
 class Score:
     """
-    Errors of the torque that a model predicts on recordings.
+    Errors of the torques that a model predicts for recordings.
 
     Attributes
     ----------
@@ -205,7 +205,7 @@ class Score:
 
     @staticmethod
     def of(fits: Sequence[Fit]) -> Score:
-        """Return the torque errors over all informative samples of given stretches."""
+        """Return the torque errors over all informative samples of gap-free sections."""
         names = 'residual', 'tau', 'informative'
         return Score.of_rows(*(np.concatenate([getattr(f, one) for f in fits]) for one in names))
 
@@ -213,7 +213,7 @@ class Score:
     def of_rows(
         residual: FloatArray, tau: FloatArray, informative: npt.NDArray[np.bool_]
     ) -> Score:
-        """Return torque errors over the informative samples of residuals and torques, (N, n)."""
+        """Return the errors of torques over their informative samples, from residuals (N, n)."""
         errors, lengths = (np.linalg.norm(informative * x, axis=0) for x in (residual, tau))
         count, whole = np.maximum(informative.sum(axis=0), 1), np.linalg.norm(lengths)
         return Score(
@@ -227,7 +227,7 @@ class Score:
 def weighted_rows(
     problem: Sequence[Regression], weights: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Return weighted columns, (N n, r), and weighted target torques, (N n,), of all stretches."""
+    """Return weighted columns (N n, r) and weighted target torques (N n,) of all sections."""
     columns = np.concatenate([part.columns for part in problem])
     target = np.concatenate([part.target for part in problem])
     rows = weights[:, :, np.newaxis] * columns
@@ -235,12 +235,12 @@ def weighted_rows(
 
 
 def by_stretch(problem: Sequence[Stretch], rows: FloatArray) -> list[FloatArray]:
-    """Split an array of the samples of all stretches, (N, ...), into one array per stretch."""
+    """Split an array (N, ...) of all samples into one array per gap-free section."""
     return np.split(rows, np.cumsum([len(part.motion) for part in problem])[:-1])
 
 
 def predictions(arm: ArmModel, recordings: Sequence[Recording], used: Conditioning) -> list[Fit]:
-    """Return measured and predicted torque of an arm model per stretch of recordings."""
+    """Return measured and predicted torque of a model for each gap-free section."""
     found = []
     for recording in recordings:
         for motion in segments(recording, used):
@@ -256,7 +256,7 @@ def _rows(
     rest: npt.NDArray[np.bool_],
     unsure: npt.NDArray[np.bool_],
 ) -> tuple[Motion, npt.NDArray[np.bool_]]:
-    """Return the decimated motion and torque of a stretch, and which samples are informative."""
+    """Decimate motion and torque of a section; also return which samples are informative."""
     kept = np.array(decimated_samples(len(motion), used), dtype=np.intp)
     assert motion.tau is not None
     tau = decimate(bridged(motion.tau, unsure), used)
@@ -271,7 +271,7 @@ def filtered_columns(
     unsure: npt.NDArray[np.bool_],
 ) -> FloatArray:
     """
-    Return chosen regressor columns of an arm along a stretch, filtered and decimated.
+    Return chosen regressor columns along a gap-free section, filtered and decimated.
 
     Parameters
     ----------
@@ -337,7 +337,7 @@ def filtered_columns(
 
 
 def _as_slice(indices: npt.NDArray[np.intp]) -> Samples:
-    """Return adjacent indices as a slice, which copies no array, and other indices unchanged."""
+    """Return adjacent indices as a slice, which avoids a copy; else return them unchanged."""
     adjacent = len(indices) and np.array_equal(indices, indices[0] + np.arange(len(indices)))
     return slice(int(indices[0]), int(indices[-1]) + 1) if adjacent else indices
 
@@ -346,7 +346,7 @@ def held_samples(
     arm: ArmModel, motion: Motion
 ) -> tuple[npt.NDArray[np.bool_], npt.NDArray[np.bool_]]:
     """
-    Return the samples of each joint at which its dry friction is unknown: rest and reversals.
+    Return masks of samples at which dry friction is unknown: at rest and in reversals.
 
     Returns
     -------
@@ -375,7 +375,7 @@ def held_samples(
 
 def bridged(values: FloatArray, unsure: npt.NDArray[np.bool_]) -> FloatArray:
     """
-    Return torques or columns, interpolated linearly across samples of unknown dry friction.
+    Interpolate torques or columns linearly across samples with unknown dry friction.
 
     Parameters
     ----------

@@ -53,7 +53,7 @@ _MIN_SAMPLES = 4
 @dataclass(frozen=True)
 class SignalSettings:
     """
-    Cut-off and decimation given by the user; None for a value that is chosen from recordings.
+    Position cut-off and decimation set by the user; None is chosen from recordings.
 
     Attributes
     ----------
@@ -80,7 +80,7 @@ class SignalSettings:
 @dataclass(frozen=True)
 class Conditioning:
     """
-    Cut-off of positions, and decimation, for recordings of equal sampling rate.
+    Filter settings for recordings of equal sampling rate: position cut-off and decimation.
 
     Attributes
     ----------
@@ -102,7 +102,7 @@ class Conditioning:
 
     @property
     def kept_hz(self) -> float:
-        """Highest frequency of decimated signals [Hz]."""
+        """Highest frequency that remains after decimation [Hz]."""
         # the decimation filter ends at this share of the decimated rate
         return 0.4 * self.rate_hz / self.decimation
 
@@ -118,7 +118,7 @@ class Conditioning:
     @property
     def smooth_stride(self) -> int:
         """
-        Largest number of samples between needed values of smooth functions of filtered positions.
+        Largest stride at which smooth functions of filtered positions have to be computed.
 
         The spectrum of positions ends at the cut-off, that of smooth functions slightly above.
         Five samples per period of the cut-off are enough for the pass band of the decimation.
@@ -131,7 +131,7 @@ class Conditioning:
 
 def conditioning(recordings: Sequence[Recording], settings: SignalSettings) -> Conditioning:
     """
-    Choose the cut-off of positions and the decimation for recordings of equal sampling rate.
+    Choose position cut-off and decimation for recordings of equal sampling rate.
 
     The cut-off of positions is the frequency at which their spectrum falls to their noise. It is
     at most a fifth of the sampling rate, as derivatives above are only noise. It is also at most
@@ -194,7 +194,7 @@ def velocity_error(recording: Recording, used: Conditioning) -> FloatArray:
 
 def segments(recording: Recording, used: Conditioning) -> Iterator[Motion]:
     """
-    Yield the motion of each gap-free stretch, at even times, with filtered positions.
+    Yield the motion of each gap-free section, evenly sampled, with filtered positions.
 
     Positions are differentiated as well; torques are unchanged. Stretches too short for the
     filters are left out.
@@ -222,20 +222,20 @@ def segments(recording: Recording, used: Conditioning) -> Iterator[Motion]:
 
 
 def unbroken(recording: Recording, rate: float) -> list[npt.NDArray[np.intp]]:
-    """Return the sample indices of each gap-free stretch of a recording."""
+    """Return the sample indices of each gap-free section of a recording."""
     longest = GAP_PERIODS * max(1.0 / rate, recording.period)
     breaks = np.flatnonzero(np.diff(recording.t) > longest) + 1
     return np.split(np.arange(len(recording.t)), breaks)
 
 
 def _shortest(used: Conditioning) -> float:
-    """Return the duration of the shortest stretch that the filters can process [s]."""
+    """Return the duration of the shortest section that the filters can process [s]."""
     edges = 2 * _HALF_TAPS * used.decimation / used.rate_hz  # of the decimation
     return edges + _CUTOFF_PERIODS / used.cutoff_hz
 
 
 def no_stretch(recording: Recording, used: Conditioning) -> IdentificationError:
-    """Return the error for a recording without a stretch long enough, with cause and remedy."""
+    """Return the error for a recording whose gap-free sections are all too short."""
     uneven = uneven_stamps(recording, used.cutoff_hz)
     if uneven:
         return IdentificationError(uneven)
@@ -305,7 +305,7 @@ def decimated_samples(n_samples: int, used: Conditioning) -> range:
 
 
 def _even(t: FloatArray, period: float, *signals: FloatArray) -> tuple[FloatArray, ...]:
-    """Return even times, and signals at these times, from cubic splines if the stamps jitter."""
+    """Return evenly spaced times and signals; cubic splines interpolate if the stamps jitter."""
     grid = np.linspace(t[0], t[-1], round((t[-1] - t[0]) / period) + 1)
     # stamps that differ by less than a twentieth of a period are even
     if len(grid) == len(t) and np.max(np.abs(grid - t)) < 0.05 * period:
@@ -327,7 +327,7 @@ def position_noise(recording: Recording) -> FloatArray:
 def _differentiated(
     recording: Recording, t: FloatArray, q: FloatArray, tau: FloatArray, used: Conditioning
 ) -> Motion:
-    """Return the filtered motion of a stretch; positions, (N, k), include a partner machine's."""
+    """Return the filtered motion of a section; positions may include another machine's."""
     sections = signal.butter(4, used.cutoff_hz, fs=used.rate_hz, output='sos')
     smooth = signal.sosfiltfilt(sections, q, axis=0)
     dq = _central_difference(smooth, t[1] - t[0])
@@ -371,7 +371,7 @@ def _central_difference(x: FloatArray, step: float) -> FloatArray:
 
 
 def _motion_band(stretches: Sequence[tuple[FloatArray, npt.ArrayLike]], rate: float) -> float:
-    """Return the frequency below which the fastest joint has 99 % of its velocity's power [Hz]."""
+    """Return the frequency below which 99 % of the power of the fastest velocity lies [Hz]."""
     # Each stretch has positions and the frequency above which they are noise, of all joints or of
     # each. Power above this frequency is ignored, as a joint that hardly moves has only noise
     # there. For the same reason, the power is summed over all stretches.
@@ -437,7 +437,7 @@ def mean_spectrum(
 def _position_spectrum(
     recording: Recording,
 ) -> tuple[list[FloatArray], FloatArray, FloatArray, FloatArray]:
-    """Return gap-free positions; their frequencies (K,), power (K, n) and noise (n,) per Hz."""
+    """Return gap-free positions with frequencies (K,), power (K, n) and noise (n,) per Hz."""
     rate = 1.0 / recording.period
     parts = [part for part in unbroken(recording, rate) if len(part) >= _MIN_SAMPLES]
     stretches = [recording.q[part] for part in parts] or [recording.q]

@@ -18,7 +18,7 @@ _UNEVEN_SHARE = 0.05
 
 def uneven_stamps(recording: Recording, cutoff_hz: float) -> str:
     """
-    Return a message on time stamps too uneven for a cut-off of positions [Hz]; empty otherwise.
+    Return a message if time stamps are too uneven for a position cut-off [Hz], else ''.
 
     Lost samples only make steps longer; varying delays of stamps make short steps too. Windows of
     50 stamps are compared with an even grid, which finds jitter and no slow drift of the clock.
@@ -42,7 +42,7 @@ def uneven_stamps(recording: Recording, cutoff_hz: float) -> str:
 
 def rounded_stamps(recording: Recording) -> str:
     """
-    Return a message if samples have equal, rounded time stamps; empty otherwise.
+    Return a message if samples have equal time stamps because of rounding, else ''.
 
     Of samples with equal stamps, the reader keeps one. Its stamp is wrong by up to half a step.
 
@@ -63,7 +63,7 @@ def rounded_stamps(recording: Recording) -> str:
 
 def check_recordings(recordings: Sequence[Recording]) -> None:
     """
-    Raise an error for a recording with too few samples per second, or from two senders.
+    Raise an error for a recording that has too few samples per second or two senders.
 
     Raises
     ------
@@ -93,7 +93,7 @@ def check_recordings(recordings: Sequence[Recording]) -> None:
 
 def two_senders(recording: Recording) -> str:
     """
-    Return a message on positions that alternate as those of two senders; empty otherwise.
+    Return a message if positions alternate like those of two senders, else ''.
 
     A sample has another sender than its neighbours if some joint is far from both neighbours, and
     these are near each other. Such samples form a separate track; values of a faulty encoder are

@@ -28,7 +28,7 @@ import numpy.typing as npt
 
 
 def _cuts(piece: Recording, used: Conditioning) -> tuple[int, int]:
-    """Return the times at which the next piece, and its own decimated samples, begin [ns]."""
+    """Return at which times [ns] the next piece begins, and its decimated samples begin."""
     # after 16 periods, the start of a filter of order 4 has decayed to exp(-38)
     periods = (EDGE_PERIODS + 16.0) * used.rate_hz / used.cutoff_hz
     margin = int(np.ceil(periods)) + len(used.taps)
@@ -55,7 +55,7 @@ def streamed(
     settings: ReadSettings,
 ) -> Iterator[tuple[Recording, Sequence[Regression]]]:
     """
-    Yield a recording in pieces without damaged samples, each with its linear problem.
+    Read a bag in pieces; yield each piece, repaired, with its linear problem.
 
     Parameters
     ----------

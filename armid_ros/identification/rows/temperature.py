@@ -21,7 +21,7 @@ _SIZES = {'viscous_slope': 'viscous_coefficient', 'coulomb_slope': 'coulomb_torq
 
 
 def mean_temperatures(parts: Sequence[Motion | Recording]) -> dict[str, float] | None:
-    """Return the mean temperature of each joint [degC]; None if a recording has no temperature."""
+    """Return each joint's mean temperature [degC]; None if a recording has none."""
     found = [part.temperature.at(part.t) for part in parts if part.temperature is not None]
     if not found or len(found) < len(parts):
         return None
@@ -32,7 +32,7 @@ def mean_temperatures(parts: Sequence[Motion | Recording]) -> dict[str, float] |
 
 def at_mean_temperature(arm: ArmModel, recordings: Sequence[Recording]) -> ArmModel:
     """
-    Return the arm model whose unfitted friction effects refer to the mean measured temperature.
+    Return the arm whose friction effects, unless fitted, refer to the mean temperature.
 
     Raises
     ------
@@ -58,7 +58,7 @@ def at_mean_temperature(arm: ArmModel, recordings: Sequence[Recording]) -> ArmMo
 
 def friction_per_kelvin(arm: ArmModel, estimate: Estimate, scatter: FloatArray) -> tuple[str, ...]:
     """
-    Return a note per joint: relative change of its friction per kelvin, with 95 % intervals.
+    Return for each joint a note on the relative change of friction per kelvin.
 
     The intervals are those of noise, or those of the differences between recordings if wider:
     `scatter`, (K, r), has the jackknife changes of the estimated values without each recording.

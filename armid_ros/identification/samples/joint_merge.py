@@ -21,14 +21,14 @@ Moment = tuple[float, FloatArray]
 
 @dataclass
 class _Part:
-    """Joints of a sender of joint states, and the sender's unmerged samples, each (s, k)."""
+    """Sender of joint states: its joints, and its samples (s, k) that are not merged yet."""
 
     joints: tuple[int, ...]
     samples: deque[Moment] = field(default_factory=lambda: deque(maxlen=1000))
     period: float = np.inf
 
     def take(self, t: float, values: FloatArray) -> None:
-        """Add a sample of the sender; clear the earlier samples if its time stamp goes back."""
+        """Add a sample of the sender; clear earlier samples if the time stamp goes back."""
         if self.samples:
             step = t - self.samples[-1][0]
             if step == 0.0:  # noqa: RUF069 - equal stamps differ by zero
@@ -42,7 +42,7 @@ class _Part:
         self.samples.append((t, values))
 
     def at(self, t: float) -> FloatArray | None:
-        """Return the signals of the sender interpolated at a time; None inside a long gap."""
+        """Interpolate the sender's signals at a time; return None inside a long gap."""
         while len(self.samples) > 1 and self.samples[1][0] <= t:
             self.samples.popleft()
         first, values = self.samples[0]
@@ -56,7 +56,7 @@ class _Part:
 
 class JointMerger:
     """
-    Merger of joint states that several senders publish, each with different joints.
+    Merger of joint states from several senders, each of which has different joints.
 
     The sender of the first joint defines the times of the merged samples; signals of other senders
     are interpolated linearly between their stamps of the same clock. A joint with two senders is
@@ -81,7 +81,7 @@ class JointMerger:
 
     def take(self, joints: tuple[int, ...], t: float, values: FloatArray) -> list[Moment]:
         """
-        Add a sample of some joints; return the merged samples that become complete.
+        Add a sample of some joints; return the samples of all joints that it completes.
 
         Parameters
         ----------
@@ -126,7 +126,7 @@ class JointMerger:
 
 def joint_places(joints: Sequence[str], names: Sequence[str]) -> npt.NDArray[np.intp]:
     """
-    Return the indices of given joints among the joint names of a message.
+    Return the index of each given joint among the joint names of a message.
 
     Parameters
     ----------

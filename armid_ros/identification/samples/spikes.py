@@ -56,7 +56,7 @@ N_FIRST = 20
 
 class SpikeGate:
     """
-    Gate that passes the undamaged joint states of a stream and leaves out damaged joint states.
+    Filter of a stream of joint states that leaves out damaged ones.
 
     Parameters
     ----------
@@ -157,7 +157,7 @@ class SpikeGate:
         return good + self._take(StreamSample(t, x))
 
     def _take(self, sample: StreamSample) -> list[StreamSample]:
-        """Process a sample whose time stamp the next sample does not contradict; see `take`."""
+        """Process a sample after the next sample has confirmed its time stamp."""
         if self._reference:
             self._last = self._reference[1].x
         if self._last is not None:
@@ -172,7 +172,7 @@ class SpikeGate:
 
     def settle(self) -> bool:
         """
-        Update the typical prediction errors if a window is almost full; return whether it was.
+        Update the typical prediction errors once a window is nearly full; return whether it was.
 
         Otherwise `take` updates them with the sample that completes the window. A stream calls
         `settle` after a sample that needs little other work.
@@ -187,7 +187,7 @@ class SpikeGate:
         curvature: FloatArray | float = 0.0,
     ) -> None:
         """
-        Begin within a recording whose typical prediction errors are known.
+        Start within a recording whose typical prediction errors are already known.
 
         Parameters
         ----------
@@ -206,7 +206,7 @@ class SpikeGate:
 
     def possible(self, excursion: Excursion, lowest: FloatArray, highest: FloatArray) -> bool:
         """
-        Return whether an excursion of signals may be a real pulse of torque, and not damage.
+        Return whether an excursion of signals can be a real torque pulse instead of damage.
 
         A position cannot jump and return. A torque can exceed its typical range, from `lowest` to
         `highest`, when free play is crossed, but by no more than the width of that range: an
@@ -224,7 +224,7 @@ class SpikeGate:
         reference: Sequence[StreamSample] = (),
         curvature: FloatArray | float = 0.0,
     ) -> None:
-        """Begin a new stretch with given samples, and keep the typical prediction errors."""
+        """Start a new section with given samples; keep the typical prediction errors."""
         self._first, self._reference = first, tuple(reference)
         self._curvature = curvature
         self._pending: list[StreamSample] = []
@@ -241,7 +241,7 @@ class SpikeGate:
         return latest[-1] if latest else None
 
     def _in_time(self, sample: StreamSample) -> bool:
-        """Return whether the stamp of a sample continues the stream or confirms a new stretch."""
+        """Return whether a sample's stamp continues the stream, or confirms a new section."""
         tail, stray, self._jumped = self._tail, self._jumped, None
         dt = 0.0 if tail is None else sample.t - tail.t
         longest = MAX_GAP * self._period
@@ -262,7 +262,7 @@ class SpikeGate:
         return False
 
     def _begin(self) -> list[StreamSample]:
-        """Measure noise and period from the first samples; return the undamaged first samples."""
+        """Measure noise and period from the first samples; return the undamaged ones."""
         raw, self._first = self._first or [], None
         first = all_unwrapped(raw, self._turn)
         self._period = float(np.median(np.diff([s.t for s in first])))
@@ -326,7 +326,7 @@ class SpikeGate:
         return []
 
     def _release(self) -> list[StreamSample]:
-        """Check the held samples for damage again; return the undamaged samples."""
+        """Check the held-back samples again; return the undamaged ones."""
         held, self._pending = self._pending, []
         innovations = self._lines_through(held)
         steady = ~self._pulsing
@@ -344,7 +344,7 @@ class SpikeGate:
         return good
 
     def _continues(self, sample: StreamSample, ratio: FloatArray) -> bool:
-        """Return whether a sample continues the held samples, with the old or a new slope."""
+        """Return whether a sample continues the held-back samples, with old or new slope."""
         last = self._pending[-1]
         before = self._pending[-2] if len(self._pending) > 1 else self._reference[1]
         first, second = self._reference
@@ -359,7 +359,7 @@ class SpikeGate:
         return False
 
     def _stepped(self) -> bool:
-        """Return whether a position has stepped between undamaged and held samples."""
+        """Return whether a position jumped between undamaged and held-back samples."""
         # The lines before and after a step do not intersect in between. The lines before and
         # after a collision do.
         ahead = innovation_of(self._reference, self._pending[0], self._period)
@@ -370,19 +370,19 @@ class SpikeGate:
         return bool(np.any(far[self._continuous & (ahead.error * back.error < 0.0)] > 1.0))
 
     def _limits(self, innovation: Innovation) -> FloatArray:
-        """Return the largest allowed prediction error of each signal of a sample, shape (m,)."""
+        """Return the largest allowed prediction error of each signal, shape (m,)."""
         limits = self._level.model.limits(innovation.noise, innovation.acceleration)
         return np.maximum(limits, self._floor)
 
     def _ratio_to_limit(self, innovation: Innovation) -> FloatArray:
-        """Return the prediction error of each signal over the largest allowed error, (m,)."""
+        """Return each signal's prediction error divided by the largest allowed one, (m,)."""
         limit = np.maximum(self._limits(innovation), 1e-300)
         return np.asarray(np.abs(innovation.error) / limit)
 
     def _accept(
         self, samples: list[StreamSample], innovation: Innovation | None = None
     ) -> list[StreamSample]:
-        """Update the typical prediction errors with samples without spikes; return the samples."""
+        """Update the typical prediction errors with undamaged samples; return the samples."""
         self._pending = []
         for sample in samples:
             one = innovation or innovation_of(self._reference, sample, self._period)
@@ -395,12 +395,12 @@ class SpikeGate:
         return samples
 
     def _lines_through(self, samples: Sequence[StreamSample]) -> list[Innovation]:
-        """Return the error of predicting each sample by the line through the two before it."""
+        """Return the errors of predicting each sample by the line through the two before."""
         pairs = range(len(samples) - 2)
         return [innovation_of(samples[k : k + 2], samples[k + 2], self._period) for k in pairs]
 
     def _leave_out_ahead(self, samples: Sequence[StreamSample], innovation: Innovation) -> None:
-        """Leave out the samples that precede the first three samples on a straight line."""
+        """Leave out all samples before the first three that lie on a straight line."""
         if samples:
             ratio, limit = self._ratio_to_limit(innovation), self._limits(innovation)
             self._leave_out(Excursion(tuple(samples), ratio, limit))

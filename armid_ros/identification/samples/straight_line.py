@@ -38,7 +38,7 @@ Time = TypeVar('Time', float, FloatArray)
 @dataclass(frozen=True, eq=False)
 class StreamSample:
     """
-    Measured signals of all joints at one time.
+    Measured signals of all joints at one time in a stream.
 
     Attributes
     ----------
@@ -59,7 +59,7 @@ class StreamSample:
 @dataclass(frozen=True, eq=False)
 class Excursion:
     """
-    Successive samples off the predicted line, to which later samples return.
+    Successive samples off the predicted straight line, to which later samples return.
 
     Attributes
     ----------
@@ -101,7 +101,7 @@ class ErrorModel:
     quantile: float
 
     def growth(self, noise: Factor, acceleration: Factor) -> FloatArray:
-        """Return the growth factor of errors, noise and acceleration combined, (m,) or (N, m)."""
+        """Return the growth of prediction errors by noise and acceleration, (m,) or (N, m)."""
         squares = acceleration**2
         return np.asarray(np.sqrt(squares + self.white * (noise**2 - squares)))
 
@@ -112,7 +112,7 @@ class ErrorModel:
 
     def limits(self, noise: Factor, acceleration: Factor) -> FloatArray:
         """
-        Return the largest allowed prediction errors, given their growth by noise and acceleration.
+        Return the largest allowed prediction errors, for given growth factors.
 
         The acceleration of an arm is bounded, unlike noise, which has tails. The limit of a smooth
         signal is therefore a small multiple of its typical error, not a quantile of the normal
@@ -132,7 +132,7 @@ class ErrorModel:
 
 class Innovation(NamedTuple):
     """
-    Prediction error of one sample.
+    Error of the prediction of one sample.
 
     Attributes
     ----------
@@ -149,7 +149,7 @@ class Innovation(NamedTuple):
 
 
 def growth_over(step: Time, ahead: Time, period: float) -> tuple[Time, Time]:
-    """Return factors by which errors by noise and by acceleration grow with prediction time."""
+    """Return how prediction errors grow with time: factors for noise and for acceleration."""
     ratio = ahead / step
     noise: Time = ((1.0 + (1.0 + ratio) ** 2 + ratio**2) / 6.0) ** 0.5
     return noise, 0.5 * ahead * (ahead + step) / period**2
@@ -158,7 +158,7 @@ def growth_over(step: Time, ahead: Time, period: float) -> tuple[Time, Time]:
 def innovation_of(
     reference: Sequence[StreamSample], sample: StreamSample, period: float
 ) -> Innovation:
-    """Return the error of predicting a sample by the straight line through two earlier samples."""
+    """Return the error of predicting a sample by the line through two earlier samples."""
     before, last = reference
     step, ahead = last.t - before.t, sample.t - last.t
     error = sample.x - last.x - ahead / step * (last.x - before.x)
@@ -166,7 +166,7 @@ def innovation_of(
 
 
 def unwrapped(x: FloatArray, last: FloatArray, turn: FloatArray) -> FloatArray:
-    """Return positions without jumps by full turns, by which drivers keep angles within +-pi."""
+    """Remove jumps by full turns from positions of drivers that report angles within +-pi."""
     if float(np.abs(x - last).max()) <= np.pi:
         return x
     turns = np.rint(np.divide(x - last, turn, where=turn > 0.0, out=np.zeros_like(x)))
@@ -174,7 +174,7 @@ def unwrapped(x: FloatArray, last: FloatArray, turn: FloatArray) -> FloatArray:
 
 
 def all_unwrapped(samples: Sequence[StreamSample], turn: FloatArray) -> list[StreamSample]:
-    """Return successive samples without jumps of their positions by full turns."""
+    """Remove jumps by full turns from the positions of successive samples."""
     found = [samples[0]]
     for sample in samples[1:]:
         found.append(replace(sample, x=unwrapped(sample.x, found[-1].x, turn)))
@@ -182,13 +182,13 @@ def all_unwrapped(samples: Sequence[StreamSample], turn: FloatArray) -> list[Str
 
 
 def quantile(period: float, count: int, false_alarm_time: float = FALSE_ALARM_TIME) -> float:
-    """Return the limit that noise of `count` signals seldom exceeds, in standard deviations."""
+    """Return the limit in standard deviations that noise of `count` signals seldom exceeds."""
     return float(-special.ndtri(min(period / false_alarm_time / count, 0.5) / 2.0))
 
 
 def robust_scale(innovations: FloatArray, share: float = 0.95) -> FloatArray:
     """
-    Return the standard deviation of errors, (k, m), from a quantile of the errors' size.
+    Return the standard deviation of errors (k, m) from a quantile of their size.
 
     Larger errors may be friction steps, or damage.
 
@@ -203,7 +203,7 @@ def robust_scale(innovations: FloatArray, share: float = 0.95) -> FloatArray:
 
 
 def share_of_noise(innovations: FloatArray, size: FloatArray) -> FloatArray:
-    """Return the share of white noise in squared successive prediction errors, (k, m)."""
+    """Return the share of white noise in the squares of successive errors (k, m)."""
     most = 3.0 * size  # larger errors are limited
     errors = np.minimum(np.maximum(innovations, -most), most)
     squares = np.einsum('k...,k...->...', errors, errors)
@@ -244,19 +244,19 @@ class NoiseLevel:
         self._window: list[tuple[Innovation, FloatArray]] = []
 
     def set(self, model: ErrorModel) -> None:
-        """Replace the typical prediction errors by those of a given error model."""
+        """Use the typical prediction errors of a given error model."""
         self.forget()
         self._remember(model.size, model.white)
         self.model = model
 
     def forget(self) -> None:
-        """Clear the measured noise; the next call of `begin` measures it again."""
+        """Forget the measured noise, so that `begin` measures it again."""
         self._sizes[:] = 0.0
         self._seen = 0
 
     def begin(self, innovations: Sequence[Innovation], moves: FloatArray, period: float) -> None:
         """
-        Measure the typical prediction errors of the first samples, some of which may be damaged.
+        Measure typical prediction errors of the first samples, some of which may be damaged.
 
         `moves`, (k, m), are the differences between successive samples; the period is in s.
 
@@ -271,11 +271,11 @@ class NoiseLevel:
             self._use(period, size, share_of_noise(errors, np.maximum(size, self._least(period))))
 
     def learn(self, innovation: Innovation, move: FloatArray) -> None:
-        """Add the prediction error of an undamaged sample, and the change of its signals, (m,)."""
+        """Add the prediction error of an undamaged sample, and its change of signals (m,)."""
         self._window.append((innovation, move))
 
     def settle(self, period: float, count: int = WINDOW) -> bool:
-        """Update the typical prediction errors if a window is full; return whether it was."""
+        """Update the typical prediction errors once a window is full; return whether it was."""
         if len(self._window) < count:
             return False
         innovations, moves = zip(*self._window, strict=True)
@@ -291,18 +291,18 @@ class NoiseLevel:
         return True
 
     def _use(self, period: float, size: FloatArray, white: FloatArray) -> None:
-        """Set the typical prediction errors to those of a window, but at least the resolution."""
+        """Set typical prediction errors from a window, but not below the resolution."""
         allowed = quantile(period, len(size), self._false_alarm_time)
         self.model = ErrorModel(period, np.maximum(size, self._least(period)), white, allowed)
 
     def _remember(self, size: FloatArray, white: FloatArray) -> None:
-        """Store the typical prediction errors of a window, in place of the oldest window."""
+        """Store the typical prediction errors of a window instead of the oldest window's."""
         place = self._seen % len(self._sizes)
         self._sizes[place], self._shares[place] = size, white
         self._seen += 1
 
     def add_steps(self, moves: FloatArray) -> None:
-        """Update the resolution of each signal with changes between successive samples, (k, m)."""
+        """Update each signal's resolution with the changes (k, m) between samples."""
         sizes = np.abs(moves)
         if ((sizes > 0.0) & (sizes < self._min_steps[-1])).any():  # seldom after the first samples
             self._min_steps = smallest_steps(np.concatenate([self._min_steps, sizes]))
@@ -316,7 +316,7 @@ class NoiseLevel:
 
 
 def smallest_steps(steps: FloatArray) -> FloatArray:
-    """Return the three smallest nonzero steps of each signal, shape (3, m)."""
+    """Return the three smallest nonzero changes of each signal, shape (3, m)."""
     none = np.full((3, steps.shape[1]), np.inf)
     steps = np.concatenate([none, np.where(steps > 0.0, steps, np.inf)])
     return np.partition(steps, 2, axis=0)[:3]

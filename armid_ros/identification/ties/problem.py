@@ -37,7 +37,7 @@ _COMMON = ('motion_lags', 'torque_lags', 'torque_noise', 'described', 'precision
 @dataclass(frozen=True)
 class InteractionProblem:
     """
-    Regression of torques on springs between two machines, tau = known + columns theta.
+    Linear regression of torques on springs between two machines, tau = known + columns theta.
 
     Attributes
     ----------
@@ -96,7 +96,7 @@ class InteractionProblem:
 
     @property
     def motion_noise(self) -> FloatArray:
-        """Covariance of the errors that noisy angles cause in a sample's motion, (3 J, 3 J)."""
+        """Covariance (3 J, 3 J) of a sample's motion that noisy angles cause."""
         return np.asarray(self.motion_lags[0])
 
     @property
@@ -123,12 +123,12 @@ class InteractionProblem:
         return np.asarray(self.tau - self.known - self.columns @ theta)
 
     def sensitivity(self, theta: FloatArray) -> FloatArray:
-        """Return the derivatives of the modelled torques by the motion, shape (N, n, 3 J)."""
+        """Return derivatives of the modelled torques by the motion, shape (N, n, 3 J)."""
         spring = np.einsum('nipj,p->nij', self.columns_by_motion, theta)
         return np.asarray(self.known_by_motion + spring)
 
     def deviation(self, theta: FloatArray) -> FloatArray:
-        """Return the root mean square residual of each joint due to noise alone, (n,) [N m]."""
+        """Return each joint's root mean square residual that noise alone causes, (n,) [N m]."""
         by_motion = self.sensitivity(theta)
         angles = np.sum(by_motion @ self.motion_noise * by_motion, axis=2)
         return np.asarray(np.sqrt(np.mean(angles, axis=0) + self.torque_noise**2))
@@ -227,7 +227,7 @@ def interaction_problem(
 def _free_inertias(
     robot: Robot, motion: Motion, springs: FloatArray, names: Sequence[str]
 ) -> tuple[FloatArray, BaseParameters]:
-    """Return the regressor columns of identifiable inertias, and the base parameters of these."""
+    """Return the regressor columns of identifiable inertias, and their base parameters."""
     # remainder of a column, as a share of it, below which it is a combination of the others
     tolerance = 1e-6
     body = regressor(robot, motion)
@@ -248,7 +248,7 @@ def _free_inertias(
 
 
 def _filtered_noise(used: Conditioning | None) -> tuple[FloatArray, FloatArray]:
-    """Return covariances between samples of filtered unit noise, of motion and of torques."""
+    """Return covariances between samples of filtered unit noise: of motion and of torques."""
     # number of samples over which errors are correlated after filtering
     n_lags = 6
     # Covariances of position, velocity, acceleration of a sample with itself and with later
@@ -270,7 +270,7 @@ def _filtered_noise(used: Conditioning | None) -> tuple[FloatArray, FloatArray]:
 
 
 def _regressor_by_motion(robot: Robot, motion: Motion, kept: npt.NDArray[np.intp]) -> FloatArray:
-    """Return derivatives of chosen rigid-body columns by the motion, shape (N, n, P, 3, n)."""
+    """Return derivatives of chosen inertial columns by the motion, shape (N, n, P, 3, n)."""
     h = 1e-5  # step of the central differences [rad or m]
     n = motion.n_joints
     result = np.empty((len(motion), n, len(kept), 3, n))
@@ -284,7 +284,7 @@ def _regressor_by_motion(robot: Robot, motion: Motion, kept: npt.NDArray[np.intp
 
 
 def _placed(by_own: FloatArray, count: int) -> FloatArray:
-    """Extend derivatives by one machine's motion, (..., 3, n), by zeros for the other machine."""
+    """Extend derivatives by one machine's motion with zeros for the other machine's."""
     result = np.zeros((*by_own.shape[:-1], count))
     result[..., : by_own.shape[-1]] = by_own
     return result.reshape((*by_own.shape[:-2], 3 * count))

@@ -42,7 +42,7 @@ def recorded_interaction_problem(
     slack: float | FloatArray = 0.0,
 ) -> InteractionProblem:
     """
-    Return the regression problem of spring stiffness, from recordings of both machines.
+    Return the regression for spring stiffness, from two recordings, one of each machine.
 
     The angles of the other machine are interpolated at the stamps of the first machine. Both are
     filtered, and torques and columns are decimated, as in any identification. White noise of the
@@ -85,7 +85,7 @@ def together_interaction_problem(
     rest: Callable[[Motion], FloatArray] | None = None,
 ) -> InteractionProblem:
     """
-    Return the regression problem of spring stiffness, from a recording of both machines.
+    Return the regression for spring stiffness, from one recording of both machines.
 
     Parameters
     ----------
@@ -139,7 +139,7 @@ def together_interaction_problem(
 
 def stacked(problems: Sequence[InteractionProblem]) -> InteractionProblem:
     """
-    Join regressions of several stretches or recordings into a single regression.
+    Join the regressions of several sections or recordings into one.
 
     Raises
     ------
@@ -154,7 +154,7 @@ def stacked(problems: Sequence[InteractionProblem]) -> InteractionProblem:
 
 
 def _one_machine(recording: Recording) -> Recording:
-    """Return a recording of both machines' joints; torques of the other machine are zero."""
+    """Return a recording with the joints of both machines; the other one's torques are zero."""
     assert recording.partner is not None and recording.tau is not None
     far = recording.partner.q
     return replace(
@@ -174,7 +174,7 @@ def band_of_motion(
     margin: float = 2.0,
 ) -> Conditioning:
     """
-    Return filters with the band reduced to that of the motion, unless the user set the band.
+    Reduce the pass band of filters to that of the motion, unless the user has set it.
 
     Parameters
     ----------
@@ -217,7 +217,7 @@ def _white(signals: FloatArray) -> FloatArray:
 @dataclass(frozen=True)
 class SensorNoise:
     """
-    Noise of the torques of an arm that springs connect to another machine.
+    Torque noise of an arm that springs connect to another machine.
 
     With springs, the noise of angles dominates. It is known far better from the angles themselves
     than from the difference of two periods of some seconds.
@@ -238,7 +238,7 @@ class SensorNoise:
     used: Conditioning
 
     def floor(self, arm: ArmModel) -> FloatArray:
-        """Return the standard deviation of the noise of filtered torques, shape (n,) [N m]."""
+        """Return the standard deviation (n,) of the noise of filtered torques [N m]."""
         problem = self._taut
         stiffness = dict.fromkeys(problem.spring_joints, 0.0)
         slack = dict.fromkeys(problem.spring_joints, 0.0)
@@ -258,5 +258,5 @@ class SensorNoise:
 
     @cached_property
     def _taut(self) -> InteractionProblem:
-        """Regression problem of springs that have no slack."""
+        """Regression for springs without slack."""
         return together_interaction_problem(self.robot, self.recording, self.used, separate=True)

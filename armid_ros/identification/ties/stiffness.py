@@ -75,7 +75,7 @@ class Interaction:
 
     @property
     def bias(self) -> FloatArray:
-        """Bias of the least-squares stiffnesses by noisy angles, shape (S,) [N/m]."""
+        """Bias of least-squares stiffnesses that noisy angles cause, shape (S,) [N/m]."""
         return np.asarray(self.uncorrected[: len(self.segments)] - self.stiffness)
 
     def interval(self, confidence: float = 0.95) -> FloatArray:
@@ -85,7 +85,7 @@ class Interaction:
 
 def identify_interaction(problem: InteractionProblem) -> Interaction:
     """
-    Estimate spring stiffnesses and free inertias, corrected for the bias by noisy angles.
+    Estimate spring stiffnesses and free inertias, corrected for bias by noisy angles.
 
     Parameters
     ----------
@@ -130,7 +130,7 @@ def identify_interaction(problem: InteractionProblem) -> Interaction:
 def _most_likely(
     problem: InteractionProblem, theta: FloatArray, variance: FloatArray
 ) -> FloatArray:
-    """Return the most likely parameters, from start values, by a quasi-Newton method (BFGS)."""
+    """Return the maximum-likelihood parameters, found by BFGS from start values."""
     # largest gradient, in standard deviations, at the end of the iteration
     converged = 1e-3
     # Where noise dominates a column, the information overestimates the curvature of the loss, and
@@ -142,7 +142,7 @@ def _most_likely(
     unit = np.linalg.inv(root).T / size[:, np.newaxis]  # directions of one standard deviation
 
     def half_loss(z: FloatArray) -> tuple[float, FloatArray]:
-        """Return half of the loss, and its gradient, at z standard deviations from the start."""
+        """Return half the loss and its gradient at z standard deviations from the start values."""
         here = theta + unit @ z
         step = _gauss_newton(problem, here, variance)
         away = here - problem.described
@@ -165,7 +165,7 @@ def _most_likely(
 
 
 def _least_squares(problem: InteractionProblem, columns: FloatArray) -> FloatArray:
-    """Return the least-squares parameters; raise an error for a spring that never stretches."""
+    """Return least-squares parameters; raise an error for a spring that never stretches."""
     w = columns.reshape(-1, columns.shape[2])
     scale = np.linalg.norm(w, axis=0)
     springs = scale[: columns.shape[2] - len(problem.rigid)]
@@ -180,7 +180,7 @@ def _least_squares(problem: InteractionProblem, columns: FloatArray) -> FloatArr
 
 
 class _Step(NamedTuple):
-    """Linear problem at the most likely motion, with residuals weighted by their covariance S."""
+    """Problem linearised at the most likely motion, with the covariance S of its residuals."""
 
     gradient: FloatArray  # negative gradient of half the loss, (P,)
     information: FloatArray  # (P, P)
@@ -206,7 +206,7 @@ def _gauss_newton(problem: InteractionProblem, theta: FloatArray, variance: Floa
 
 
 def _noise(problem: InteractionProblem, by_motion: FloatArray, variance: FloatArray) -> FloatArray:
-    """Return the covariance S of the residuals of each sample, shape (N, n, n)."""
+    """Return the covariance S of each sample's residuals, shape (N, n, n)."""
     covariance = by_motion @ problem.motion_noise @ by_motion.transpose(0, 2, 1)
     return np.asarray(covariance + np.diag(variance))
 
@@ -218,7 +218,7 @@ def _covariance(
     step: _Step,
     excess: float,
 ) -> FloatArray:
-    """Return the sandwich covariance of the parameters at the solution, H^-1 B H^-1, (P, P)."""
+    """Return the sandwich covariance H^-1 B H^-1 of the parameters, shape (P, P)."""
     # B is the covariance of the scores. Filters correlate neighbouring samples by a known
     # amount. If scores vary more, as with coloured noise, standard deviations are increased.
     # Independent poses have B = H.
