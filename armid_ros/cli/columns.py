@@ -22,7 +22,7 @@ META = 'armid.columns'
 
 
 def _kept(ctx: click.Context, parameter: click.Parameter, value: Any) -> Any:
-    """Store the value of an option in click's context, from which `settings` reads it."""
+    """Store the value of an option in click's context, where `settings` finds it."""
     ctx.meta.setdefault(META, {})[parameter.name] = value
     return value
 
@@ -32,7 +32,7 @@ _option = partial(click.option, callback=_kept, expose_value=False)
 
 
 def _rules(ctx: click.Context, parameter: click.Parameter, value: Any) -> Any:
-    """Store the pairs OLD:NEW of --rename; raise a RecordingError for a malformed pair."""
+    """Store the pairs OLD:NEW of --rename; RecordingError for a malformed pair."""
     rules = []
     for text in value:
         old, *new = listed(text, ':')
@@ -62,7 +62,7 @@ def _couplings(ctx: click.Context, parameter: click.Parameter, value: Any) -> An
 
 
 def _numbers(ctx: click.Context, parameter: click.Parameter, value: str | None) -> Any:
-    """Store the number of an option, or its numbers per joint, in click's context."""
+    """Store the number, or the numbers per joint, of an option in click's context."""
     if value is not None:
         from armid_ros.recording.columns import numbers
 
@@ -157,7 +157,7 @@ recordings = together(options, parameters.topic, parameters.setting, parameters.
 
 
 def settings() -> ColumnSettings:
-    """Return the settings for columns of tables that the options of the running command give."""
+    """Return the column settings that the options of the running command give."""
     from armid_ros.recording.columns import ColumnSettings
 
     return ColumnSettings(**click.get_current_context().meta.get(META, {}))

@@ -53,14 +53,14 @@ TYPED = 'armid.typed'
 
 
 class Commands(click.Group):
-    """Command group that imports a command on its use, and exits with code 2 on bad input."""
+    """Group of all commands: each is imported when used; bad input ends with exit code 2."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
-        """List the commands in the order of their use, then the commands of plug-ins by name."""
+        """List commands in the order of their use, then those of plug-ins by name."""
         return [*COMMANDS, *sorted(plug_ins('commands').keys() - COMMANDS)]
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
-        """Import and return the command of a name; None if there is no such command."""
+        """Import and return the command with this name; None if there is none."""
         if cmd_name in COMMANDS or cmd_name in plug_ins('commands'):
             return _imported(cmd_name)
         return None
@@ -69,7 +69,7 @@ class Commands(click.Group):
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
         """
-        Find the command that the arguments name, and set its defaults from armid.toml.
+        Find the command that the arguments name; set its defaults from armid.toml.
 
         The error message for an unknown command suggests the most similar command.
 
@@ -87,7 +87,7 @@ class Commands(click.Group):
         return name, command, rest
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        """List each command with the first sentence of its help, or the error of its import."""
+        """Write each command with the first sentence of its help, or its import error."""
         rows = []
         for name in self.list_commands(ctx):
             try:
@@ -98,14 +98,14 @@ class Commands(click.Group):
             formatter.write_dl(rows)
 
     def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem]:
-        """Return completions of a command or an option, without an import of all commands."""
+        """Return shell completions of a command or an option, without importing all commands."""
         names = [
             CompletionItem(name) for name in self.list_commands(ctx) if name.startswith(incomplete)
         ]
         return [*names, *click.Command.shell_complete(self, ctx, incomplete)]
 
     def invoke(self, ctx: click.Context) -> Any:
-        """Run a command and print its notes; print an error message for bad input."""
+        """Run a command and print its notes; for bad input print an error message."""
         try:
             result = super().invoke(ctx)
             _print_notes(ctx)
@@ -141,7 +141,7 @@ def _print_notes(context: click.Context) -> None:
 
 @cache
 def _imported(name: str) -> click.Command:
-    """Import the command of a name, and let its options accept finite numbers only."""
+    """Import the command with this name; its options will refuse infinite numbers."""
     command: click.Command
     if name in COMMANDS:
         module = import_module(f'armid_ros.cli.{COMMANDS[name]}')
@@ -153,7 +153,7 @@ def _imported(name: str) -> click.Command:
 
 
 def _refuse_infinite(command: click.Command) -> None:
-    """Let the options of a command and of its subcommands accept finite numbers only."""
+    """Make the options of a command and its subcommands refuse infinite numbers."""
     for below in command.commands.values() if isinstance(command, click.Group) else ():
         _refuse_infinite(below)
     for parameter in command.params:
@@ -167,7 +167,7 @@ def _finite(
     parameter: click.Parameter,
     value: Any,
 ) -> Any:
-    """Raise BadParameter for a number that is not finite; else call the option's own callback."""
+    """Raise BadParameter for a number that is not finite, else call the option's callback."""
     for number in value if isinstance(value, tuple) else (value,):
         if number is not None and not math.isfinite(number):
             raise click.BadParameter(f'{number} is not a finite number', context, parameter)
@@ -181,7 +181,7 @@ def project_options(
     others: Callable[[], Iterable[click.Command]],
 ) -> dict[str, Any]:
     """
-    Return the defaults of a command from armid.toml, and print them on stderr.
+    Return the defaults of a command from armid.toml; print them on stderr.
 
     A key outside of a table sets an option of all commands. A key in the table of a command
     sets the option for that command only.
@@ -241,7 +241,7 @@ def project_options(
 
 
 def _options(command: click.Command) -> dict[str, click.Option]:
-    """Return the options of a command and of its subcommands, by name without dashes."""
+    """Return the options of a command and its subcommands, by name without dashes."""
     inner = command.commands.values() if isinstance(command, click.Group) else ()
     own = [one for one in command.params if isinstance(one, click.Option)]
     found = {text.lstrip('-'): one for one in own for text in one.opts}

@@ -70,7 +70,7 @@ def convert(
 def _convert_tables(
     files: tuple[Path, ...], robot: Robot | None, joints: str | None, out: Path | None
 ) -> None:
-    """Join tables into a bag; without an output path, only print how their columns are read."""
+    """Join tables into a bag; without an output path, only print how columns are read."""
     from armid_ros.files.cells import listed
     from armid_ros.recording import write_recording
     from armid_ros.recording.reader import read_tables
@@ -98,7 +98,7 @@ def _convert_tables(
 
 
 def _convert_bag(path: Path, out: Path | None) -> None:
-    """Copy a ROS 1 bag to a ROS 2 bag, and print the copied topics."""
+    """Convert a ROS 1 bag to a ROS 2 bag, and print the copied topics."""
     from armid_ros.cli import options
     from armid_ros.recording import copy_bag, topics
     from armid_ros.recording.columns import refuse_columns

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 def share_of_percent(
     ctx: click.Context | None, param: click.Parameter | None, value: str
 ) -> float:
-    """Convert a percentage, with or without a percent sign, to a share from 0 to 1."""
+    """Convert text such as '1' or '1 %' to a share from 0 to 1."""
     try:
         share = float(value.removesuffix('%')) / 100.0
     except ValueError:
@@ -211,7 +211,7 @@ def diagnose(
 
 
 def _identified_from(model: Path, diagnosed: list[Path]) -> tuple[Path, ...]:
-    """Return the recordings that a model was identified from; empty if any is diagnosed."""
+    """Return the recordings that gave a model; empty if one of them is diagnosed."""
     from armid_ros.identification.output import identified_from, require_as_identified
 
     found = identified_from(model)
@@ -224,7 +224,7 @@ def _identified_from(model: Path, diagnosed: list[Path]) -> tuple[Path, ...]:
 
 
 def _model_of(path: Path, robot: Robot) -> ArmModel:
-    """Read a model.yaml; ArmidError if its description has other kinematics than a given robot."""
+    """Read a model.yaml; ArmidError if it is of a robot with other kinematics."""
     from armid_ros.arm import load_model
     from armid_ros.cli import options
     from armid_ros.identification.output import kinematics_digest
@@ -246,7 +246,7 @@ def open_partner(
     source: str | None, ties: Sequence[str], robot: Robot, gravity: str
 ) -> Partner | None:
     """
-    Load the machine of --partner with the possible ties to the arm; None without --partner.
+    Load the machine of --partner with possible ties to the arm; None without --partner.
 
     Raises
     ------
@@ -289,7 +289,7 @@ def read_together(
     partner: Partner,
     topic: str | None,
 ) -> list[Recording]:
-    """Return the recordings of the arm with the motion of the partner, read from the same bags."""
+    """Read the motion of the partner from the arm's bags; add it to the recordings."""
     from armid_ros.cli import options
     from armid_ros.recording import read_recording, recorded_together
 

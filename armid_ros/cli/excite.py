@@ -30,7 +30,7 @@ _SHARED = {
 
 
 def _speed(context: click.Context, parameter: click.Parameter, value: Any) -> str | float:
-    """Return --speed as a speed class, or as a share of the velocity and acceleration limits."""
+    """Return --speed as a speed class, or as a share of velocity and acceleration limits."""
     try:
         return str(value) if value in SPEED_CLASSES else float(value)
     except ValueError:
@@ -282,7 +282,7 @@ def excite(
 
 
 def _refuse_other_options(context: click.Context, kind: str) -> None:
-    """Raise a UsageError for a given option that this --kind of trajectory does not have."""
+    """Raise a UsageError for a given option that does not exist for this --kind."""
     for option in context.command.params:
         name = str(option.name)
         fits = name in _SHARED or (name == 'share') == (kind in COURSES)
@@ -292,7 +292,7 @@ def _refuse_other_options(context: click.Context, kind: str) -> None:
 
 
 def _driven(source: str, gravity: str, joints: str | None, bags: tuple[Path, ...]) -> Robot:
-    """Load the robot; joints that belong to no arm are driven only if --joints names them."""
+    """Load the robot; joints outside its arms are driven only if --joints names them."""
     from armid_ros.cli import options
     from armid_ros.files.cells import listed
     from armid_ros.robots import load_arms
@@ -308,7 +308,7 @@ def _driven(source: str, gravity: str, joints: str | None, bags: tuple[Path, ...
 
 
 def require_free(folder: Path) -> None:
-    """Raise a RecordingError if results in the output folder would overwrite a recording."""
+    """Raise a RecordingError if results would overwrite a recording in the output folder."""
     from armid_ros.api.excitation import BAG
     from armid_ros.files.output import is_plan
 
@@ -323,7 +323,7 @@ def require_free(folder: Path) -> None:
 def write_course(
     kind: str, space: CollisionScene, duration: float, share: float, seed: int, out: Path
 ) -> None:
-    """Design a trajectory for the identification of elastic joints, and write it as a bag."""
+    """Design a trajectory that identifies elastic joints, and write it as a bag."""
     from armid_ros.api.excitation import BAG, ExcitationResult
     from armid_ros.cli import options
     from armid_ros.excitation import ClearanceModel

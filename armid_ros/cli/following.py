@@ -38,7 +38,7 @@ _OWN = {'robot_source', 'out', 'as_json', 'strict', 'every', 'no_baseline'}
 
 def next_command(then: str, result: Shown) -> str:
     """
-    Return the command line to run next, with arguments of the running command.
+    Return the command line to run next, with arguments from the running command.
 
     Parameters
     ----------
@@ -74,7 +74,7 @@ def next_command(then: str, result: Shown) -> str:
 def _subject(
     then: str, result: Shown, given: dict[str, Any]
 ) -> tuple[str | Path, list[Path], list[Any]]:
-    """Return the robot, the recordings and further options of the next command."""
+    """Return robot, recordings and further options of the next command."""
     robot, out = given.get('robot_source'), Path(given.get('out') or '')
     bags = list(given.get('bags') or filter(None, [given.get('bag')]))
     more: list[Any] = []

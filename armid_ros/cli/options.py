@@ -56,7 +56,7 @@ _SHOWN = 'armid.columns.shown'
 
 def stage(out: Path, schema: str, robot: str = '', also: Collection[str] = ()) -> Staged:
     """
-    Create and lock a folder for the results of this command; return the staging folder.
+    Create and lock the command's results folder; return its staging folder.
 
     Files appear in the folder only when the command keeps the staging folder. Other files of an
     earlier result are then removed, except a description that --robot names. With --force, files
@@ -90,7 +90,7 @@ def deliver(
     summary: Summary | None = None,
 ) -> None:
     """
-    Print the summary or document of a result, and write its files if a folder is given.
+    Print the summary or the document of a result; write its files if a folder is given.
 
     Parameters
     ----------
@@ -129,7 +129,7 @@ def deliver_page(
     verdict: VerdictSection,
     table: tuple[Sequence[str], Sequence[Sequence[str]]] | None,
 ) -> None:
-    """Write report.html and NAME.json; print verdict and table, or JSON if there is no table."""
+    """Write report.html and NAME.json; print verdict and table, or JSON without a table."""
     write_file(staged.folder / 'report.html', page)
     summary = None
     if table is not None:
@@ -142,7 +142,7 @@ def deliver_page(
 def deliver_document(
     staged: Staged, name: str, document: Mapping[str, Any], summary: Summary | None, *files: str
 ) -> None:
-    """Write NAME.json and keep the folder; print the document, or the summary if it is given."""
+    """Write NAME.json and keep the folder; print the summary if given, else the document."""
     write_document(staged.folder / f'{name}.json', document)
     staged.keep()
     if summary is None:
@@ -191,7 +191,7 @@ def origin(
     *,
     source: str = '',
 ) -> ResultOrigin:
-    """Return the origin of a result: --robot, the robot's name in model.yaml, and provenance."""
+    """Return the origin of a result: --robot, the robot's name for model.yaml, provenance."""
     return ResultOrigin(robot, source, provenance(paths, seed=seed))
 
 
@@ -204,7 +204,7 @@ def read_settings() -> ReadSettings:
 
 
 def tell_damage(*recordings: Recording) -> None:
-    """Print the damage of recording files on stderr, each line once."""
+    """Print the damage of recordings on stderr, each message once."""
     for text in dict.fromkeys(
         f'{r.source}: {r.report.damage}' for r in recordings if r.report.damage
     ):
@@ -218,7 +218,7 @@ def open_robot(
     bags: Sequence[Path] = (),
     tell: bool = True,
 ) -> Robot:
-    """Load the robot that the options name; store notes on doubtful values to print at the end."""
+    """Load the robot that options name; keep notes on doubtful values for the end."""
     named = listed(joints) if isinstance(joints, str) else joints
     if source != '-':
         robot = load_robot(source, gravity=gravity, joints=named or None)
@@ -246,7 +246,7 @@ def open_robot(
 
 def model_of(path: Path, robot: Robot | None) -> ArmModel:
     """
-    Read a model.yaml for a given robot, or for the robot that the file names.
+    Read a model.yaml, for the given robot or for the robot that the file names.
 
     Raises
     ------
@@ -269,7 +269,7 @@ def model_of(path: Path, robot: Robot | None) -> ArmModel:
 
 
 def with_effects(arm: ArmModel, names: str) -> ArmModel:
-    """Add the effects of --effects that the arm does not have yet."""
+    """Add those effects of --effects that the arm does not have yet."""
     for name in filter(None, parted(names)):
         effect = make_effect(name, arm.robot)
         if (effect.name, effect.joints) not in [(own.name, own.joints) for own in arm.effects]:
@@ -278,7 +278,7 @@ def with_effects(arm: ArmModel, names: str) -> ArmModel:
 
 
 def box(text: str, robot: Robot) -> tuple[str, Corners]:
-    """Parse the text of --box: a joint of the robot, and two corners of a box [m]."""
+    """Parse the option --box: a joint of the robot, and two corners of a box [m]."""
     *parts, corners = listed(text, '=')
     joint = '='.join(parts)
     robot.index(joint)
@@ -292,7 +292,7 @@ def box(text: str, robot: Robot) -> tuple[str, Corners]:
 
 
 def per_joint(text: str | None, robot: Robot, option: str) -> FloatArray | None:
-    """Parse a number for all joints, or a number per joint; None if no text is given."""
+    """Parse one number for all joints or one per joint; None if no text is given."""
     with reading(option, RobotError):
         return None if text is None else values_per_joint(numbers(text), robot.joints, repr(text))
 
@@ -301,7 +301,7 @@ def read(
     paths: Sequence[Path], robot: Robot | None, topic: str | None, **known: Any
 ) -> list[Recording]:
     """
-    Read the joints of bags and tables; print guessed columns on stderr, without repeats.
+    Read joints from bags and tables; print guessed columns on stderr, each once.
 
     Without a robot, further arguments of `read_recording` state what is known of the joints.
 
@@ -325,7 +325,7 @@ def read(
 
 
 def kept_source(source: str, robot: Robot, out: Path) -> str:
-    """Return the text by which result files refer to a robot; save a URDF that a bag contains."""
+    """Return how result files refer to a robot; save a URDF that comes from a bag."""
     if source == '-':
         write_file(out / 'robot.urdf', robot.urdf)
         return 'robot.urdf'

@@ -21,7 +21,7 @@ PACKAGES = 'armid.packages'
 
 
 def together(*options: Callable[[Any], Any]) -> Callable[[_Command], _Command]:
-    """Return a decorator that adds several options to a command, in the order of the help."""
+    """Return a decorator that adds several options to a command, in this order."""
 
     def add(command: Any) -> Any:
         for option in reversed(options):
@@ -32,26 +32,26 @@ def together(*options: Callable[[Any], Any]) -> Callable[[_Command], _Command]:
 
 
 class OutPath(click.Path):
-    """Output path; an empty path, which would be the current folder, is an error."""
+    """Option type for an output path; an empty path is an error."""
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        """Return the output path; fail if it is empty."""
+        """Return the output path; raise an error if it is empty."""
         if not str(value).strip():
             self.fail('the path is empty; name a folder, or . for this one', param, ctx)
         return super().convert(value, param, ctx)
 
 
 class ModelPath(click.Path):
-    """Path of a model.yaml, or of a folder in which identify or diagnose wrote a model.yaml."""
+    """Option type for a model.yaml, or for a results folder that contains one."""
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        """Return the given path; for a folder, return the path of the model.yaml in it."""
+        """Return the path; of a folder, the path of its model.yaml."""
         path = Path(str(super().convert(value, param, ctx)))
         return path / 'model.yaml' if path.is_dir() else path
 
 
 def completed(_: click.Context, parameter: click.Parameter, incomplete: str) -> list[str]:
-    """Return shell completions for the last name in a list: robot, effect or fixed choice."""
+    """Return shell completions for the last name of a list: robots, effects or choices."""
     before, sign, last = incomplete.rpartition('=' if parameter.name == 'priors' else ',')
     words = {'gravity': ('earth', 'moon'), 'speed': SPEED_CLASSES, 'priors': HOW_OFTEN}
     names: Iterable[str] = words.get(str(parameter.name), ())
@@ -67,7 +67,7 @@ def completed(_: click.Context, parameter: click.Parameter, incomplete: str) -> 
 
 
 def names(_: click.Context, parameter: click.Parameter, value: str | None) -> tuple[str, ...]:
-    """Split a list of names at commas, except within double quotes."""
+    """Split a list of names at commas that are outside double quotes."""
     return listed(value) if value else ()
 
 
@@ -167,7 +167,7 @@ packages = click.option(
 
 
 def robot_described(**values: Any) -> Callable[[_Command], _Command]:
-    """Return a decorator that adds the options --robot and --package to a command."""
+    """Return a decorator that adds the options --robot and --package."""
     source = click.option(
         '--robot',
         'robot_source',
@@ -180,7 +180,7 @@ def robot_described(**values: Any) -> Callable[[_Command], _Command]:
 
 
 def with_packages(context: click.Context, source: str | None) -> str | None:
-    """Return the text of --robot, with the folders of --package appended as arguments."""
+    """Append the folders of --package to the text of --robot."""
     written = []
     for text in context.meta.get(PACKAGES, []):
         name, _, folder = text.partition('=')

@@ -126,7 +126,7 @@ def simulate(
 
 
 def _parse_effect(text: str, robot: Robot) -> tuple[Effect, FloatArray]:
-    """Parse --effect; raise a ModelError if its size is zero, warn of an impossible payload."""
+    """Parse --effect; ModelError for an effect of size zero, warning for an impossible payload."""
     from armid_ros.effects import parse_effect
     from armid_ros.simulation.plant import possible_loads
 

@@ -23,7 +23,7 @@ def say(text: str, colour: str | None = None) -> None:
 @contextmanager
 def progress(what: str) -> Iterator[Tick]:
     """
-    Show a progress bar in a `with` block; yield a function that sets its share and step name.
+    Show a progress bar in a `with` block; yield a function that updates share and step.
 
     Without a terminal there is a line on stderr at most every ten seconds.
 
@@ -58,7 +58,7 @@ def progress(what: str) -> Iterator[Tick]:
 
 
 def progress_line(what: str, share: float, spent: float) -> str:
-    """Return the progress as a line of text with the remaining time, given the time spent [s]."""
+    """Return progress and remaining time as a line of text; `spent` is in seconds."""
     known = 0.0 < share < 1.0
     rest = f', about {spent * (1.0 / share - 1.0):.0f} s to go' if known else ''
     return f'{what}: {100.0 * share:.0f} %, {spent:.0f} s{rest}'

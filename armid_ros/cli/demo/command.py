@@ -131,7 +131,7 @@ def _page(
     target: FloatArray,
     origin: ResultOrigin,
 ) -> str:
-    """Return report.html of the demo, with true values and convergence of the online estimate."""
+    """Return report.html of the demo, with true values and the online estimate over time."""
     from armid_ros.report import identification_report as page
 
     parameters = page.parameter_sections(found.core, truth, name='truth')

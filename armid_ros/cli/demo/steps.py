@@ -38,7 +38,7 @@ def _facts() -> dict[str, Any]:
 
 
 def true_arm(robot: Robot) -> ArmModel:
-    """Return the arm to identify, with friction and with other masses than described."""
+    """Return the arm to be identified: it has friction, and other masses than described."""
     true = _facts()
     factors = np.array(true['mass_factors'])[:, np.newaxis]
     parameters = robot.rigid_parameters.reshape(-1, 10) * factors
@@ -50,7 +50,7 @@ def true_arm(robot: Robot) -> ArmModel:
 
 def hidden_change(arm: ArmModel, rng: np.random.Generator, hide: str = '') -> ArmModel:
     """
-    Add a hidden effect, which a diagnosis has to find, as the last effect of an arm.
+    Add to an arm, as its last effect, a hidden effect that a diagnosis has to find.
 
     Parameters
     ----------
@@ -91,7 +91,7 @@ def diagnose_hidden(
     origin: ResultOrigin,
 ) -> DiagnosisResult:
     """
-    Record an arm with a hidden effect over ROS topics; diagnose the arm with its earlier model.
+    Record an arm with a hidden effect over ROS topics; diagnose it with its earlier model.
 
     Parameters
     ----------
@@ -143,7 +143,7 @@ def diagnose_hidden(
 
 
 def outcome(changed: ArmModel, diagnosed: DiagnosisResult) -> str:
-    """Return a sentence on the hidden effect, and whether the diagnosis ranked it first."""
+    """Return a sentence on the hidden effect and on whether the diagnosis ranked it first."""
     effect = changed.effects[-1]
     parameters = effect.parameters(changed.robot)
     shown = [
@@ -158,7 +158,7 @@ def outcome(changed: ArmModel, diagnosed: DiagnosisResult) -> str:
 
 
 def story(changed: ArmModel, diagnosed: DiagnosisResult) -> dict[str, Any]:
-    """Return a JSON document with hidden effect and verdict, and whether the verdict is right."""
+    """Return a JSON document with hidden effect, verdict, and whether the verdict is right."""
     effect = changed.effects[-1]
     return {
         'hidden': {
@@ -174,6 +174,6 @@ def story(changed: ArmModel, diagnosed: DiagnosisResult) -> dict[str, Any]:
 
 
 def _found(effect: Effect, diagnosed: DiagnosisResult) -> bool:
-    """Return whether the first effect that the diagnosis names is a given effect on its joints."""
+    """Return whether the diagnosis names this effect first, on the same joints."""
     first = diagnosed.core.findings[:1]
     return any((one.name, one.joints) == (effect.name, effect.joints) for one in first)

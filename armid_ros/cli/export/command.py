@@ -105,7 +105,7 @@ def export(
 
 
 def _left_out(where: str, lines: Sequence[str]) -> tuple[str, ...]:
-    """Return a note on the parameters that an exported file omits; values have two digits."""
+    """Return a note on the parameters that an exported file cannot contain."""
     short = [
         re.sub(r'^\w+: (.+ = )(\S+)', lambda value: f'{value[1]}{float(value[2]):.2g}', line)
         for line in lines

@@ -26,7 +26,7 @@ DEAD_BAND = 1e-3
 
 def torque_tables(arm: ArmModel) -> tuple[dict[str, npt.NDArray[Any]], tuple[str, ...]]:
     """
-    Return the constants of an arm's joint torque function, as tables with a row per joint.
+    Return the constants of an arm's torque function as tables, one row per joint.
 
     Returns
     -------
@@ -66,7 +66,7 @@ def torque_tables(arm: ArmModel) -> tuple[dict[str, npt.NDArray[Any]], tuple[str
 
 def torque_code(arm: ArmModel, language: str, source: str) -> tuple[str, tuple[str, ...]]:
     """
-    Return code that computes the joint torques of an arm, and lines on omitted parameters.
+    Return code for an arm's joint torques, and lines on parameters that it omits.
 
     The language is 'cpp', a C++17 header with torque(q, dq, ddq, tau), or 'python', a module with
     torque(q, dq, ddq) that returns tau; neither needs more than the standard library. A
@@ -94,7 +94,7 @@ def torque_code(arm: ArmModel, language: str, source: str) -> tuple[str, tuple[s
 
 
 def _nested(values: Any, brackets: str, apart: str = ' ') -> str:
-    """Write nested lists in the brackets of a language; `apart` separates the outer elements."""
+    """Format nested lists with a language's brackets; `apart` separates outer elements."""
     if not isinstance(values, list):
         return repr(values)
     apart = apart if isinstance(values[0], list) else ' '

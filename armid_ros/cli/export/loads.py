@@ -20,7 +20,7 @@ import pinocchio as pin
 @dataclass(frozen=True)
 class CarriedLoad:
     """
-    Payload fixed to a link of the robot.
+    Payload on a link of the robot, in the frame that manufacturers use.
 
     Attributes
     ----------
@@ -36,7 +36,7 @@ class CarriedLoad:
     body: pin.Inertia
 
     def principal(self) -> tuple[FloatArray, FloatArray]:
-        """Return principal moments (3,) [kg m^2] and axes (columns), each near its frame axis."""
+        """Return principal moments (3,) [kg m^2] and axes, each near an axis of the frame."""
         moments, axes = np.linalg.eigh(self.body.inertia)
         order = max(
             map(list, permutations(range(3))),
@@ -50,7 +50,7 @@ class CarriedLoad:
 
 def load_of(arm: ArmModel, joint: str | None = None, frame: str | None = None) -> CarriedLoad:
     """
-    Return the payload of a model in a frame of the robot.
+    Return the payload of a model, expressed in a frame of the robot.
 
     Parameters
     ----------
@@ -109,7 +109,7 @@ def load_of(arm: ArmModel, joint: str | None = None, frame: str | None = None) -
 
 
 def _flange(joint: str, links: Collection[str]) -> str:
-    """Return the link named tool0 or flange, or the only link; raise a ModelError otherwise."""
+    """Return the link named tool0 or flange, or else the only link; ModelError if several."""
     # names that ROS-Industrial gives to the frame of a flange
     usual = [name for name in ('tool0', 'flange') if name in links]
     if not usual and len(links) != 1:
@@ -122,7 +122,7 @@ def _flange(joint: str, links: Collection[str]) -> str:
 
 def universal_robots(load: CarriedLoad) -> str:
     """
-    Return the URScript call for a payload that is given in the frame of the tool flange.
+    Return the URScript call that sets a payload, given in the tool flange's frame.
 
     Mass [kg], centre of gravity from the tool mount [m], and the inertia matrix [kg m^2] as Ixx,
     Iyy, Izz, Ixy, Ixz, Iyz about the centre of gravity in the axes of the tool flange.
@@ -136,7 +136,7 @@ def universal_robots(load: CarriedLoad) -> str:
 
 def franka(load: CarriedLoad) -> str:
     """
-    Return the libfranka call for a payload that is given in the frame of the flange.
+    Return the libfranka call that sets a payload, given in the flange's frame.
 
     Mass [kg], translation from the flange to the centre of mass [m], and the inertia matrix
     [kg m^2] about the centre of mass, column-major.
@@ -151,7 +151,7 @@ def franka(load: CarriedLoad) -> str:
 
 def kuka(load: CarriedLoad) -> str:
     """
-    Return the line of $config.dat for a payload that is given in the frame of the flange.
+    Return the line of $config.dat that sets a payload, given in the flange's frame.
 
     Mass M [kg], centre X, Y, Z [mm] and orientation A, B, C [deg] of the principal axes, which are
     rotations about z, the new y and the new x; principal moments J [kg m^2].
@@ -168,7 +168,7 @@ def kuka(load: CarriedLoad) -> str:
 
 def abb(load: CarriedLoad) -> str:
     """
-    Return the RAPID declaration of a payload that is given in the frame of the tool.
+    Return the RAPID declaration of a payload, given in the tool's frame.
 
     Mass [kg], centre of gravity [mm], orientation of the axes of moment as a quaternion, scalar
     first, and moments of inertia about these axes [kg m^2]. A tload of tooldata is in the wrist
@@ -195,7 +195,7 @@ MAKERS: dict[str, tuple[Callable[[CarriedLoad], str], str]] = {
 
 def load_text(load: CarriedLoad, maker: str, source: str) -> tuple[str, tuple[str, ...]]:
     """
-    Return the load data file of a manufacturer (a key of `MAKERS`), and the notes in the file.
+    Return the load data file of a manufacturer (a key of `MAKERS`), and its notes.
 
     A physically impossible inertia is written as zero, as of a point mass. The source of the load
     is named in the comment.
@@ -218,6 +218,6 @@ def load_text(load: CarriedLoad, maker: str, source: str) -> tuple[str, tuple[st
 
 
 def _list(values: FloatArray | float) -> str:
-    """Write numbers without exponents, to nine decimals."""
+    """Format numbers without exponents, with nine decimals."""
     texts = [f'{value + 0.0:.9f}'.rstrip('0') for value in np.round(np.ravel(values), 9)]
     return ', '.join(f'{text}0' if text.endswith('.') else text for text in texts)
