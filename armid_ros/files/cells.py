@@ -13,7 +13,7 @@ _GUARDED = ('=', '+', '-', '@', '#', '\t', '\r', "'")
 
 def csv_text(rows: Iterable[Sequence[str]]) -> str:
     """
-    Return the rows of a table as CSV text; the first cell of each row has to be a name.
+    Format table rows as CSV text; the first cell of each row has to be a name.
 
     A name that begins like a formula of a spreadsheet gets an apostrophe as prefix. Quotes are
     added if needed.
@@ -29,7 +29,7 @@ def csv_text(rows: Iterable[Sequence[str]]) -> str:
 
 
 def parted(text: str, separator: str = ',') -> list[str]:
-    """Split a text at separators outside double quotes; the quotes stay in the parts."""
+    """Split a text at separators that are outside double quotes; quotes are kept."""
     parts, last = [], 0
     for match in re.finditer(rf'"[^"]*"|{re.escape(separator)}', text):
         if match[0] == separator:
@@ -39,5 +39,5 @@ def parted(text: str, separator: str = ',') -> list[str]:
 
 
 def listed(text: str, separator: str = ',') -> tuple[str, ...]:
-    """Return the names in a separated list; a name in double quotes may contain the separator."""
+    """Return the names of a separated list; double quotes may enclose a separator."""
     return tuple(part.replace('"', '') for part in parted(text, separator))

@@ -51,7 +51,7 @@ _UNEXPECTED = (
 @contextmanager
 def reading(path: str | Path, error: type[ArmidError]) -> Iterator[None]:
     """
-    Convert every parser error in a with-block into one error that names the file.
+    Convert each parser error in a `with` block into an error that names the file.
 
     Parameters
     ----------
@@ -77,7 +77,7 @@ def reading(path: str | Path, error: type[ArmidError]) -> Iterator[None]:
 
 
 def finite(value: Any, quantity: str) -> float:
-    """Convert a value in a document to a float; ValueError unless finite and at most LARGEST."""
+    """Convert a value of a document to a float; ValueError unless finite and at most LARGEST."""
     try:
         number = float(value)
     except (TypeError, ValueError, OverflowError):
@@ -91,7 +91,7 @@ def finite(value: Any, quantity: str) -> float:
 
 def load_yaml(text: str) -> Any:
     """
-    Parse a YAML text to dictionaries, lists, texts and numbers, with limits of depth and size.
+    Parse YAML text to dictionaries, lists, texts and numbers, with limited depth and size.
 
     Raises
     ------
@@ -133,7 +133,7 @@ def load_yaml(text: str) -> Any:
 
 def yaml_line(text: str, place: Sequence[str | int]) -> int:
     """
-    Return the line number, from 1, of an entry in a YAML text.
+    Return the line number, from 1, of an entry of a YAML text.
 
     Parameters
     ----------
@@ -161,12 +161,12 @@ def yaml_line(text: str, place: Sequence[str | int]) -> int:
 
 
 def _line(event: yaml.Event) -> int:
-    """Return the line number of a parser event, from 1; 0 if unknown."""
+    """Return the line number, from 1, of a parser event; 0 if unknown."""
     return 0 if event.start_mark is None else int(event.start_mark.line) + 1
 
 
 def _error_message(problem: BaseException) -> str:
-    """Return the message of a parser's error in a single line."""
+    """Return the message of a parser's error as one line."""
     if isinstance(problem, RecursionError):
         return 'the document is nested too deep'
     if isinstance(problem, MemoryError):

@@ -99,7 +99,7 @@ _MARKED_SUFFIXES = ('.html', '.json', '.yaml', '.rviz', 'plotjuggler.xml')
 
 def write_file(path: str | Path, content: str | bytes) -> None:
     """
-    Write a file under a temporary name and rename it, so that it is complete or absent.
+    Write a file atomically: under a temporary name, which is then renamed.
 
     Parameters
     ----------
@@ -130,7 +130,7 @@ def write_file(path: str | Path, content: str | bytes) -> None:
 
 
 def json_text(document: Any, indent: int | None = None) -> str:
-    """Return a document as JSON text; numbers that are not finite become null."""
+    """Format a document as JSON; numbers that are not finite become null."""
     return json.dumps(_representable(document), indent=indent, allow_nan=False)
 
 
@@ -144,7 +144,7 @@ def result_folder(
     force: bool = False,
 ) -> Iterator[Path]:
     """
-    Create a folder for the results of one command, and lock it during the with-block.
+    Create a folder for a command's results; it is locked during the `with` block.
 
     Parameters
     ----------
@@ -186,7 +186,7 @@ def result_folder(
 @contextmanager
 def locked(path: Path) -> Iterator[None]:
     """
-    Create a folder if it is missing, and lock it against other runs during the with-block.
+    Create a folder if necessary; it is locked for other runs during the `with` block.
 
     Raises
     ------
@@ -220,7 +220,7 @@ def locked(path: Path) -> Iterator[None]:
 
 
 def _refuse_other_results(path: Path, schema: str, robot: str) -> None:
-    """Raise OutputError if a folder has results of another command or of another robot."""
+    """Raise OutputError if a folder contains results of another command or robot."""
     there = [name for name in DOCUMENTS if os.path.lexists(path / name)]
     if not there and schema in _SCHEMAS_WITH_MODEL and os.path.lexists(path / _MODEL):
         there = [_MODEL]
@@ -245,13 +245,13 @@ def _refuse_other_results(path: Path, schema: str, robot: str) -> None:
 
 
 def _in_words(schema: str) -> str:
-    """Return a schema in words: 'results of comparison' for 'armid/comparison/1'."""
+    """Return a schema in words, such as 'results of comparison' for 'armid/comparison/1'."""
     parts = schema.split('/')
     return f'results of {parts[1]}' if len(parts) == 3 else schema
 
 
 def _representable(value: Any) -> Any:
-    """Return a nested document with None in place of numbers that are not finite."""
+    """Replace numbers that are not finite by None in a nested document."""
     if isinstance(value, float):
         return value if math.isfinite(value) else None
     if isinstance(value, dict):
@@ -262,12 +262,12 @@ def _representable(value: Any) -> Any:
 
 
 def final_path(path: Path) -> Path:
-    """Return the final path of a file in a staging folder; paths elsewhere are unchanged."""
+    """Return where a file in a staging folder will be finally; other paths are unchanged."""
     return Path(*(part for part in path.parts if part != STAGING))
 
 
 def hash_files(paths: Iterable[str | Path]) -> tuple[tuple[str, int, str], ...]:
-    """Return path, size and SHA-256 of files, and of all files inside folders such as bags."""
+    """Return path, size and SHA-256 of files, and of all files in folders such as bags."""
     found = []
     for path in map(Path, paths):
         inside = sorted(path.rglob('*')) if path.is_dir() else [path]
@@ -279,13 +279,13 @@ def hash_files(paths: Iterable[str | Path]) -> tuple[tuple[str, int, str], ...]:
 
 
 def written_by(schema: str, also: Collection[str] = ()) -> tuple[str, ...]:
-    """Return the names, or patterns such as '*.png', of the files in results with a schema."""
+    """Return the names or patterns ('*.png') of all files that belong to a schema."""
     return (*_WRITES.get(schema, ()), *also)
 
 
 def refuse_foreign(folder: Path, schema: str, also: Collection[str] = ()) -> None:
     """
-    Raise OutputError if a folder has files that the command did not write.
+    Raise OutputError if a folder contains files that the command did not write.
 
     Parameters
     ----------
@@ -317,7 +317,7 @@ def refuse_foreign(folder: Path, schema: str, also: Collection[str] = ()) -> Non
 
 def refuse_replacing(folder: Path, names: Collection[str], remedy: str = '') -> None:
     """
-    Raise OutputError if files to be replaced were not written by this package.
+    Raise OutputError if a file to be replaced was not written by this package.
 
     Parameters
     ----------
@@ -345,7 +345,7 @@ def refuse_replacing(folder: Path, names: Collection[str], remedy: str = '') -> 
 
 
 def is_plan(path: Path) -> bool:
-    """Return whether a folder is a bag with a planned trajectory and no measurements."""
+    """Return whether a folder is a bag of a planned trajectory, without measurements."""
     try:
         text = read_text(path / 'metadata.yaml', OutputError)
     except OutputError:
@@ -355,7 +355,7 @@ def is_plan(path: Path) -> bool:
 
 
 def is_own(path: Path) -> bool:
-    """Return whether this package wrote a file, such as a report, or a bag of a planned motion."""
+    """Return whether this package wrote a file or bag, such as a report or planned motion."""
     if path.is_dir():
         return is_plan(path)
     if not path.name.endswith(_MARKED_SUFFIXES):

@@ -40,7 +40,7 @@ def is_file(path: str | Path) -> bool:
 
 def open_regular(path: str | Path, error: type[ArmidError]) -> BinaryIO:
     """
-    Open a regular file for reading; refuse folders, FIFOs, devices and sockets.
+    Open a regular file for reading; refuse folders, pipes, devices and sockets.
 
     Parameters
     ----------
@@ -98,12 +98,12 @@ def read_text(path: str | Path, error: type[ArmidError]) -> str:
 
 
 def problem_text(problem: OSError | ValueError) -> str:
-    """Return the reason of a system error as a text without the path."""
+    """Return the reason of a system error as text, without the path."""
     return (problem.strerror if isinstance(problem, OSError) else None) or str(problem)
 
 
 def default_memory_limit() -> int:
-    """Return the default memory limit of an input: a quarter of the available memory [bytes]."""
+    """Return the default memory limit for an input: a quarter of available memory [bytes]."""
     bounds = [os.sysconf('SC_PAGE_SIZE') * os.sysconf('SC_PHYS_PAGES')]
     limit = resource.getrlimit(resource.RLIMIT_AS)[0]
     if limit != resource.RLIM_INFINITY:
@@ -116,7 +116,7 @@ def default_memory_limit() -> int:
 
 
 def size_text(size: int) -> str:
-    """Return a number of bytes as a text with a unit, such as '1.5 MB'."""
+    """Format a number of bytes with a unit, such as '1.5 MB'."""
     for unit, scale in (('GB', 10**9), ('MB', 10**6), ('kB', 10**3)):
         if size >= scale:
             return f'{size / scale:.3g} {unit}'

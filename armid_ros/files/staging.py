@@ -28,7 +28,7 @@ from armid_ros.files.output import DOCUMENTS, locked, STAGING
 @dataclass(frozen=True)
 class Staged:
     """
-    New result in a staging folder; it replaces the earlier result when it is complete.
+    New result in a staging folder, which replaces the earlier result once complete.
 
     Attributes
     ----------
@@ -52,12 +52,12 @@ class Staged:
 
     @property
     def alone(self) -> bool:
-        """Whether the folder of the results contains nothing but the staging folder."""
+        """Whether the results folder contains only the staging folder."""
         return all(path.name == STAGING for path in self.out.iterdir())
 
     def keep(self) -> None:
         """
-        Replace the earlier result by the files in the staging folder, in one step if possible.
+        Replace the earlier result by the staged files, in one step if possible.
 
         Other files of the folder are linked into a new folder, which then replaces the old
         folder. If that is impossible (current folder, mount point, file system without hard
@@ -93,7 +93,7 @@ class Staged:
             raise OutputError(f'{self.out}: cannot be written to: {error.strerror}') from error
 
     def _exchanged(self, names: Collection[str]) -> bool:
-        """Replace the folder by a new folder with result and other files; False if impossible."""
+        """Replace the folder by one with the new result and other files; False if impossible."""
         out = self.out.resolve()
         old, own = out.stat(), self.folder.stat()
         if Path.cwd().is_relative_to(out) or (old.st_uid, old.st_gid) != (own.st_uid, own.st_gid):
@@ -122,7 +122,7 @@ class Staged:
         return True
 
     def _earlier_files(self) -> list[Path]:
-        """Return the files of the earlier result that the new result lacks."""
+        """Return the files of the earlier result that the new result does not replace."""
         spared = {path.resolve() for path in self.spared}
         return [
             path
@@ -139,7 +139,7 @@ def staged(
     out: Path, replaced: Collection[str] = (), spared: Collection[Path] = ()
 ) -> Iterator[Staged]:
     """
-    Create a staging folder for a result; the end of the with-block deletes it.
+    Create a staging folder for a result; it is deleted at the end of the `with` block.
 
     Parameters
     ----------
@@ -168,7 +168,7 @@ def staged(
 
 
 def _exchange(first: Path, second: Path) -> None:
-    """Exchange the names of two folders in one step; OSError if the system cannot."""
+    """Exchange the names of two folders in one step; OSError if this is not supported."""
     at_fdcwd, rename_exchange = -100, 2  # constants of the system call renameat2(2)
     rename = getattr(ctypes.CDLL(None, use_errno=True), 'renameat2', None)
     if rename is None:
@@ -179,7 +179,7 @@ def _exchange(first: Path, second: Path) -> None:
 
 
 def _remove(path: Path) -> None:
-    """Remove a folder, a file or a symbolic link; the target of a link is kept."""
+    """Delete a folder, file or symbolic link; the target of a link is kept."""
     if path.is_dir() and not path.is_symlink():
         shutil.rmtree(path)
     else:
