@@ -38,7 +38,7 @@ USUAL = ','.join(USUAL_EFFECTS)
 
 
 def robot_of(robot: RobotLike) -> Robot:
-    """Return the robot of a model, or load a robot that is given by name or path."""
+    """Return the robot of a model, or load the robot that a name or path denotes."""
     if isinstance(robot, ArmModel):
         return robot.robot
     if isinstance(robot, Robot):
@@ -57,7 +57,7 @@ def is_model(path: str | Path) -> bool:
 
 
 def source_of(robot: Robot) -> str:
-    """Return the text by which result files refer to a robot: shipped name, path or own name."""
+    """Return how result files refer to a robot: by shipped name, path or own name."""
     for name in shipped_robots():
         if robot.path == shipped_path(name):
             return name
@@ -65,7 +65,7 @@ def source_of(robot: Robot) -> str:
 
 
 def arm_of(arm: RobotLike, effects: str = USUAL) -> ArmModel:
-    """Return an arm model; a robot without a model gets the named effects, by default friction."""
+    """Return an arm model; a robot without a model gets effects, by default friction."""
     if isinstance(arm, ArmModel):
         return arm
     if not isinstance(arm, Robot) and is_model(arm):
@@ -74,7 +74,7 @@ def arm_of(arm: RobotLike, effects: str = USUAL) -> ArmModel:
 
 
 def drivable(arm: RobotLike) -> ArmModel:
-    """Return an arm model; TrajectoryError if driven joints of a named robot belong to no arm."""
+    """Return an arm model; TrajectoryError if the robot drives joints that belong to no arm."""
     model = arm_of(arm)
     others = joints_beside_arms(model.robot) if isinstance(arm, str | Path) else ()
     if others:
@@ -89,7 +89,7 @@ def drivable(arm: RobotLike) -> ArmModel:
 def recordings_of(
     recordings: RecordingLike | Sequence[RecordingLike], robot: Robot, *, required: bool = False
 ) -> list[Recording]:
-    """Return recordings as a list, and read those that are given as paths."""
+    """Return recordings as a list; those given as paths are read."""
     several = recordings if isinstance(recordings, Iterable) else [recordings]
     several = [recordings] if isinstance(recordings, RecordingLike) else list(several)
     if required and not several:
@@ -112,7 +112,7 @@ def recordings_of(
 
 
 def with_unique_sources(*groups: list[Recording]) -> tuple[list[Recording], ...]:
-    """Append numbers to equal source names of recordings, except paths of existing files."""
+    """Make source names of recordings unique by numbers; paths of existing files are kept."""
     taken: dict[str, int] = {}
 
     def named(recording: Recording) -> Recording:
@@ -126,7 +126,7 @@ def with_unique_sources(*groups: list[Recording]) -> tuple[list[Recording], ...]
 
 
 def motion_of(recording: Recording, cutoff: float | None = None) -> Motion:
-    """Return the filtered motion of the longest stretch without lost samples of a recording."""
+    """Return the filtered motion of the longest section of a recording without lost samples."""
     measured = recording.tau is not None
     taken = recording if measured else replace(recording, tau=np.zeros_like(recording.q))
     used = conditioning([taken], SignalSettings(cutoff))

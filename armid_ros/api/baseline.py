@@ -28,7 +28,7 @@ def baseline_recordings(
     diagnosed: Sequence[Recording],
 ) -> list[Recording]:
     """
-    Return the given baseline recordings; by default those of the model's identification.
+    Return the baseline recordings: the given ones, else those that the model is identified from.
 
     The default baseline is empty if one of its recordings is diagnosed.
 
@@ -57,7 +57,7 @@ def diagnosed_model(
     rng: Rng,
 ) -> tuple[RobotLike | IdentificationResult, ArmModel, Misfit | None, IdentificationResult | None]:
     """
-    Return the arm to diagnose, its model and misfit, and the identification of a simulator.
+    Return the arm to diagnose, its model and misfit; identify a simulator given by `against`.
 
     Without recordings of a simulator (`against`), the last result is None.
 

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 @dataclass(frozen=True, repr=False, eq=False)
 class ComparisonResult(Shown):
     """
-    Changes between two identifications.
+    Result of the comparison of two identifications.
 
     Attributes
     ----------
@@ -59,11 +59,11 @@ class ComparisonResult(Shown):
 
     @property
     def load(self) -> float | None:
-        """Mass added to a link [kg]; None if no load explains the changes of the rigid body."""
+        """Mass added to a link [kg]; None if no load explains the parameter changes."""
         return None if self.core.load is None else float(self.core.load.mass)
 
     def to_dataframe(self) -> pandas.DataFrame:
-        """Return every parameter as a pandas table, with its values in both identifications."""
+        """Return a pandas table of all parameters with their values in both identifications."""
         return data_frame(self.document()['parameters'])
 
     def document(self, origin: ResultOrigin = DEFAULT_ORIGIN) -> dict[str, Any]:
@@ -71,7 +71,7 @@ class ComparisonResult(Shown):
         return self.core.document()
 
     def page(self, origin: ResultOrigin = DEFAULT_ORIGIN) -> str:
-        """Return report.html of the comparison."""
+        """Return the text of report.html."""
         return compare_report(self.core, origin)
 
     def summary(self) -> Summary:

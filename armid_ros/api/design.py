@@ -178,7 +178,7 @@ def _searched(
     rival: ArmModel | None,
     progress: Progress,
 ) -> ExcitationResult:
-    """Check that the start pose is free of collisions, and search for an excitation trajectory."""
+    """Search for an excitation trajectory, after a check that the start pose is collision-free."""
     planner = TransferPlanner.of(model, scene, settings.speed)
     start = None if start is None else np.asarray(start, dtype=float)
     if start is None:

@@ -124,17 +124,17 @@ class DiagnosisResult(ShownModel):
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names of the effects that the diagnosis accepted, the largest first."""
+        """Names of the accepted effects, the largest first."""
         return tuple(finding.name for finding in self.core.findings)
 
     @property
     def arm(self) -> ArmModel:
-        """Return the model with the named effects, and with the residual map if it was learned."""
+        """Return the model with the named effects and, if learned, the map of residual torque."""
         return self.core.arm if self.residual is None else self.residual.arm
 
     def plot(self) -> npt.NDArray[np.object_]:
         """
-        Draw the residual torque of each joint without and with the named effects.
+        Plot the residual torque of each joint, without and with the named effects.
 
         Returns
         -------
@@ -174,7 +174,7 @@ class DiagnosisResult(ShownModel):
         }
 
     def page(self, origin: ResultOrigin = DEFAULT_ORIGIN) -> str:
-        """Return report.html with verdict and evidence."""
+        """Return the text of report.html, with verdict and evidence."""
         learned = self.residual
         return diagnosis_report(
             replace(self.core, notes=(*self.core.notes, *self.notes)),
@@ -193,7 +193,7 @@ class DiagnosisResult(ShownModel):
         )
 
     def fill(self, folder: Path, origin: ResultOrigin = DEFAULT_ORIGIN) -> dict[str, Any]:
-        """Write diagnosis.json and model.yaml, and at the end report.html, into a folder."""
+        """Write diagnosis.json, model.yaml and report.html into a folder."""
         source, document = origin.of(source_of(self.description.robot)).source, self.document()
         save_model(folder / 'model.yaml', self.arm, source, self.core.estimate, self.misfit)
         write_file(folder / 'diagnosis.json', json_text(document, indent=1))
@@ -214,7 +214,7 @@ class DiagnosisResult(ShownModel):
         ]
 
     def with_residual(self, seed: int) -> DiagnosisResult:
-        """Learn the unexplained residual torque as a map, or add a note on why there is no map."""
+        """Learn the unexplained residual torque as a map; if this fails, note the reason."""
         if self.verdict not in OPEN:
             note = f'nothing is learned for the verdict {self.verdict.replace("_", " ")}'
             return replace(self, notes=(*self.notes, note))
@@ -231,7 +231,7 @@ class DiagnosisResult(ShownModel):
         return replace(self, residual=found, notes=(*self.notes, *why))
 
     def with_extras(self, residual: bool, seed: int, progress: Progress) -> DiagnosisResult:
-        """Learn the residual if requested, simulate held-out recordings, and plan the next run."""
+        """Learn the residual if requested, simulate held-out recordings, plan the next motion."""
         result = self
         if residual:
             progress(1.0, 'learning the residual')
@@ -254,14 +254,14 @@ class DiagnosisResult(ShownModel):
         return replace(result, next_run=run, no_run='; '.join(why))
 
     def _steps(self, model: str) -> list[str]:
-        """Return the next steps for the user; commands in them contain the path of the model."""
+        """Return the next steps for the user, with commands that name the path of the model."""
         worse = dict.fromkeys(joint for pair in self.forward for joint in pair.worse)
         learned = self.residual is not None
         steps = next_steps(self.core, self.next_run, self.no_run, model, tuple(worse), learned)
         return list(map(pretty, steps))
 
     def summary(self, model: str = MODEL, every: bool = True) -> Summary:
-        """Return a summary: verdict, values that differ from zero, notes, and next steps."""
+        """Return the terminal summary: verdict, significant values, notes and next steps."""
         rows: list[Sequence[str]] = [*named_rows(self.core.findings, certain=True)]
         most = 6  # number of rows without --all
         if not every and len(rows) > most + 1:
@@ -421,7 +421,7 @@ def diagnose(
 
 
 def require_residual() -> None:
-    """Raise IdentificationError if the package or a library that learns residuals is missing."""
+    """Raise IdentificationError if the optional packages for learning residuals are missing."""
     try:
         from armid_ros.residual import require_libraries
     except ModuleNotFoundError:
@@ -432,7 +432,7 @@ def require_residual() -> None:
 
 
 def _attempt(name: str, make: Callable[[], _Made]) -> tuple[_Made | None, tuple[str, ...]]:
-    """Call a function; return its result, or None and a note with the reason of its failure."""
+    """Call a function; return its result, or None and a note with the reason of failure."""
     try:
         return make(), ()
     except Exception as error:  # the diagnosis itself is valid after any error

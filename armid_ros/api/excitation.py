@@ -51,7 +51,7 @@ BAG = 'trajectory'
 @dataclass(frozen=True, repr=False, eq=False)
 class ExcitationResult(Shown):
     """
-    A designed excitation trajectory.
+    Designed excitation trajectory with its collision scene and predicted accuracy.
 
     Attributes
     ----------
@@ -96,7 +96,7 @@ class ExcitationResult(Shown):
 
     @property
     def trajectory(self) -> Excitation:
-        """Return the trajectory, from rest to rest."""
+        """Trajectory from rest to rest, without approach and return."""
         return self.core.excitation
 
     @property
@@ -105,11 +105,11 @@ class ExcitationResult(Shown):
         return self.trajectory.duration
 
     def motion(self, rate: float = WAYPOINT_RATE) -> Motion:
-        """Return position, velocity and acceleration along the trajectory at a rate [Hz]."""
+        """Return samples of the trajectory at a rate [Hz]: position, velocity, acceleration."""
         return self.trajectory.motion(rate)
 
     def plot(self) -> npt.NDArray[np.object_]:
-        """Draw the position of each joint over time; return an array (n,) of matplotlib axes."""
+        """Plot the position of each joint over time; return an array (n,) of matplotlib axes."""
         motion = self.motion()
         curves = {'position': (motion.t, motion.q)}
         return draw_joints(motion.joints, curves, 'position [rad or m]')
@@ -124,17 +124,17 @@ class ExcitationResult(Shown):
 
     @cached_property
     def planner(self) -> TransferPlanner:
-        """Return the planner of the motions from the start pose to the trajectory and back."""
+        """Planner of the motions from the start pose to the trajectory and back."""
         return TransferPlanner.of(self.arm, self.scene, self.core.settings.speed)
 
     @cached_property
     def start(self) -> FloatArray:
-        """Return the pose in which the run starts and ends, shape (n,) [rad or m]."""
+        """Pose in which the run starts and ends, shape (n,) [rad or m]."""
         return self.planner.free_start() if self.given_start is None else self.given_start
 
     @cached_property
     def start_reason(self) -> str:
-        """Return why the start pose is not zero; empty if it is zero or the user gave a start."""
+        """Return why the start pose is not zero; empty if it is zero or chosen by the user."""
         if self.given_start is not None:
             return ''
         robot, nearest = self.arm.robot, self.planner.zero_pose
@@ -150,20 +150,20 @@ class ExcitationResult(Shown):
 
     @cached_property
     def run(self) -> Run:
-        """Return the run: approach, trajectory, way back; TrajectoryError if no path is found."""
+        """Return the run: approach, trajectory and return; TrajectoryError if no path is found."""
         excitation = self.core.excitation
         return plan_run(excitation, self.planner, self.start, WAYPOINT_RATE, seed=self.seed)
 
     @cached_property
     def isolability(self) -> Isolability:
-        """Return which effects the trajectory makes detectable or cannot distinguish."""
+        """Return which effects the trajectory makes detectable, and which it cannot separate."""
         settings = self.core.settings
         noise, count = torque_noise(self.arm, settings), settings.rate * self.duration
         return isolability(self.arm, self.motion(), noise, count)
 
     @cached_property
     def fitness(self) -> Fitness:
-        """Return the summary of the safety checks: limits, clearance and floor along the run."""
+        """Return the result of the safety checks: limits, clearance and floor along the run."""
         return fitness(self.run.motion(), self.scene)
 
     def document(self, origin: ResultOrigin = DEFAULT_ORIGIN) -> dict[str, Any]:
@@ -205,7 +205,7 @@ class ExcitationResult(Shown):
         }
 
     def page(self, origin: ResultOrigin = DEFAULT_ORIGIN) -> str:
-        """Return report.html on the quality of the run."""
+        """Return the text of report.html on the quality of the trajectory."""
         return excitation_report(
             replace(self.core, excitation=self.run.excitation),
             self.arm,
@@ -221,7 +221,7 @@ class ExcitationResult(Shown):
 
     def fill(self, folder: Path, origin: ResultOrigin = DEFAULT_ORIGIN) -> dict[str, Any]:
         """
-        Write excitation.yaml, .csv and .json, a bag with the run, and report.html into a folder.
+        Write excitation.yaml, .csv and .json, a bag of the run, and report.html into a folder.
 
         The trajectory, which takes longest to find, is written first.
 
@@ -247,7 +247,7 @@ class ExcitationResult(Shown):
         return document
 
     def summary(self) -> Summary:
-        """Return a summary: identifiable parameters, and the used share of each joint's limits."""
+        """Return the terminal summary: identifiable parameters, and the share of limits in use."""
         robot, shares = self.arm.robot, self.core.robot_limits_used(self.arm)
         rows = [
             (joint, *(f'{100 * share[k]:.0f} %' for share in shares.values()))

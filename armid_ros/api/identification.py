@@ -67,7 +67,7 @@ if TYPE_CHECKING:
 @dataclass(frozen=True, repr=False, eq=False)
 class IdentificationResult(ShownModel):
     """
-    An identified model with its recordings, fits and grade.
+    Result of an identification: model, recordings, fits and grade.
 
     Attributes
     ----------
@@ -119,12 +119,12 @@ class IdentificationResult(ShownModel):
 
     @property
     def estimate(self) -> Estimate:
-        """Return the estimated base parameters and parameters of effects, with covariance."""
+        """Estimate of base parameters and effect parameters, with covariance."""
         return self.core.estimate
 
     @property
     def training(self) -> Score:
-        """Torque errors of the model on the recordings that it is fitted to."""
+        """Torque errors of the model on the recordings from which it was identified."""
         return Score.of(self.core.training)
 
     @property
@@ -134,7 +134,7 @@ class IdentificationResult(ShownModel):
 
     @property
     def misfit(self) -> Misfit:
-        """Return the misfit of the model on its recordings, with the information matrix."""
+        """Return the rms residual on the recordings by joint, with the information matrix."""
         known = parameters_of(self.arm.robot.name, self.document())
         information = known.information(self.arm.parameters)
         unusable = self.grade == 'unusable'
@@ -160,7 +160,7 @@ class IdentificationResult(ShownModel):
 
     def plot(self) -> npt.NDArray[np.object_]:
         """
-        Draw measured and predicted torques of the first held-out recording, or the training data.
+        Plot measured and predicted torques of held-out data, or else of training data.
 
         Returns
         -------
@@ -176,7 +176,7 @@ class IdentificationResult(ShownModel):
         return draw_joints(self.arm.robot.joints, curves, 'torque [N m or N]')
 
     def __getitem__(self, key: tuple[str, str]) -> float:
-        """Return the value of an effect or parameter of a joint: ['viscous_friction', 'elbow']."""
+        """Return the value of an effect or parameter on a joint: ['viscous_friction', 'elbow']."""
         return self.estimate[key]
 
     def to_dataframe(self) -> pandas.DataFrame:
@@ -191,7 +191,7 @@ class IdentificationResult(ShownModel):
 
     @cached_property
     def exports(self) -> dict[str, Exported]:
-        """Return URDF and MJCF by file name; empty if a link is not physically consistent."""
+        """Return URDF and MJCF by file name; empty if a link is physically inconsistent."""
         if self.core.physical is None:
             return {}
         return {'identified.urdf': arm_urdf(self.arm), 'identified.mjcf.xml': arm_mjcf(self.arm)}
@@ -207,7 +207,7 @@ class IdentificationResult(ShownModel):
         return document
 
     def page(self, origin: ResultOrigin = DEFAULT_ORIGIN) -> str:
-        """Return report.html with all curves, numbers and warnings."""
+        """Return the text of report.html with all curves, numbers and warnings."""
         without_place = {name: one.without_place for name, one in self.exports.items()}
         return identification_report(
             self.core,
@@ -238,7 +238,7 @@ class IdentificationResult(ShownModel):
         return document
 
     def summary(self, every: bool = False) -> Summary:
-        """Return a summary: errors, friction, warnings and next step; with `every`, all values."""
+        """Return the terminal summary: errors, friction, warnings, next step; or all values."""
         core, estimate, joints = self.core, self.estimate, self.arm.robot.joints
         others = self.graded.reasons[1:]
         held_out = [fit for fits in self.validation.values() for fit in fits]
@@ -284,7 +284,7 @@ class IdentificationResult(ShownModel):
         )
 
     def _parameters(self) -> list[str]:
-        """Return a text table with the estimated and the described value of each parameter."""
+        """Return a text table of the parameters, estimated and described."""
         estimate, links = self.estimate, self.arm.robot.links
         described = self.core.base.values(self.description.theta)
         rows = []

@@ -84,7 +84,7 @@ class InspectionResult(Shown):
 
     @property
     def remarks(self) -> tuple[str, ...]:
-        """Return remarks for the user, most serious first."""
+        """Return remarks for the user, the most serious first."""
         return tuple(remark.text for remark in self.core.remarks)
 
     @property
@@ -93,7 +93,7 @@ class InspectionResult(Shown):
         return self.core.recording
 
     def to_dataframe(self) -> pandas.DataFrame:
-        """Return ranges, speeds and efforts of the joints as a pandas table."""
+        """Return a pandas table with ranges, speeds and efforts of the joints."""
         return data_frame(self.core.joints)
 
     def document(self, origin: ResultOrigin = DEFAULT_ORIGIN) -> dict[str, Any]:
@@ -101,11 +101,11 @@ class InspectionResult(Shown):
         return inspection_document(self.core)
 
     def page(self, origin: ResultOrigin = DEFAULT_ORIGIN) -> str:
-        """Return inspection.html with the recorded curves of all joints."""
+        """Return the text of inspection.html with the recorded curves of all joints."""
         return inspection_report(self.core, self.with_step(origin))
 
     def summary(self) -> Summary:
-        """Return a summary: verdict, table of joints, remarks and sampling."""
+        """Return the terminal summary: verdict, joints, remarks and sampling."""
         heads, found = joint_heads(self.core), self.core
         trial = found.trial
         good = trial is not None and not trial.refused and trial.grade != 'unusable'
@@ -190,7 +190,7 @@ def inspect(
 
 
 def _trial_fit(robot: Robot, recording: Recording, rng: Rng) -> TrialFit:
-    """Identify a robot from a recording; return the quality of the fit, or why it was refused."""
+    """Identify a robot from one recording; return the fit's quality, or why it was refused."""
     try:
         found = identify(robot, recording, physical=False, rng=rng)
         motions = [fit.motion for fit in found.core.training]
@@ -204,7 +204,7 @@ def _trial_fit(robot: Robot, recording: Recording, rng: Rng) -> TrialFit:
 @dataclass(frozen=True, repr=False, eq=False)
 class CheckResult(Shown):
     """
-    Result of the check of a robot description.
+    Result of the check of a robot description, with or without recordings.
 
     Attributes
     ----------
@@ -248,13 +248,13 @@ class CheckResult(Shown):
         }
 
     def page(self, origin: ResultOrigin = DEFAULT_ORIGIN) -> str:
-        """Return report.html with a table of the links."""
+        """Return the text of report.html with a table of the links."""
         return description_check_report(
             self.remarks, self.links, self.with_step(origin, self.robot)
         )
 
     def summary(self) -> Summary:
-        """Return a summary: the finding, and masses and centres of mass of the links."""
+        """Return the terminal summary: finding, masses and centres of mass of the links."""
         links = self.links
         wrong = links is not None and not np.isnan(links.measured_mass).all()
         columns = slice(None) if wrong else slice(0, 4, 2)

@@ -31,7 +31,7 @@ def simulate(
     rng: Rng = 0,
 ) -> Recording:
     """
-    Record a simulated arm that follows a trajectory.
+    Simulate an arm that follows a trajectory; return the recording of its sensors.
 
     Parameters
     ----------
@@ -80,7 +80,7 @@ def simulate(
 
 
 def recording_of(run: SimulatedRun, temperature: Temperatures | None = None) -> Recording:
-    """Return the recording of the simulated sensors, with temperatures of the joints if known."""
+    """Return the sensor recording of a simulated run, with joint temperatures if known."""
     return Recording(
         joints=run.joints,
         t=run.t,
@@ -100,7 +100,7 @@ def reference_of(
     settings: ReadSettings = DEFAULT,
 ) -> Reference:
     """
-    Return the reference motion that a simulated arm follows.
+    Convert a trajectory, or a file that has one, to the reference of a simulated arm.
 
     Parameters
     ----------

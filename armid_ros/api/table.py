@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 @dataclass(frozen=True)
 class Summary:
     """
-    Text that a command prints about a result.
+    Text that a command prints about its result.
 
     Attributes
     ----------
@@ -58,7 +58,7 @@ class Summary:
     then: str = ''
 
     def text(self, *below: str) -> list[str]:
-        """Return the lines of the summary, with the lines `below` before the next steps."""
+        """Return the lines of the summary; the lines `below` are put before the next steps."""
         headline = f'{self.badge.upper()}: {self.title}' if self.badge else self.title
         steps = [f'next: {step}' for step in self.steps]
         table = aligned(self.heads, self.rows)
@@ -70,7 +70,7 @@ ResidualPart = tuple[str, FloatArray, FloatArray]
 
 
 def data_frame(rows: Any) -> pandas.DataFrame:
-    """Return rows as a pandas table; ArmidError if pandas is not installed."""
+    """Convert rows to a pandas table; ArmidError if pandas is not installed."""
     try:
         from pandas import DataFrame
     except ModuleNotFoundError:
@@ -80,7 +80,7 @@ def data_frame(rows: Any) -> pandas.DataFrame:
 
 class Shown(ABC):
     """
-    Result that shows its summary when printed, and is saved as the files that its command writes.
+    Base class of results: printed as a summary, saved as the files of the command.
 
     Attributes
     ----------
@@ -94,32 +94,32 @@ class Shown(ABC):
     @property
     @abstractmethod
     def files(self) -> Sequence[str]:
-        """Return the names of the files of the result: the JSON document first, then the page."""
+        """Names of the result's files: the JSON document first, then the page."""
 
     @abstractmethod
     def summary(self) -> Summary:
-        """Return the summary of the result."""
+        """Return the terminal summary of the result."""
 
     def with_step(self, origin: ResultOrigin, robot: Robot | None = None) -> ResultOrigin:
-        """Return the origin of a result with the next step, and with the name of a given robot."""
+        """Return the origin, completed by the next step and by the name of a given robot."""
         shown, known = self.summary(), origin if robot is None else origin.of(source_of(robot))
         step = origin.step or ''.join(shown.steps[:1]) or f'armid {shown.then}'
         return replace(known, step=step)
 
     @abstractmethod
     def document(self, origin: ResultOrigin = DEFAULT_ORIGIN) -> dict[str, Any]:
-        """Return the content of the JSON file of the result, with the given provenance."""
+        """Return the content of the result's JSON file, with the given provenance."""
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the content of the JSON file."""
+        """Return the content of the result's JSON file."""
         return self.document()
 
     @abstractmethod
     def page(self, origin: ResultOrigin = DEFAULT_ORIGIN) -> str:
-        """Return the report as the text of one HTML file."""
+        """Return the report as the text of a single HTML file."""
 
     def report(self, path: str | Path = 'report.html') -> Path:
-        """Write the report as an HTML file and return the path of the file."""
+        """Write the report as an HTML file; return its path."""
         write_file(Path(path), self.page())
         return Path(path)
 
@@ -131,7 +131,7 @@ class Shown(ABC):
         return document
 
     def save(self, folder: str | Path) -> Path:
-        """Write the files of the result; OutputError if the folder already has other files."""
+        """Write the result's files to a folder; OutputError if it contains other files."""
         with staged(Path(folder)) as result:
             self.fill(result.folder)
             with result_folder(Path(folder), self.schema):
@@ -143,7 +143,7 @@ class Shown(ABC):
         return '\n'.join(self.summary().text())
 
     def _repr_html_(self) -> str:
-        """Show the report in a frame of the notebook; without a report, show the text."""
+        """Return HTML for a notebook: the report in a frame, or the summary if there is none."""
         try:
             page = self.page()
         except ArmidError:  # a design without a trajectory has no page
@@ -152,15 +152,15 @@ class Shown(ABC):
 
 
 class ShownModel(Shown):
-    """Result with an arm model and residual torques."""
+    """Base class of results with an arm model and residual torques."""
 
     @abstractmethod
     def _residuals(self) -> Sequence[ResidualPart]:
-        """Return source, times [s] and residual torques [N m or N] of each recorded stretch."""
+        """Return source, times [s] and residual torques [N m or N] of each recorded section."""
 
     def residual_table(self) -> pandas.DataFrame:
         """
-        Return measured minus predicted torques [N m or N] as a pandas table, held-out data last.
+        Return a pandas table of residual torques [N m or N], held-out data last.
 
         Columns are recording, t [s], and every joint.
 
@@ -178,10 +178,10 @@ class ShownModel(Shown):
     @property
     @abstractmethod
     def arm(self) -> ArmModel:
-        """Return the model of the arm."""
+        """Model of the arm."""
 
     def urdf(self, path: str | Path | None = None) -> str:
-        """Return a URDF with the identified values; write it to a file if a path is given."""
+        """Return a URDF with the identified values; also write it to a file if a path is given."""
         text = arm_urdf(self.arm).text
         if path is not None:
             write_file(path, text)
@@ -189,7 +189,7 @@ class ShownModel(Shown):
 
 
 def aligned(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
-    """Return the lines of a text table; the first column is left-aligned, others right-aligned."""
+    """Return the lines of a text table: first column aligned left, other columns right."""
     if not heads:
         return []
     table = [tuple(heads), *(tuple(row) for row in rows)]
