@@ -33,7 +33,7 @@ _MIN_SIZE = 1e-3
 
 
 def _view() -> FloatArray:
-    """Return the axes of the drawing, (3, 3): right, up, and towards the viewer."""
+    """Return the axes of the drawing as rows, (3, 3): right, up, towards the viewer."""
     azimuth, elevation = np.radians(-55.0), np.radians(18.0)
     (sa, ca), (se, ce) = ((np.sin(x), np.cos(x)) for x in (azimuth, elevation))
     return np.array([[-sa, ca, 0.0], [-ca * se, -sa * se, ce], [ca * ce, sa * ce, se]])
@@ -45,7 +45,7 @@ _VIEW = _view()
 @dataclass(frozen=True)
 class ArmDrawing(Templated):
     """
-    SVG elements of an arm in one pose, or in several poses side by side.
+    Drawing of an arm as SVG elements, in one pose or in several poses side by side.
 
     Attributes
     ----------
@@ -85,7 +85,7 @@ def draw_poses(
     collision: CollisionModel, poses: FloatArray, captions: Sequence[str], path: FloatArray
 ) -> ArmDrawing:
     """
-    Draw an arm and its obstacles in several poses, with the path of the arm's last body.
+    Draw an arm and its obstacles in several poses, with the path of its last body.
 
     Parameters
     ----------
@@ -131,7 +131,7 @@ def draw_arm(
     robot: Robot, marked: Sequence[str], q: FloatArray | None = None, label: str = ''
 ) -> ArmDrawing:
     """
-    Draw an arm in the pose with the largest visible area.
+    Draw an arm in one pose, by default the one with the largest visible area.
 
     Parameters
     ----------
@@ -184,7 +184,7 @@ def draw_arm(
 
 @dataclass(frozen=True)
 class _Solid:
-    """A body to draw: all points within a radius of given points in the frame of a joint."""
+    """Body to draw: the hull of spheres around given points, in the frame of a joint."""
 
     joint: int
     of_arm: bool
@@ -192,7 +192,7 @@ class _Solid:
     radius: float
 
     def seen(self, frame: pin.SE3) -> tuple[FloatArray, float]:
-        """Return the body's outline in the drawing plane and its nearness to the viewer [m]."""
+        """Return the body's outline in the drawing plane, and its nearness to the viewer [m]."""
         points = self.points @ frame.rotation.T + frame.translation
         turn = np.linspace(0.0, 2.0 * np.pi, _CIRCLE_CORNERS, endpoint=False)
         ring = max(self.radius, 1e-4) * np.column_stack([np.cos(turn), np.sin(turn)])
@@ -203,7 +203,7 @@ class _Solid:
 
 
 def _solids(collision: CollisionModel) -> list[_Solid]:
-    """Return collision bodies of an arm and its obstacles, and bars for links without a body."""
+    """Return the bodies of an arm and its obstacles; links without bodies become bars."""
     solids = []
     for body in collision.geometry.geometryObjects:
         shape = body.geometry
@@ -224,7 +224,7 @@ def _solids(collision: CollisionModel) -> list[_Solid]:
 
 
 def _frames(model: pin.Model, q: FloatArray) -> list[pin.SE3]:
-    """Return the frames of all joints in a pose, rotated so that gravity points down."""
+    """Return all joint frames in a pose, rotated so that gravity points down."""
     data, upright = model.createData(), pin.SE3.Identity()
     pin.forwardKinematics(model, data, np.asarray(q, dtype=float))
     if np.any(model.gravity.linear):
@@ -240,7 +240,7 @@ def _flat(points: FloatArray) -> FloatArray:
 
 @dataclass(frozen=True)
 class _Strip:
-    """Equal picture frames side by side, one for each pose, which contain all bodies."""
+    """Picture frames of equal size side by side, one for each pose."""
 
     solids: Sequence[_Solid]
     frames: Sequence[list[pin.SE3]]
@@ -258,7 +258,7 @@ class _Strip:
         room: tuple[float, float],
         *others: FloatArray,
     ) -> _Strip:
-        """Return picture frames of at most a given size [px] around bodies and points `others`."""
+        """Return frames of at most a given size [px] that show all bodies and points."""
         hulls = [solid.seen(frame[solid.joint])[0] for frame in frames for solid in solids]
         points, margin = np.concatenate([*others, *hulls]), 0.03  # around a drawing [m]
         left, low = (points.min(axis=0) - margin).tolist()
@@ -274,7 +274,7 @@ class _Strip:
         return np.asarray(np.round(np.stack([right, down], axis=-1), 1))
 
     def bodies(self, colour: Callable[[_Solid], str]) -> tuple[tuple[str, str], ...]:
-        """Return outline and colour of each body, in each pose farthest from the viewer first."""
+        """Return outline and colour of each body in each pose, sorted from far to near."""
         found = []
         for pose, frame in enumerate(self.frames):
             seen = [(solid, *solid.seen(frame[solid.joint])) for solid in self.solids]
@@ -286,5 +286,5 @@ class _Strip:
 
 
 def svg_points(points: FloatArray) -> str:
-    """Format points, shape (K, 2) [px], as an SVG list of points."""
+    """Format points (K, 2) [px] as an SVG list of points."""
     return ' '.join(f'{x:.1f},{y:.1f}' for x, y in points)

@@ -17,7 +17,7 @@ from markupsafe import Markup
 @dataclass(frozen=True)
 class ContentSection(Section):
     """
-    Section of a page with a heading and a sequence of blocks.
+    Section of a page: a heading and a sequence of blocks.
 
     Attributes
     ----------
@@ -37,7 +37,7 @@ class ContentSection(Section):
 @dataclass(frozen=True)
 class Paragraph(Templated):
     """
-    Paragraph of a page.
+    Paragraph of text on a page.
 
     Attributes
     ----------
@@ -57,7 +57,7 @@ class Paragraph(Templated):
 @dataclass(frozen=True)
 class TableCell:
     """
-    Table cell with a style, small print below it, or a shaded background.
+    Table cell with a style, small print or a shaded background.
 
     Attributes
     ----------
@@ -81,7 +81,7 @@ class TableCell:
 @dataclass(frozen=True)
 class IntervalTrack:
     """
-    Table cell that draws an interval and a reference value on an axis around zero.
+    Table cell that draws an interval and a reference value on an axis.
 
     Attributes
     ----------
@@ -97,7 +97,7 @@ class IntervalTrack:
     reference: float | None
 
     def place(self, number: float) -> float:
-        """Return the position of a number on the axis [% of the width]."""
+        """Return where a number is on the axis [% of its width]."""
         span = max(abs(self.value) + self.reach, abs(self.reference or 0.0)) or 1.0
         return round(50.0 + 45.0 * max(-1.0, min(1.0, number / span)), 2)
 
@@ -135,7 +135,7 @@ class DataTable(Templated):
 @dataclass(frozen=True)
 class FactList(Templated):
     """
-    List of facts: name and value in each line.
+    List of facts: each line has a name and a value.
 
     Attributes
     ----------
@@ -172,7 +172,7 @@ class BulletList(Templated):
 @dataclass(frozen=True)
 class Fold(Templated):
     """
-    Line of text that opens and closes the blocks below it.
+    Line of text which opens and closes the blocks below it.
 
     Attributes
     ----------
@@ -215,7 +215,7 @@ class Panels(Templated):
 @dataclass(frozen=True)
 class Legend(Templated):
     """
-    Legend: colours and their meaning.
+    Legend of a chart: colours and their meaning.
 
     Attributes
     ----------
@@ -232,7 +232,7 @@ class Legend(Templated):
 @dataclass(frozen=True)
 class SmallMultiples(Templated):
     """
-    Grid of small pictures, as many in a row as the width of the page allows.
+    Grid of small pictures, with as many in a row as fit on the page.
 
     Attributes
     ----------
@@ -249,7 +249,7 @@ class SmallMultiples(Templated):
 @dataclass(frozen=True)
 class Bar:
     """
-    Bar of a bar chart, with the text next to it.
+    Bar of a bar chart, with its text.
 
     Attributes
     ----------
@@ -298,7 +298,7 @@ class BarChart(Templated):
 @dataclass(frozen=True)
 class VerdictSection(Section):
     """
-    Verdict box at the top of a page: badge, findings, next step, bars and limitations.
+    Verdict box at the top of a page: verdict, findings, next step, bars, limitations.
 
     Attributes
     ----------
@@ -332,14 +332,14 @@ class VerdictSection(Section):
 
 
 def next_steps(steps: Sequence[str]) -> list[ContentSection]:
-    """Return a section with all next steps; [] if the verdict box already shows the only step."""
+    """Return the section with all next steps; [] if the verdict box shows the only one."""
     bullets = BulletList([(step, '') for step in steps], True)
     return [ContentSection('What to do next', [bullets])] if steps[1:] else []
 
 
 @dataclass(frozen=True)
 class Origin(Section):
-    """Section with the provenance: command, files and their hashes, versions, seed."""
+    """Section on how a result was made: command, hashed files, versions, seed."""
 
     title: ClassVar[str] = 'Provenance'
     template: ClassVar[str] = 'origin.html'

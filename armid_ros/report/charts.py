@@ -30,7 +30,7 @@ Kind = Literal['line', 'trend', 'points', 'sticks', 'band']
 @dataclass(frozen=True)
 class Series:
     """
-    Curve, point cloud or band of a chart.
+    Curve, points or band of a chart.
 
     Attributes
     ----------
@@ -58,7 +58,7 @@ class Series:
 @dataclass(frozen=True)
 class Chart(Templated):
     """
-    Chart of curves over a common abscissa, with zoom.
+    Chart of curves with a common horizontal axis and zoom.
 
     Attributes
     ----------
@@ -103,7 +103,7 @@ class Chart(Templated):
     def over_time(
         cls, t: FloatArray, series: Sequence[Series], ylabel: str, **others: Any
     ) -> Chart:
-        """Return a chart over time [s], without samples that make no visible difference."""
+        """Return a chart over time [s]; samples without visible influence are left out."""
         kept = thinned(*(one.y for one in series))
         drawn = [
             replace(one, y=one.y[kept], upper=None if one.upper is None else one.upper[kept])
@@ -113,7 +113,7 @@ class Chart(Templated):
 
     @property
     def json(self) -> Markup:
-        """Data of the chart as JSON for assets/report.js."""
+        """Chart data as JSON for the script assets/report.js."""
         data = {
             'x': rounded(self.x),
             'xlabel': self.xlabel,
@@ -141,7 +141,7 @@ class Chart(Templated):
 
 def thinned(*series: npt.ArrayLike, most: int = 3000) -> npt.NDArray[np.intp]:
     """
-    Return the indices of samples that suffice to draw curves without a visible change.
+    Return indices of the samples with which curves look the same as with all samples.
 
     Parameters
     ----------
@@ -177,19 +177,19 @@ def thinned(*series: npt.ArrayLike, most: int = 3000) -> npt.NDArray[np.intp]:
 
 
 def joined(parts: Sequence[FloatArray]) -> FloatArray:
-    """Concatenate values of stretches; a NaN between two stretches breaks the curve."""
+    """Concatenate values of gap-free sections; NaN between two sections breaks the curve."""
     pieces = [part for stretch in parts for part in (stretch, [np.nan])]
     return read_only(np.concatenate(pieces[:-1]))
 
 
 def joined_time(parts: Sequence[FloatArray]) -> FloatArray:
-    """Concatenate the times of stretches, to match the values of `joined`."""
+    """Concatenate times of gap-free sections, as `joined` does with values."""
     pieces = [part for stretch in parts for part in (stretch, stretch[-1:])]
     return read_only(np.concatenate(pieces[:-1]))
 
 
 def rounded(values: npt.ArrayLike) -> list[float | None]:
-    """Return a chart's values, rounded to a tenth of a pixel; None in place of NaN."""
+    """Round values of a chart to a tenth of a pixel; NaN becomes None."""
     array = np.asarray(values, dtype=float)
     finite = array[np.isfinite(array)]
     span = float(np.ptp(finite)) if len(finite) else 0.0
@@ -200,7 +200,7 @@ def rounded(values: npt.ArrayLike) -> list[float | None]:
 
 
 def script_json(data: dict[str, Any]) -> Markup:
-    """Return data as JSON text that is safe in a script element of HTML."""
+    """Format data as JSON that is safe inside a script element of HTML."""
     text = json.dumps(data, allow_nan=False, separators=(',', ':'))
     for character in '<>&\u2028\u2029':
         text = text.replace(character, f'\\u{ord(character):04x}')
@@ -209,7 +209,7 @@ def script_json(data: dict[str, Any]) -> Markup:
 
 def image_data(colour: FloatArray, strength: FloatArray) -> str:
     """
-    Return an image as the data URL of a PNG file.
+    Convert an image to the data URL of a PNG file.
 
     Parameters
     ----------

@@ -75,7 +75,7 @@ def compare_report(comparison: Comparison, origin: ResultOrigin) -> str:
 
 
 def verdict(comparison: Comparison) -> tuple[str, str]:
-    """Return the verdict on the comparison as words for the badge, and its colour."""
+    """Return the verdict on two identifications: words for the badge, and its colour."""
     if comparison.unusable:
         return 'unusable', 'bad'
     if comparison.anything:
@@ -86,7 +86,7 @@ def verdict(comparison: Comparison) -> tuple[str, str]:
 
 
 def next_step(comparison: Comparison) -> str:
-    """Return the next step after a comparison of two identifications."""
+    """Return the advice to the user after a comparison of two identifications."""
     if comparison.anything or comparison.unusable:
         return 'If you expected this, use the later model. If not, diagnose the later recordings.'
     return 'Identify from all recordings together, for smaller intervals.'
@@ -178,7 +178,7 @@ def _count_sentence(comparison: Comparison) -> str:
 
 
 def _residuals(comparison: Comparison) -> Iterator[str]:
-    """Yield a sentence on each joint whose residual changed, then the possible reason."""
+    """Yield a sentence on each joint whose residual changed, and one on possible reasons."""
     for change in comparison.changed_residuals:
         errors = change.before_error, change.after_error
         ranks = ('second', 'first') if change.ratio > 1.0 else ('first', 'second')
@@ -198,7 +198,7 @@ def _residuals(comparison: Comparison) -> Iterator[str]:
 
 
 def _load(comparison: Comparison, load: LoadChange) -> tuple[str, str]:
-    """Return sentences on a load that explains all inertial changes: mass, link and centre."""
+    """Return sentences on a load that explains all changes of inertial parameters."""
     joints = {
         (
             int(c.parameter.name.split(' ')[0].lstrip('Imxyz')) if c.parameter.rigid else 0
@@ -225,7 +225,7 @@ def _load(comparison: Comparison, load: LoadChange) -> tuple[str, str]:
 
 
 def _not_compared(comparison: Comparison) -> tuple[str, ...]:
-    """Return a sentence for each reason why parameters of one model are not compared."""
+    """Return sentences on the parameters that only one of the two models has."""
     lines = []
     sides = ('first', 'second', comparison.only_before), ('second', 'first', comparison.only_after)
     for side, other, found in sides:
@@ -242,7 +242,7 @@ def _not_compared(comparison: Comparison) -> tuple[str, ...]:
 
 
 def _beware(comparison: Comparison) -> tuple[str, ...]:
-    """Return the limitations of a comparison of two identifications."""
+    """Return sentences on the limitations of a comparison of two identifications."""
     lines = []
     for given in (comparison.before, comparison.after):
         if given.fit is None:

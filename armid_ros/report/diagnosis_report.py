@@ -44,13 +44,13 @@ _TONES = {'consistent': 'good', 'named': 'fair', 'ambiguous': 'fair', 'partial':
 
 
 def tone_of(diagnosis: Diagnosis) -> str:
-    """Return the colour of a verdict: 'good' only without doubt and if all joints were checked."""
+    """Return the colour of a verdict: 'good' only if all joints were checked without doubt."""
     tone = _TONES.get(diagnosis.verdict, 'bad')
     return 'fair' if tone == 'good' and (diagnosis.not_checked or diagnosis.doubt) else tone
 
 
 def cause_sentences(diagnosis: Diagnosis) -> list[str]:
-    """Return sentences on the share of the gap that each cause explains, and on minor effects."""
+    """Return sentences on the share that each cause explains, and on minor effects."""
     shares = [
         f'{names_and_places(group)}: {percent(group[0].share)} of the difference'
         f'{share_interval_in_words(group[0])}{", together" * (len(group) > 1)}'
@@ -144,7 +144,7 @@ def diagnosis_report(
 
 
 def _at_fault(diagnosis: Diagnosis, read: Mapping[str, Sequence[Recording]]) -> list[str]:
-    """Return the recordings that a bad_data verdict names, or else all; [] for other verdicts."""
+    """Return the recordings that a verdict bad_data names, else all; [] for other verdicts."""
     if diagnosis.verdict != 'bad_data':
         return []
     sources = [one.source for several in read.values() for one in several if one.source]
@@ -154,7 +154,7 @@ def _at_fault(diagnosis: Diagnosis, read: Mapping[str, Sequence[Recording]]) -> 
 
 
 def _verdict(diagnosis: Diagnosis, worse: Sequence[str], step: str) -> VerdictSection:
-    """Return the verdict box: causes, next step, and bars of explained shares or torque errors."""
+    """Return the verdict box: causes, next step, and bars of explained shares or errors."""
     notes = [sentence(note) for note in diagnosis.notes]
     if worse:
         notes.append(
@@ -173,7 +173,7 @@ def _verdict(diagnosis: Diagnosis, worse: Sequence[str], step: str) -> VerdictSe
 @dataclass(frozen=True)
 class Story(Section):
     """
-    Section with a drawing of the arm and facts on the causes and the patched model.
+    Section with a drawing of the arm, and facts on the causes and the patched model.
 
     Attributes
     ----------
@@ -192,7 +192,7 @@ class Story(Section):
 
     @property
     def drawing(self) -> ArmDrawing:
-        """Drawing of the arm in a recorded pose, with the joints of the causes coloured."""
+        """Drawing of the arm in a recorded pose; joints with a cause are coloured."""
         data, robot = self.diagnosis.data, self.diagnosis.arm.robot
         causes = self.diagnosis.findings
         largest = [place.joint for place in self.diagnosis.where[:1]]
@@ -209,7 +209,7 @@ class Story(Section):
 
     @property
     def rows(self) -> list[tuple[str, list[str]]]:
-        """Facts by name: times of the causes, model, meaning of effects, unexplained torque."""
+        """Names and values of facts: times of the causes, model, meaning of effects and others."""
         diagnosis, patched = self.diagnosis, not self.diagnosis.harmful
         meaning = {effect.name: effect.summary for effect in diagnosis.arm.effects}
         names = list(dict.fromkeys(one.name for one in diagnosis.findings if patched))
@@ -241,7 +241,7 @@ class Story(Section):
 
 def overlay_section(diagnosis: Diagnosis, gap: Gap) -> ContentSection:
     """
-    Return the section with measured and modelled torque of the joint with the largest error.
+    Return the section with measured and modelled torques of the worst joint.
 
     Parameters
     ----------
@@ -308,7 +308,7 @@ def overlay_section(diagnosis: Diagnosis, gap: Gap) -> ContentSection:
 
 
 def _of_recording(gap: Gap, shown: Overlay, joint: int) -> tuple[FloatArray, ...]:
-    """Return times of a recording, and a joint's torque as measured and from both models."""
+    """Return times of a recording, and a joint's torque: measured, and from both models."""
     here = shown.source, shown.trajectory.fold
     own = [one for one in gap.overlays if (one.source, one.trajectory.fold) == here]
     curves = zip(*((one.measured, one.before, one.after) for one in own), strict=True)
@@ -318,7 +318,7 @@ def _of_recording(gap: Gap, shown: Overlay, joint: int) -> tuple[FloatArray, ...
 
 def whole_overlays(diagnosis: Diagnosis, recordings: Sequence[Recording]) -> Gap | None:
     """
-    Return the gap, with torque curves of whole recordings if a cause acts only for some time.
+    Return residuals and torque curves; whole recordings are shown if a cause acts temporarily.
 
     Parameters
     ----------

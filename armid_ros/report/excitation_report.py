@@ -188,7 +188,7 @@ def _verdict(
 
 
 def identifiable(design: Design, links: Sequence[str]) -> list[str]:
-    """Return sentences on how many parameters are identifiable, and how accurately."""
+    """Return sentences on the number of identifiable parameters and on their accuracy."""
     information = design.information
     std, names = information.std, information.parameters
     seen = int(np.sum(np.isfinite(std)))
@@ -303,7 +303,7 @@ def _motion_section(
 def _clearance_section(
     t: FloatArray, curves: Mapping[str, FloatArray], margin: float, notes: Sequence[str]
 ) -> ContentSection:
-    """Return the section with the distances of links from each other and from obstacles."""
+    """Return the section with distances of links from each other and from obstacles."""
     roles: tuple[Role, ...] = ('residual', 'before')
     blocks: list[Templated] = [
         Chart(

@@ -131,7 +131,7 @@ def parameter_sections(
     name: str = 'description',
 ) -> list[Section]:
     """
-    Return sections with all parameters and, if fitted, with physically consistent links.
+    Return the sections on all parameters and, if fitted, on physical consistency.
 
     Parameters
     ----------
@@ -153,7 +153,7 @@ def parameter_sections(
 
 
 def _contradictions(result: Identification, description: ArmModel) -> list[str]:
-    """Return a sentence on how many rigid-body parameters differ from the URDF; [] if none do."""
+    """Return a sentence on how many inertial parameters differ from the URDF; [] if none."""
     counts = not_as_described(result, description)
     joints = [joint for joint, (differ, _) in counts.items() if differ]
     differ, count = (sum(numbers) for numbers in zip(*counts.values(), strict=True))
@@ -185,7 +185,7 @@ def _input_section(result: Identification, robot: str) -> ContentSection:
 
 
 def _noise_section(robot: Robot, check: NoiseCheck) -> ContentSection:
-    """Return the section on encoder noise: its size, a test for it, and the parameter bias."""
+    """Return the section on encoder noise: its size, the test for bias, and the bias."""
     noise = ', '.join(
         f'{joint} {digits(1e3 * value)} m{unit}'
         for joint, value, unit in zip(
@@ -210,7 +210,7 @@ def _noise_section(robot: Robot, check: NoiseCheck) -> ContentSection:
 def _physical_section(
     certificate: PhysicalCertificate, exports: Mapping[str, Sequence[str]]
 ) -> ContentSection:
-    """Return the section with mass, moments and pseudo-inertia of each fitted link."""
+    """Return the section on physical consistency: mass, moments, pseudo-inertia of each link."""
     quantifier = 'Every' if certificate.consistent else 'Not every'
     training, held_out = (
         100.0 * (ratio - 1.0) for ratio in (certificate.misfit_ratio, certificate.held_out_ratio)
@@ -265,7 +265,7 @@ def convergence_section(
     history: Sequence[tuple[float, Estimate]], truth: FloatArray
 ) -> ContentSection:
     """
-    Return the section with online estimates over time, compared with the true values.
+    Return the section with online estimates over time and the true values.
 
     Parameters
     ----------

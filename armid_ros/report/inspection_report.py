@@ -100,13 +100,13 @@ def inspection_report(found: Inspection, origin: ResultOrigin = DEFAULT_ORIGIN) 
 
 
 def inspection_word(found: Inspection) -> str:
-    """Return the verdict on a recording: 'ready', 'doubtful' or 'unfit'."""
+    """Return the verdict on a recording as a word: 'ready', 'doubtful' or 'unfit'."""
     weights = {remark.weight for remark in found.remarks}
     return 'unfit' if 'bad' in weights else 'doubtful' if 'doubt' in weights else 'ready'
 
 
 def check_word(remarks: Sequence[Remark], found: LinkCheck | None) -> str:
-    """Return the verdict on a robot description (URDF): 'clean', 'look' or 'wrong'."""
+    """Return the verdict on a URDF as a word: 'clean', 'look' or 'wrong'."""
     weights = {remark.weight for remark in remarks}
     # with a smaller share explained, an effect may be missing instead
     if 'bad' in weights or (found is not None and found.wrong and found.explained >= 0.9):
@@ -115,7 +115,7 @@ def check_word(remarks: Sequence[Remark], found: LinkCheck | None) -> str:
 
 
 def headline(remarks: Sequence[Remark], found: LinkCheck | None) -> tuple[str, ...]:
-    """Return sentences on a checked URDF: main finding, torque error, suspicious values."""
+    """Return sentences on a checked URDF: finding, torque error and suspicious values."""
     suspicious = [pretty(sentence(one.text)) for one in remarks if one.weight != 'note']
     impossible = [one for one in remarks if one.weight == 'bad']
     values = suspicious or ['No impossible or suspicious value in the description.']
@@ -144,7 +144,7 @@ def headline(remarks: Sequence[Remark], found: LinkCheck | None) -> tuple[str, .
 
 
 def _wrong_mass(found: LinkCheck, k: int) -> str:
-    """Return a phrase on the mass error of a link; '' if it is not significant."""
+    """Return words on the error of a link's mass; '' if it is not significant."""
     change, reach = found.measured_mass[k] - found.mass[k], HALF_WIDTH * found.mass_std[k]
     if not abs(change) > reach:
         return ''
@@ -171,7 +171,7 @@ def link_rows(found: LinkCheck) -> list[tuple[str, ...]]:
 
 
 def _interval(values: FloatArray, std: FloatArray) -> str:
-    """Format values with their largest 95 % half-width; '-' for NaN."""
+    """Format values with their largest 95 % half-width; NaN becomes '-'."""
     if np.isnan(values).any():
         return '-'
     reach = float(HALF_WIDTH * std.max())
@@ -209,7 +209,7 @@ def description_check_report(
 
 
 def recording_facts(found: Inspection) -> list[tuple[str, str]]:
-    """Return name and value of facts on a recording: sampling, gaps, period and repairs."""
+    """Return names and values of facts on a recording: sampling, gaps, period, repairs."""
     sampling, recording, trial = found.sampling, found.recording, found.trial
     motion = 'does not repeat'
     if sampling.period is not None:
@@ -299,7 +299,7 @@ def _curves_section(found: Inspection) -> ContentSection:
 
 
 def joint_heads(found: Inspection) -> tuple[str, ...]:
-    """Return the column heads of the table of joints, with units if all joints have the same."""
+    """Return the heads of the joint table's columns; with units, if they are all the same."""
     alike, unit = len(set(found.units)) == 1, found.units[0]
     length, speed, torque = (
         f' [{one}]' if alike else '' for one in (unit, f'{unit}/s', 'N' if unit == 'm' else 'N m')

@@ -33,7 +33,7 @@ def judge(
     unusable: bool = False,
 ) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """
-    Return the limitations of an identification, and next steps.
+    Return sentences on the limitations of an identification, and on next steps.
 
     Parameters
     ----------
@@ -77,7 +77,7 @@ def judge(
 
 
 def findings_of(result: Identification, verification: Verification | None) -> Iterator[str]:
-    """Yield sentences on the identified parameters, and on the position error in simulation."""
+    """Yield sentences on identified parameters and on position errors in simulation."""
     robot = result.arm.robot
     effects = [name_in_words(effect.name) for effect in result.arm.effects]
     time = sum(float(fit.motion.t[-1] - fit.motion.t[0]) for fit in result.training)
@@ -102,7 +102,7 @@ def findings_of(result: Identification, verification: Verification | None) -> It
 def _of_errors(
     result: Identification, training: Score, held_out: Score | None, misfits: bool
 ) -> Iterator[Caution]:
-    """Yield limitations and remedies from the torque errors of training and held-out data."""
+    """Yield limitations and remedies that follow from training and held-out torque errors."""
     if misfits:
         yield (
             '',
@@ -139,7 +139,7 @@ def _of_errors(
 
 
 def residual_trends(joints: Sequence[str], fits: Sequence[Fit]) -> tuple[str, ...]:
-    """Return a sentence on joints whose residual depends on speed, position or load, else ()."""
+    """Return a sentence on joints whose residual depends on speed, position or load."""
     depends: dict[str, list[str]] = {}
     errors = Score.of(fits).joint_relative_error_percent
     least = 100.0 * DiagnosisSettings.material
@@ -157,7 +157,7 @@ def residual_trends(joints: Sequence[str], fits: Sequence[Fit]) -> tuple[str, ..
 
 
 def _of_residuals(result: Identification, fits: Sequence[Fit]) -> Iterator[Caution]:
-    """Yield limitations and remedies from residuals, intervals and condition number."""
+    """Yield limitations and remedies that follow from residuals and condition number."""
     joints = result.arm.robot.joints
     for trend in residual_trends(joints, fits):
         yield trend, 'Find the missing effect with armid diagnose, and add it with --effects.'
@@ -189,7 +189,7 @@ def _of_residuals(result: Identification, fits: Sequence[Fit]) -> Iterator[Cauti
 
 
 def _of_verification(verification: Verification, misfits: bool) -> Iterator[Caution]:
-    """Yield limitations and remedies from simulations and the test for encoder noise."""
+    """Yield limitations and remedies that follow from simulations and the noise test."""
     for text in verification.left_out:
         yield sentence(text), ''
     worse = ', '.join(sorted({name for pair in verification.forward for name in pair.worse}))

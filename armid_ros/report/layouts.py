@@ -22,7 +22,7 @@ _RESIDUAL = f'{_IDENTIFIER}/residual'
 
 
 def topic_prefix(namespace: str) -> str:
-    """Return the topic prefix of a namespace, such as '/' or '/left_arm/'."""
+    """Return the prefix of topic names in a namespace, such as '/' or '/left_arm/'."""
     return '/' + (namespace.strip('/') + '/' if namespace.strip('/') else '')
 
 
@@ -30,7 +30,7 @@ def plotter_layouts(
     robot: str, joints: Sequence[str], namespace: str = '', base: str = 'base_link'
 ) -> dict[str, str]:
     """
-    Return the contents of layout files of PlotJuggler, Foxglove and RViz by file name.
+    Return layout files for PlotJuggler, Foxglove and RViz: content by file name.
 
     PlotJuggler and Foxglove show motion, torque, residual and convergence, Foxglove the arm and
     the diagnosis as well. RViz shows the model of the arm, which moves with the transforms of
@@ -83,10 +83,10 @@ def plotter_layouts(
 
 
 def _path(value: str, label: str) -> dict[str, Any]:
-    """Return the settings of one plotted signal in Foxglove."""
+    """Return Foxglove's settings for one plotted signal."""
     return {'value': value, 'enabled': True, 'timestampMethod': 'headerStamp', 'label': label}
 
 
 def _paths(field: str, joints: Sequence[str], suffix: str = '') -> list[dict[str, Any]]:
-    """Return the settings of a plotted field of each joint in Foxglove."""
+    """Return Foxglove's settings for a plotted field of each joint."""
     return [_path(f'{field}[{k}]', f'{joint}{suffix}') for k, joint in enumerate(joints)]

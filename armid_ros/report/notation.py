@@ -28,12 +28,12 @@ TERMS = {
 
 
 def pretty(unit: str) -> str:
-    """Replace powers by superscripts: 'kg m²' for 'kg m^2'."""
+    """Write the powers in a unit as superscripts: 'kg m²' for 'kg m^2'."""
     return unit.replace('^2', '²').replace('^3', '³')
 
 
 def digits(value: float, count: int = 2) -> str:
-    """Format a number with `count` significant digits, or all integer digits: '2.0', '178'."""
+    """Format a number with `count` significant digits, or all its integer digits."""
     if not abs(value) < _MAX_NUMBER:
         return DASH
     if 10.0**count <= abs(value) < 1e7:
@@ -42,19 +42,19 @@ def digits(value: float, count: int = 2) -> str:
 
 
 def plain(value: float, count: int = 3) -> str:
-    """Format a number without trailing zeros; with an exponent below 1e-4 and from 1e7."""
+    """Format a number without trailing zeros; very small and large ones with exponent."""
     rounded = 10.0**count - 0.5 <= abs(value) < 1e7
     return f'{value:.0f}' if rounded else f'{value:.{count}g}'
 
 
 def sentence(text: str) -> str:
-    """Return a text with a capital letter at the start and a full stop at the end."""
+    """Capitalise the first letter of a text, and end it with a full stop."""
     text = text[:1].upper() + text[1:]
     return text if text.endswith('?') else f'{text.rstrip(".")}.'
 
 
 def with_interval(value: float, std: float, unit: str) -> str:
-    """Format a value with 95 % interval and unit; angles also in degrees."""
+    """Format a value with its 95 % interval and unit; angles in degrees as well."""
     text = _plus_minus(value, std, f' {pretty(unit)}'.rstrip())
     if unit == 'rad' and abs(value) < _MAX_NUMBER:
         turn = 180.0 / math.pi
@@ -65,7 +65,7 @@ def with_interval(value: float, std: float, unit: str) -> str:
 def value_of(
     finding: Finding, parameter: ParameterName, value: float, std: float, had: float = 0.0
 ) -> str:
-    """Format a parameter with interval, such as '1.0 to 2.0 ± 0.1 N m'; or 'not determined'."""
+    """Format a parameter of a finding with its interval, or return 'not determined'."""
     if words.vague(finding, parameter, value, std):
         return 'not determined'
     start = f'{measured(had, HALF_WIDTH * std)[0]} to ' if had else ''
@@ -91,19 +91,19 @@ def percent(share: float) -> str:
 
 
 def probability(p: float) -> str:
-    """Format a p value: '0.25', '0.03' or '< 0.0001'."""
+    """Format a p-value: '0.25', '0.03' or '< 0.0001'."""
     if p < 1e-4:
         return '< 0.0001'
     return f'{p:.1g}' if p < 0.1 else f'{p:.2f}'
 
 
 def counted(number: int, noun: str) -> str:
-    """Return a number with its noun: '1 joint', '2 joints'."""
+    """Format a number with its noun, in the plural if needed: '1 joint', '2 joints'."""
     return f'{number} {noun if number == 1 else noun + "s"}'
 
 
 def robot_label(source: str) -> str:
-    """Return the name of a robot for a heading: shipped name or file name."""
+    """Return the name of a robot for headings: shipped name or file name."""
     if source == '-':
         return 'description in the recording'
     path = source.split(' ')[0] if ':=' in source else source
@@ -112,7 +112,7 @@ def robot_label(source: str) -> str:
 
 def common_prefix(names: Sequence[str]) -> str:
     """
-    Return the common prefix of all joint and link names, such as 'panda_'; '' if it is short.
+    Return the prefix that all joint and link names share, such as 'panda_'; '' if short.
 
     Parameters
     ----------
@@ -137,7 +137,7 @@ def common_prefix(names: Sequence[str]) -> str:
 
 
 def without_prefix(text: str, names: Sequence[str]) -> str:
-    """Remove the common prefix from joint and link names in a label, but not from paths."""
+    """Remove the common prefix of joint and link names from a label, but not from paths."""
     prefix = common_prefix(names)
     if not prefix:
         return text
@@ -146,7 +146,7 @@ def without_prefix(text: str, names: Sequence[str]) -> str:
 
 
 def explained(text: str) -> Markup:
-    """Return a text as HTML, with a tooltip at the first use of each of the `TERMS`."""
+    """Convert a text to HTML; the first use of each of the `TERMS` gets a tooltip."""
     html = str(escape(text))
     for term, meaning in TERMS.items():
         words = rf'(?<!>)\b({term.replace(" ", "[ -]")})\b'

@@ -37,7 +37,7 @@ _LABELS = re.compile(
 
 class Templated:
     """
-    Block of a page that a Jinja template renders; the template sees it as `block`.
+    Base class of page blocks; a Jinja template renders each, and sees it as `block`.
 
     Attributes
     ----------
@@ -52,13 +52,13 @@ class Templated:
     package: ClassVar[str] = 'armid_ros.report'
 
     def html(self) -> Markup:
-        """Return the block as HTML, with all text escaped."""
+        """Return the block as HTML; all text is escaped."""
         return render(self.template, {'block': self, 'section': self}, self.package)
 
 
 class Section(Templated):
     """
-    Section of a page that a Jinja template renders; the template sees it as `section`.
+    Base class of page sections; a Jinja template renders each, and sees it as `section`.
 
     Attributes
     ----------
@@ -71,7 +71,7 @@ class Section(Templated):
 
     @property
     def anchor(self) -> str:
-        """Identifier of the section for links within the page."""
+        """Identifier of the section for links inside the page."""
         return re.sub('[^a-z0-9]+', '-', self.title.lower()).strip('-')
 
 
@@ -102,7 +102,7 @@ class Page:
     names: Sequence[str] = ()
 
     def html(self) -> str:
-        """Return the page as one HTML file that contains scripts and styles."""
+        """Return the page as a single HTML file, including scripts and styles."""
         assets = {
             'generator': Markup(GENERATOR),
             'chart_library': asset('uPlot.iife.min.js'),
@@ -121,7 +121,7 @@ class Page:
 
 
 def render(template: str, values: Mapping[str, Any], package: str = 'armid_ros.report') -> Markup:
-    """Fill values into a template of a package, with all text escaped."""
+    """Render a template of a package with given values; all text is escaped."""
     return Markup(_environment(package).get_template(template).render(values))
 
 
@@ -141,5 +141,5 @@ def _environment(package: str) -> Environment:
 
 
 def asset(name: str) -> Markup:
-    """Return the text of a file in assets/, to insert into a page without escaping."""
+    """Return the content of a file in assets/, for insertion without escaping."""
     return Markup((files('armid_ros.report') / 'assets' / name).read_text(encoding='utf-8'))

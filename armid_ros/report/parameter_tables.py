@@ -35,7 +35,7 @@ _FRICTION = {'viscous': 'viscous_coefficient', 'Coulomb': 'coulomb_torque'}
 
 def full_label(name: ParameterName, links: Sequence[str] = ()) -> str:
     """
-    Return the label of a parameter in words, with its link or joint.
+    Return a parameter's name in words, with its link or joint.
 
     Parameters
     ----------
@@ -59,14 +59,14 @@ def full_label(name: ParameterName, links: Sequence[str] = ()) -> str:
 
 
 def _words_and_link(name: ParameterName, links: Sequence[str]) -> tuple[str, str]:
-    """Return the first parameter of a linear combination in words, and its link or ''."""
+    """Return the first parameter of a linear combination in words, and its link."""
     symbol, number = _SYMBOL.findall(name.name)[0]
     known = 0 < int(number) <= len(links)
     return symbol_in_words(symbol), links[int(number) - 1] if known else ''
 
 
 def grouping(name: ParameterName, links: Sequence[str] = ()) -> str:
-    """Return the linear combination of a base parameter; '' for a single parameter."""
+    """Return a base parameter's linear combination as text; '' for a single parameter."""
     if ' ' not in name.name:
         return ''
 
@@ -78,7 +78,7 @@ def grouping(name: ParameterName, links: Sequence[str] = ()) -> str:
 
 
 def arm_facts(arm: ArmModel, robot: str) -> list[tuple[str, str]]:
-    """Return name and value of facts on an arm: robot, joints, gravity and effects."""
+    """Return names and values of facts on an arm: robot, joints, gravity, effects."""
     gravity = ', '.join(f'{g:.4g}' for g in arm.robot.gravity)
     return [
         ('Robot', robot_label(robot) if robot == '-' else robot),
@@ -98,7 +98,7 @@ def parameter_folds(
     order: Callable[[int], float] = float,
 ) -> list[Fold]:
     """
-    Return a foldable table of parameters for each link and for each kind of effect.
+    Return a foldable table of parameters for each link and each kind of effect.
 
     Parameters
     ----------
@@ -153,7 +153,7 @@ def parameter_folds(
 
 
 def estimate_text(value: float, std: float) -> tuple[str, str]:
-    """Format a value and its 95 % half-width; 'includes 0' for an insignificant value."""
+    """Format a value and its 95 % half-width; 'includes 0' if it is insignificant."""
     number, reach = measured(value, HALF_WIDTH * std)
     return (number if not std or abs(value) > HALF_WIDTH * std else 'includes 0'), reach
 
@@ -166,7 +166,7 @@ def parameter_section(
     reference: str = 'description',
 ) -> ContentSection:
     """
-    Return the section with the estimates of all parameters and their reference values.
+    Return the section with all estimated parameters and their reference values.
 
     Parameters
     ----------
@@ -226,7 +226,7 @@ def joint_columns(
     result: Identification, description: ArmModel, held_out: Sequence[Fit]
 ) -> dict[str, list[str]]:
     """
-    Return error, friction and deviations from the URDF of each joint, as table columns.
+    Return table columns with error, friction and deviation from the URDF of each joint.
 
     Parameters
     ----------
@@ -261,7 +261,7 @@ def joint_columns(
 
 def not_as_described(result: Identification, description: ArmModel) -> dict[str, tuple[int, int]]:
     """
-    Return how many rigid-body parameters of each joint differ from the description.
+    Return for each joint how many inertial parameters differ from the description.
 
     Parameters
     ----------

@@ -16,7 +16,7 @@ _PACKAGES = ('armid_ros', 'numpy', 'scipy', 'pin', 'clarabel', 'mcap')
 @dataclass(frozen=True)
 class Provenance:
     """
-    Files, versions, settings and seed that reproduce a result.
+    Files, versions, settings and seed with which a result can be reproduced.
 
     Attributes
     ----------
@@ -46,7 +46,7 @@ class Provenance:
 @dataclass(frozen=True)
 class ResultOrigin:
     """
-    Robot name, provenance and next command for the files and the page of a result.
+    Robot name, provenance and next command, for the files and the page of a result.
 
     Attributes
     ----------
@@ -67,7 +67,7 @@ class ResultOrigin:
     step: str = ''
 
     def of(self, known: str) -> ResultOrigin:
-        """Return the origin, with a given robot name where its own is missing."""
+        """Return the origin; a missing robot name is replaced by the given one."""
         return replace(self, robot=self.robot or known, source=self.source or known)
 
 
@@ -76,7 +76,7 @@ DEFAULT_ORIGIN = ResultOrigin()
 
 
 def versions() -> dict[str, str]:
-    """Return versions of Python, system and packages that can change a result."""
+    """Return the versions of Python, system and packages that may influence a result."""
     known = {'Python': platform.python_version(), 'system': platform.platform(terse=True)}
     for package in _PACKAGES:
         try:

@@ -30,7 +30,7 @@ MIN_TREND_SHARE = 0.15
 @dataclass(frozen=True)
 class Trend:
     """
-    Mean residual in bins of another quantity, such as speed.
+    Mean residual of a joint in bins of another quantity, such as speed.
 
     Attributes
     ----------
@@ -47,7 +47,7 @@ class Trend:
 
     @staticmethod
     def of(x: FloatArray, residual: FloatArray, bins: int = 20) -> Trend:
-        """Return the mean of a residual, shape (N,), in bins of a quantity x, shape (N,)."""
+        """Compute the mean of a residual (N,) in bins of a quantity x (N,)."""
         groups = np.array_split(np.argsort(x, kind='stable'), max(1, min(bins, len(x) // 25)))
         centre = np.array([x[group].mean() for group in groups])
         mean = np.array([residual[group].mean() for group in groups])
@@ -60,7 +60,7 @@ class Trend:
 @dataclass(frozen=True)
 class Whiteness:
     """
-    Autocorrelation of the residual of a joint, with the 99 % band of white noise.
+    Autocorrelation of a joint's residual, with the 99 % band of white noise.
 
     Attributes
     ----------
@@ -79,12 +79,12 @@ class Whiteness:
 
     @property
     def outside(self) -> float:
-        """Share of lags with autocorrelation outside the 99 % band; 0.01 for white noise."""
+        """Share of lags with autocorrelation outside the 99 % band; white noise has 0.01."""
         return float(np.mean(np.abs(self.correlation) > self.band))
 
     @staticmethod
     def of(fits: Sequence[Fit], joint: int, lags: int = 40) -> Whiteness:
-        """Return the autocorrelation of a joint's residual within unbroken stretches."""
+        """Compute the autocorrelation of a joint's residual within gap-free sections."""
         longest = max(fits, key=lambda fit: len(fit.motion)).motion
         period = float(np.median(np.diff(longest.t)))
         products = np.zeros(max(2, min(lags + 1, len(longest) // 4)))
@@ -103,7 +103,7 @@ class Whiteness:
 
 def torque_reach(result: Identification, fits: Sequence[Fit]) -> FloatArray:
     """
-    Return the 95 % half-width of each joint's predicted torque due to parameter errors, (n,).
+    Return the 95 % half-width (n,) of predicted torques that parameter errors cause.
 
     The half-widths are root mean squares over a motion [N m].
 
@@ -118,7 +118,7 @@ def torque_reach(result: Identification, fits: Sequence[Fit]) -> FloatArray:
 
 def residual_section(robot: Robot, fits: Sequence[Fit], role: str) -> ContentSection:
     """
-    Return the section with each joint's residual against speed, position and load.
+    Return the section with each joint's residual over speed, position and load.
 
     Parameters
     ----------
@@ -171,7 +171,7 @@ def residual_section(robot: Robot, fits: Sequence[Fit], role: str) -> ContentSec
 
 
 def _cloud(x: FloatArray, residual: FloatArray, xlabel: str, ylabel: str) -> Chart:
-    """Return a chart of a residual against a variable, with the mean residual in bins."""
+    """Return a chart of a residual over a variable, with its mean in bins."""
     trend = Trend.of(x, residual)
     # largest number of points of a cloud
     chosen = np.unique(np.linspace(0, max(len(x) - 1, 0), min(500, len(x))).astype(np.intp))
@@ -219,7 +219,7 @@ def whiteness_section(robot: Robot, fits: Sequence[Fit], role: str) -> ContentSe
 def residual_by_variable(
     fits: Sequence[Fit], joint: int
 ) -> tuple[FloatArray, dict[str, FloatArray]]:
-    """Return a joint's residual, (N,), and its speed, position and predicted torque by name."""
+    """Return a joint's residual (N,), and its speed, position and predicted torque by name."""
     used = np.concatenate([fit.informative[:, joint] for fit in fits])
     parts = {
         'speed': [fit.motion.dq for fit in fits],
@@ -231,7 +231,7 @@ def residual_by_variable(
 
 
 def explained_shares(fits: Sequence[Fit], joint: int) -> dict[str, float]:
-    """Return the share of a joint's residual that speed, position and load each explain alone."""
+    """Return which share of a joint's residual each of speed, position and load explains."""
     residual, axes = residual_by_variable(fits, joint)
     # smallest number of samples for a trend
     if len(residual) < 20:

@@ -121,7 +121,7 @@ def _repeatability(
 
 def repeatability(fits: Sequence[Fit]) -> tuple[float, FloatArray, FloatArray] | None:
     """
-    Return the period of a recorded motion, and torque noise and residual of each joint.
+    Return the period of a recorded motion, and each joint's torque noise and residual.
 
     Two periods are compared in the longest stretch of a recording; None if no motion repeats. The
     residuals are compared, each at the positions of its own period. Torque that depends only on

@@ -50,7 +50,7 @@ _DETECTABLE = (
 
 
 def share_bars(diagnosis: Diagnosis) -> BarChart:
-    """Return bars of squared torque error: the share of each cause, and the unexplained share."""
+    """Return bars that divide the squared torque error among causes and unexplained rest."""
     rows, taken = [], 0.0
     for group in by_cause(diagnosis.findings):
         one = group[0]
@@ -75,7 +75,7 @@ def named_rows(
     findings: Sequence[Finding], certain: bool = False
 ) -> list[tuple[str, str, str, str]]:
     """
-    Return a table row for each parameter of the named effects, with its 95 % interval.
+    Return table rows with the parameters of named effects and their 95 % intervals.
 
     Parameters
     ----------
@@ -122,7 +122,7 @@ def named_section(findings: Sequence[Finding]) -> ContentSection:
 
 
 def evidence_section(diagnosis: Diagnosis) -> ContentSection:
-    """Return the section with residuals of the worst joints against variables of the motion."""
+    """Return the section with residuals of the worst joints over position, velocity and others."""
     folds = []
     total = 'the explained part' if diagnosis.findings else 'the difference'
     for number, place in enumerate(diagnosis.where[:3]):
@@ -158,7 +158,7 @@ def evidence_section(diagnosis: Diagnosis) -> ContentSection:
 
 
 def minor_section(diagnosis: Diagnosis, patched: bool) -> ContentSection:
-    """Return the section with significant effects that are negligible or fail on held-out data."""
+    """Return the section on significant effects that are negligible or fail on held-out data."""
     rows = [
         (
             name_in_words(one.name),
@@ -184,7 +184,7 @@ def minor_section(diagnosis: Diagnosis, patched: bool) -> ContentSection:
 
 
 def detectable_section(sizes: Sequence[Detectable]) -> ContentSection:
-    """Return the section with the detectable size of each effect at its best and worst joint."""
+    """Return the section with the detectable size of each effect, best and worst joint."""
     rows = [_detectable_row(name, sizes) for name in dict.fromkeys(one.name for one in sizes)]
     return ContentSection(
         'Smallest detectable effects',
@@ -202,7 +202,7 @@ def detectable_section(sizes: Sequence[Detectable]) -> ContentSection:
 
 
 def isolability_section(isolability: Isolability) -> ContentSection:
-    """Return the section with detectable sizes and similarity of effects for a planned run."""
+    """Return the section on which effects a planned motion can detect and separate."""
     kinds, apart = isolability.of_kinds()
     near = (apart < DISTINCT) & ~np.eye(len(kinds), dtype=bool)
     names = [name_in_words(kind) for kind in kinds]
@@ -242,7 +242,7 @@ def isolability_section(isolability: Isolability) -> ContentSection:
 
 
 def _detectable_row(name: str, sizes: Sequence[Detectable]) -> tuple[str, str, str, str]:
-    """Return the table cells of one effect, with the columns `_DETECTABLE`."""
+    """Return the table row of one effect, with the columns `_DETECTABLE`."""
 
     def place(one: Detectable) -> str:
         return ', '.join(one.joints) or 'the arm'
@@ -260,7 +260,7 @@ def _detectable_row(name: str, sizes: Sequence[Detectable]) -> tuple[str, str, s
 
 
 def candidates_section(diagnosis: Diagnosis) -> ContentSection:
-    """Return the section with the share of the residual that each candidate alone explains."""
+    """Return the section with the share of the residual that each effect alone explains."""
     explanation = diagnosis.explanation
     names = {finding.name for finding in diagnosis.findings}
     rows = [
@@ -302,7 +302,7 @@ def candidates_section(diagnosis: Diagnosis) -> ContentSection:
 
 
 def _candidate_value(diagnosis: Diagnosis, trial: CauseResult) -> str:
-    """Format a candidate's first value with interval; or 'includes 0' or 'not possible'."""
+    """Format the first value of a candidate, or 'includes 0' or 'not possible'."""
     arm, effect, kept = diagnosis.arm, trial.effect, list(trial.kept)
     if diagnosis.explanation is not None:
         arm = diagnosis.explanation.given
@@ -317,7 +317,7 @@ def _candidate_value(diagnosis: Diagnosis, trial: CauseResult) -> str:
 
 
 def gap_section(diagnosis: Diagnosis, gap: Gap) -> ContentSection:
-    """Return the section with each joint's torque error without and with the named effects."""
+    """Return the section with each joint's torque error, without and with named effects."""
     usual_error, harmful = diagnosis.baseline, bool(diagnosis.harmful)
     recordings = 'recordings not used for the fit' if gap.predicted else gap.data
     unpatched = ' The model in model.yaml does not have the named cause.' * harmful
@@ -335,7 +335,7 @@ def gap_section(diagnosis: Diagnosis, gap: Gap) -> ContentSection:
 
 
 def gap_bars(diagnosis: Diagnosis, gap: Gap) -> BarChart:
-    """Return bars of each joint's torque error in units of its usual error, largest first."""
+    """Return bars of each joint's torque error in units of its usual error, worst first."""
     robot = diagnosis.arm.robot
     roles: list[tuple[Role, str, FloatArray]] = [
         ('before', 'given model', gap.before),

@@ -31,7 +31,7 @@ ZOOM = 'Drag across a plot, or pinch it, to zoom; double-click or double-tap to 
 
 
 def by_recording(fits: Sequence[Fit]) -> dict[str, list[Fit]]:
-    """Group fits by the name of their recording."""
+    """Group fits by recording."""
     found: dict[str, list[Fit]] = {}
     for fit in fits:
         found.setdefault(fit.source, []).append(fit)
@@ -40,7 +40,7 @@ def by_recording(fits: Sequence[Fit]) -> dict[str, list[Fit]]:
 
 def error_bars(robot: Robot, training: Fits, validation: Fits, halves: Score) -> BarChart:
     """
-    Return bars of the relative torque error of each joint, the worst joint first.
+    Return bars of each joint's relative torque error, the worst joint first.
 
     Held-out and training errors are shown. Without held-out recordings, each half of the data is
     predicted by the fit to the other half.
@@ -139,7 +139,7 @@ def fit_section(
 
 
 def _fit_charts(fits: Sequence[Fit], joint: int, unit: str, link: str) -> tuple[Chart, Chart]:
-    """Return charts of measured and predicted torque, and of the residual, of one joint."""
+    """Return charts of one joint: measured and predicted torque, and residual."""
     t = joined_time([fit.motion.t for fit in fits])
     measured = joined([fit.motion.tau[:, joint] for fit in fits if fit.motion.tau is not None])
     predicted = joined([fit.predicted[:, joint] for fit in fits])
@@ -173,7 +173,7 @@ def forward_section(
     labels: tuple[str, str] = ('description', 'identified'),
 ) -> ContentSection:
     """
-    Return the section with position errors of two models driven by the recorded torques.
+    Return the section with position errors of two simulated models under recorded torques.
 
     Parameters
     ----------
@@ -227,7 +227,7 @@ def forward_section(
 def _worst_joint(
     robot: Robot, pair: ForwardValidation, models: Sequence[tuple[Role, str, ForwardScore]]
 ) -> list[Templated]:
-    """Return a chart of the position error of the joint with the largest error."""
+    """Return a chart of the position error of the worst joint."""
     farthest = max((score for *_, score in models), key=lambda one: one.position_error.max())
     worst, motion = int(farthest.position_error.argmax()), pair.after.motion
     curves = [1e3 * (score.simulated[:, worst] - motion.q[:, worst]) for *_, score in models]
