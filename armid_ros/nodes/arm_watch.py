@@ -26,7 +26,7 @@ _REST = 0.25
 
 class ArmWatch:
     """
-    Subscription to joint_states that supervises joint positions, and age and stamps of messages.
+    Subscriber of joint_states that supervises joint positions, message age and time stamps.
 
     Attributes
     ----------
@@ -76,22 +76,22 @@ class ArmWatch:
 
     @property
     def effort(self) -> FloatArray:
-        """Return the efforts of the last joint state, shape (n,) [N m or N]; NaN if missing."""
+        """Efforts in the last joint state, shape (n,) [N m or N]; NaN if missing."""
         known = dict(zip(*self._efforts, strict=False))
         return np.array([known.get(joint, math.nan) for joint in self._joints])
 
     def now(self) -> float:
-        """Return the time of a steady clock, or of /clock if used, for the age of messages [s]."""
+        """Return the time for message ages [s]: of a steady clock, or of /clock if used."""
         return self._age_clock(self._node.get_clock().now().nanoseconds)
 
     def catch_up(self) -> None:
-        """Process the joint states that arrived during a long computation."""
+        """Process joint states that arrived while the node was computing."""
         with self._states.handle:
             while (taken := self._states.handle.take_message(JointState, True)) is not None:
                 self._states.callback(taken[0])
 
     def staleness(self, timeout: float) -> str:
-        """Return a message on joints without a new position for `timeout` [s]; empty if none."""
+        """Return a message on joints without new positions for `timeout` [s]; empty if none."""
         fault = self.monitor.pose.staleness(self.now(), timeout)
         topic = self._states.topic_name
         if (
@@ -104,7 +104,7 @@ class ArmWatch:
 
     def fault_at_start(self, timeout: float, difference: float, simulated: bool) -> str:
         """
-        Return why the arm must not be started now; empty if it may be started.
+        Return why the arm must not start now; empty if it may start.
 
         Parameters
         ----------
@@ -146,7 +146,7 @@ class ArmWatch:
         )
 
     def _age_clock(self, clock_ns: int) -> float:
-        """Return the time of `now` [s] for a time of the node's clock [ns]."""
+        """Convert a time of the node's clock [ns] to the time scale of `now` [s]."""
         if not self._node.get_clock().ros_time_is_active:
             return float(self._steady.now().nanoseconds * 1e-9)
         return (clock_ns - self._stepped_ns) * 1e-9

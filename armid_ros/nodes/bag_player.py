@@ -36,7 +36,7 @@ from trajectory_msgs.msg import JointTrajectory
 
 
 class _JumpGuard:
-    """Guard against recorded trajectories that do not start at the measured arm position."""
+    """Check that a recorded trajectory starts at the measured position of the arm."""
 
     def __init__(self, node: Node, tolerance: float, timeout: float) -> None:
         self.tolerance, self.timeout = tolerance, timeout
@@ -47,7 +47,7 @@ class _JumpGuard:
         )
 
     def describe(self, cdr: bytes) -> None:
-        """Read the velocity limits from a serialised robot_description."""
+        """Read velocity limits from a serialised robot_description."""
         try:
             robot = robot_from_urdf(deserialize_message(cdr, String).data)
         except ArmidError:
@@ -55,7 +55,7 @@ class _JumpGuard:
         self._limits = dict(zip(robot.joints, robot.velocity_limit.tolist(), strict=True))
 
     def objection(self, cdr: bytes) -> str:
-        """Return why a serialised JointTrajectory must not be sent; empty if it may be sent."""
+        """Return why a recorded trajectory must not be sent; empty if it may be sent."""
         try:
             reference = waypoints_of(deserialize_message(cdr, JointTrajectory))
         except ArmidError as error:
@@ -89,7 +89,7 @@ class _JumpGuard:
 
 class BagPlayerNode(ArmidNode):
     """
-    Node that publishes the messages of a bag, byte by byte as recorded.
+    Node that publishes the messages of a bag, unchanged.
 
     A JointTrajectory is sent only if no joint of the arm on joint_states would jump.
 
@@ -178,7 +178,7 @@ class BagPlayerNode(ArmidNode):
 
     @property
     def failure(self) -> str:
-        """Return why a trajectory was not sent; empty if all trajectories were sent."""
+        """Reason why a trajectory was not sent; empty if all were sent."""
         return self._refused
 
     @property
@@ -188,11 +188,11 @@ class BagPlayerNode(ArmidNode):
 
     @property
     def position(self) -> float:
-        """Return the playback time since the first message of the bag [s]."""
+        """Time in the bag, from its first message on [s]."""
         return (self._position - self._first) * 1e-9
 
     def play(self) -> None:
-        """Publish the messages that are due at the present playback time."""
+        """Publish all messages that are due at the present time in the bag."""
         now = self._pace.now().nanoseconds
         if self._anchor is None:
             if (self._lock_step and now == 0) or not self._ready():
@@ -229,7 +229,7 @@ class BagPlayerNode(ArmidNode):
             )
 
     def changed(self, names: frozenset[str]) -> None:
-        """Apply new values of the rate of /clock and of the limits for trajectories."""
+        """Apply changed parameters: rate of /clock, and limits for trajectories."""
         if 'clock_rate' in names:
             self._set_clock_rate()
         if self._guard is not None:
@@ -243,7 +243,7 @@ class BagPlayerNode(ArmidNode):
             self._clock_publisher = self.create_publisher(ClockMessage, '/clock', 10)
 
     def condition(self) -> tuple[str, Mapping[str, object]]:
-        """Return the missing subscribers, the number of published messages and the bag time."""
+        """Return missing subscribers, number of published messages, and time in the bag."""
         values = {
             'messages': self.published.total(),
             'position': self.position,
@@ -280,7 +280,7 @@ class BagPlayerNode(ArmidNode):
         return publishers
 
     def _read_messages(self) -> Iterator[RawMessage]:
-        """Yield the messages of the played topics from the begin of the bag."""
+        """Yield the messages of the played topics from the start of the bag."""
         return (m for m in self._bag.messages() if m.topic in self._topics)
 
     def _ready(self) -> bool:
@@ -308,7 +308,7 @@ class BagPlayerNode(ArmidNode):
         self.published[message.topic] += 1
 
     def _read_next(self) -> None:
-        """Read the next message; at the end of the bag, log whether the bag is damaged."""
+        """Read the next message; at the end of the bag, log any damage of the bag."""
         self._next = next(self._messages, None)
         if self._next is None and self._bag.damage:
             self.complaints.add('damage', f'{self.value("bag")}: {self._bag.damage}')

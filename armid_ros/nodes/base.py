@@ -52,7 +52,7 @@ def key_values(values: Mapping[str, object]) -> list[KeyValue]:
 
 class ArmidNode(Node):
     """
-    ROS node whose parameters come from a table, and whose state is published on /diagnostics.
+    Base class of nodes with a table of parameters, whose state is published on /diagnostics.
 
     Exceptions in callbacks do not end the node: they are counted and logged. Errors of the
     operating system, such as a full disk, do end the node.
@@ -69,7 +69,7 @@ class ArmidNode(Node):
     table: ClassVar[tuple[NodeParameter, ...]]
 
     def __init__(self, name: str, **kwargs: Any) -> None:
-        """Make the node; further arguments are those of rclpy's Node, such as namespace."""
+        """Create the node; other arguments are those of rclpy's Node."""
         super().__init__(name, **kwargs)
         self.complaints = Complaints(self.get_logger())
         self._clock_missed = self._trouble_logged = False
@@ -88,7 +88,7 @@ class ArmidNode(Node):
     def create_subscription(
         self, msg_type: Any, topic: str, callback: Callable[[Any], None], *args: Any, **more: Any
     ) -> Subscription:
-        """Subscribe as in rclpy; exceptions of the callback do not end the node."""
+        """Subscribe as rclpy does; exceptions in the callback do not end the node."""
         return super().create_subscription(
             msg_type, topic, self.guarded(callback, topic), *args, **more
         )
@@ -96,12 +96,12 @@ class ArmidNode(Node):
     def create_timer(
         self, timer_period_sec: float, callback: Callable[[], None], *args: Any, **more: Any
     ) -> Timer:
-        """Make a timer as in rclpy; exceptions of its callback do not end the node."""
+        """Create a timer as rclpy does; exceptions in its callback do not end the node."""
         safe = self.guarded(callback, getattr(callback, '__name__', 'timer'))
         return super().create_timer(timer_period_sec, safe, *args, **more)
 
     def guarded(self, callback: Callable[..., Any], source: str) -> Callable[..., Any]:
-        """Return a callback whose exceptions are logged as faults of an input source."""
+        """Wrap a callback so that its exceptions are logged as faults of an input."""
 
         @wraps(callback)
         def call(*args: Any) -> Any:
@@ -120,12 +120,12 @@ class ArmidNode(Node):
         return call
 
     def create_steady_timer(self, seconds: float, callback: Callable[[], None]) -> Timer:
-        """Make a timer in real time, independent of /clock."""
+        """Create a timer that runs in real time, independent of /clock."""
         return self.create_timer(seconds, callback, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     @property
     def missing_clock(self) -> str:
-        """Return why the simulated time is missing; empty if it is available or not used."""
+        """Return why there is no simulated time; empty if there is, or if it is not used."""
         clock = self.get_clock()
         if not clock.ros_time_is_active:
             return ''
@@ -140,7 +140,7 @@ class ArmidNode(Node):
         return ''
 
     def log_trouble(self) -> None:
-        """Log a new problem of the node once, or that simulated time is missing."""
+        """Log a new problem of the node, once; missing simulated time is a problem."""
         missing = self.missing_clock
         if missing and not self._clock_missed:
             self.get_logger().warning(f'{missing}; until then the node waits')
@@ -151,7 +151,7 @@ class ArmidNode(Node):
         self._trouble_logged = bool(trouble)
 
     def warn_of_unknown(self) -> None:
-        """Log the parameters that were given at the start but do not exist in the node."""
+        """Log parameters given at the start that the node does not have."""
         known = self.get_parameters_by_prefix('')
         given = [name for name in overrides(self) if not name.startswith('qos_overrides.')]
         wrong = [name for name in given if name not in known]
@@ -161,28 +161,28 @@ class ArmidNode(Node):
 
     @property
     def finished(self) -> bool:
-        """Whether the work of the node is done, so that its process may end."""
+        """Whether the node has done its work, so that its process may end."""
         return False
 
     @property
     def failure(self) -> str:
-        """Return why the task of the node failed; the process then ends with exit code 2."""
+        """Reason why the node's task failed, which leads to exit code 2; empty otherwise."""
         return ''
 
     @property
     def activity(self) -> str:
-        """Return the diagnostics message for a node without a problem."""
+        """Message on /diagnostics for a node without a problem."""
         return 'running'
 
     @property
     def hardware(self) -> str:
-        """Return the name of the robot, for diagnostics."""
+        """Name of the robot on /diagnostics."""
         return ''
 
     @abstractmethod
     def condition(self) -> tuple[str, Mapping[str, object]]:
         """
-        Return the present problem of the node, and values for /diagnostics.
+        Return the node's present problem, and values for /diagnostics.
 
         Returns
         -------
@@ -194,16 +194,16 @@ class ArmidNode(Node):
         """
 
     def level(self, troubled: bool) -> bytes:
-        """Return the diagnostics level, by default WARN for a node with a problem."""
+        """Return the level on /diagnostics: by default, WARN if there is a problem."""
         return DiagnosticStatus.WARN if troubled else DiagnosticStatus.OK
 
     def further_statuses(self) -> Sequence[DiagnosticStatus]:
-        """Return further statuses of the node for /diagnostics."""
+        """Return additional statuses of the node for /diagnostics."""
         return ()
 
     def check(self, values: Mapping[str, Any]) -> None:
         """
-        Raise an ArmidError if parameters must not be set to new values at run time.
+        Raise an ArmidError if new parameter values are not allowed at run time.
 
         Parameters
         ----------
@@ -214,7 +214,7 @@ class ArmidNode(Node):
 
     def changed(self, names: frozenset[str]) -> None:
         """
-        Apply the new values of parameters that were set at run time.
+        Apply parameters that were changed at run time.
 
         Parameters
         ----------
@@ -224,22 +224,22 @@ class ArmidNode(Node):
         """
 
     def close(self) -> None:
-        """Save results and stop motions when the node ends."""
+        """Save results and stop motions before the node ends."""
 
     def log(self, text: str) -> str:
-        """Log a text unless ROS is shut down, and return the text."""
+        """Log a text unless ROS is shut down; return the text."""
         if self.context.ok():
             self.get_logger().info(text)
         return text
 
     def value(self, parameter: str) -> Any:
-        """Return the value of a parameter; empty texts are removed from a list of texts."""
+        """Return a parameter's value; empty texts in a list of texts are left out."""
         value = self.get_parameter(parameter).value
         is_list = isinstance(value, list) and all(isinstance(one, str) for one in value)
         return tuple(filter(None, value)) if is_list else value
 
     def folder(self, parameter: str) -> Path:
-        """Return the folder that a parameter names; it is created if it does not exist."""
+        """Return the folder that a parameter names; create it if it is missing."""
         folder = Path(self.value(parameter)).expanduser()
         try:
             folder.mkdir(parents=True, exist_ok=True)
@@ -250,7 +250,7 @@ class ArmidNode(Node):
 
     def offer(self, service: str, action: Callable[[], str]) -> None:
         """
-        Offer a service of type std_srvs/Trigger that runs a function.
+        Offer a std_srvs/Trigger service that calls a function and returns its text.
 
         Parameters
         ----------
@@ -282,7 +282,7 @@ class ArmidNode(Node):
 
     def set_parameters_atomically(self, parameter_list: list[Parameter]) -> SetParametersResult:
         """
-        Set parameters as in rclpy, and log rejected ones.
+        Set parameters as rclpy does; log those that are rejected.
 
         Parameters with unchanged values are accepted, so that dumped parameters can be loaded
         again. An integer is accepted for a float.
@@ -313,7 +313,7 @@ class ArmidNode(Node):
         return result
 
     def publish_diagnostics(self) -> None:
-        """Publish the state of the node and its rejected inputs on /diagnostics."""
+        """Publish the node's state and its rejected inputs on /diagnostics."""
         trouble, values = self.condition()
         status = DiagnosticStatus(
             name=f'{self.get_fully_qualified_name()[1:]}: state', hardware_id=self.hardware

@@ -17,7 +17,7 @@ from std_srvs.srv import Trigger
 
 def call_publisher(node: str, action: str, speed: float | None, timeout: float) -> str:
     """
-    Start, rehearse, stop or slow down the excitation of a running excitation_publisher.
+    Start, rehearse, stop or slow down the run of an excitation_publisher node.
 
     Parameters
     ----------

@@ -16,7 +16,7 @@ FATAL = (OSError, MemoryError, RecordingEnded)
 
 class Complaints:
     """
-    Inputs that a node rejected: their number by kind, and the log messages.
+    Inputs that a node rejected: number of each kind, and logged messages.
 
     Attributes
     ----------
@@ -32,7 +32,7 @@ class Complaints:
     """
 
     def __init__(self, logger: RcutilsLogger) -> None:
-        """Log messages about rejected inputs with the logger of a node."""
+        """Use the logger of a node for messages on rejected inputs."""
         self._logger = logger
         self.counts: Counter[str] = Counter()
         self._logged: dict[str, set[str]] = {}
@@ -41,7 +41,7 @@ class Complaints:
         self.defects = 0
 
     def add(self, kind: str, text: str) -> None:
-        """Count a rejected input, and log the message unless it was logged before."""
+        """Count a rejected input; log the message if it is new."""
         self.counts[kind] += 1
         self.latest = text
         self.fresh = True
@@ -51,11 +51,11 @@ class Complaints:
             self._logger.warning(text)
 
     def has_logged(self, text: str) -> bool:
-        """Return whether a message about a rejected input was logged."""
+        """Return whether this message on a rejected input was logged."""
         return any(text in logged for logged in self._logged.values())
 
     def add_exception(self, kind: str, error: Exception) -> None:
-        """Count an input that caused an unexpected exception, and log the exception."""
+        """Count an input that raised an unexpected exception, and log the exception."""
         self.defects += 1
         self.add(kind, f'{kind}: skipped, as it cannot be used ({type(error).__name__}: {error})')
         self._logger.debug(''.join(traceback.format_exception(error)))

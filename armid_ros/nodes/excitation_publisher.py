@@ -36,7 +36,7 @@ from std_msgs.msg import String
 
 class ExcitationPublisherNode(ArmidNode):
     """
-    Node that moves a real or simulated arm along an excitation, and supervises the motion.
+    Node that moves an arm along an excitation and supervises the motion.
 
     The run is sent as a goal of the action follow_joint_trajectory if a controller offers the
     action, else as a message. The arm must be at rest at the start. It moves slowly from its
@@ -57,7 +57,7 @@ class ExcitationPublisherNode(ArmidNode):
         **kwargs: Any,
     ) -> None:
         """
-        Make the node; the arm does not move before the start of a run.
+        Create the node; the arm does not move until a run is started.
 
         Parameters
         ----------
@@ -99,7 +99,7 @@ class ExcitationPublisherNode(ArmidNode):
         self._timer = self.create_steady_timer(0.05, self.poll)
 
     def parameters(self) -> Sequence[NodeParameter]:
-        """Return the parameters of the node; some defaults are different for a simulation."""
+        """Return the parameters of the node; some defaults differ for a simulation."""
         declare(self, (SIMULATION,))
         table = [p for p in super().parameters() if p is not SIMULATION]
         self._simulated = bool(self.value('simulation') or self.value('use_sim_time'))
@@ -111,19 +111,19 @@ class ExcitationPublisherNode(ArmidNode):
 
     @property
     def duration(self) -> float:
-        """Return the duration of the approach and the excitation together [s]."""
+        """Duration of approach and excitation together [s]."""
         if self._gate is not None:
             return self._gate.run.duration
         return float(self.value('approach') + self._excitation.sampled_duration(self._rate))
 
     @property
     def readers(self) -> int:
-        """Return the number of subscribers to joint_trajectory."""
+        """Number of subscribers to joint_trajectory."""
         return self._controller.readers
 
     @property
     def last_stamp_ns(self) -> int:
-        """Return the oldest stamp of the present joint positions [ns]."""
+        """Oldest time stamp among the present joint positions [ns]."""
         return self._arm.monitor.last_stamp_ns
 
     @property
@@ -141,7 +141,7 @@ class ExcitationPublisherNode(ArmidNode):
         return elapsed if on_the_way else None
 
     def poll(self) -> None:
-        """Start a run once controller and joint states are there; stop it if either is lost."""
+        """Start a run once controller and joint states exist; stop it if one of them is lost."""
         self._controller.poll()
         now, patience = self._arm.now(), self.value('state_timeout')
         if self.elapsed is not None:
@@ -169,11 +169,11 @@ class ExcitationPublisherNode(ArmidNode):
                 self.get_logger().warning(f'{missing}; call ~/start when this is solved')
 
     def start(self) -> str:
-        """Plan the path from the measured position to the excitation, and start the run."""
+        """Plan the path from the measured position to the excitation; start the run."""
         return self._start(self.value('speed_scaling'))
 
     def rehearse(self) -> str:
-        """Run the excitation slowly, and report tracking errors and torques afterwards."""
+        """Run the excitation slowly, and then report tracking errors and torques."""
         speed = min(self.value('rehearsal_speed'), self.value('speed_scaling'))
         text = self._start(speed)
         assert self._gate is not None
@@ -181,7 +181,7 @@ class ExcitationPublisherNode(ArmidNode):
         return f'rehearsal at {100.0 * speed:.0f} % of the speed: {text}'
 
     def _start(self, speed: float) -> str:
-        """Plan a run at a share of the excitation's speed, and send it to the controller."""
+        """Plan a run at a share of the excitation's speed; send it to the controller."""
         self._waiting = False
         if self.elapsed is not None:
             raise TrajectoryError('the excitation is under way; ~/stop ends it')
@@ -225,14 +225,14 @@ class ExcitationPublisherNode(ArmidNode):
         )
 
     def _fault_at_start(self) -> str:
-        """Return why the joint states do not permit a start; empty if they permit it."""
+        """Return why the joint states do not allow a start; empty if they do."""
         patience = self.value('state_timeout')
         difference = patience if self.value('simulation') else 0.1 * self.value('stopping')
         difference = math.inf if self.value('zero_stamp') else difference
         return self._arm.fault_at_start(patience, difference, self._simulated)
 
     def stop(self) -> str:
-        """Stop the arm on its path, or send the stop again if the arm still moves after it."""
+        """Stop the arm on its path; if it still moves later, send the stop again."""
         self._waiting = False
         if self._gate is not None:
             elapsed = self._arm.now() - self._begun
@@ -253,11 +253,11 @@ class ExcitationPublisherNode(ArmidNode):
 
     @property
     def activity(self) -> str:
-        """Return 'running' during a run, otherwise the result of the last run."""
+        """'running' during a run, otherwise the result of the last run."""
         return 'running' if self.elapsed is not None else self._outcome
 
     def condition(self) -> tuple[str, Mapping[str, object]]:
-        """Return the problem and the progress of the present run."""
+        """Return problem and progress of the present run."""
         elapsed = self.elapsed
         values = {
             'running': int(elapsed is not None),
@@ -284,7 +284,7 @@ class ExcitationPublisherNode(ArmidNode):
             self._loaded(values['file'])
 
     def changed(self, names: frozenset[str]) -> None:
-        """Load the excitation file after a change of the parameter `file`."""
+        """Load another excitation after a change of the parameter `file`."""
         if 'file' in names:
             self._excitation = self._loaded(self.value('file'))
 
@@ -294,7 +294,7 @@ class ExcitationPublisherNode(ArmidNode):
         return checked(load_excitation(path), self._planner, path)
 
     def close(self) -> None:
-        """Stop the arm unless it is at rest, and wait until the stop has arrived."""
+        """Stop the arm unless it is at rest; wait until the stop has arrived."""
         ending = self._current_ending()
         sent = self._gate is not None or (ending is not None and ending.last is not None)
         if sent and self.context.ok():
@@ -308,7 +308,7 @@ class ExcitationPublisherNode(ArmidNode):
         super().destroy_node()
 
     def guarded(self, callback: Callable[..., Any], source: str) -> Callable[..., Any]:
-        """Return a callback whose unexpected exceptions stop the arm, and are logged."""
+        """Wrap a callback so that unexpected exceptions are logged and stop the arm."""
 
         @wraps(callback)
         def stopping(*args: Any) -> Any:
@@ -324,7 +324,7 @@ class ExcitationPublisherNode(ArmidNode):
         return super().guarded(stopping, source)
 
     def _on_state(self, now: float) -> None:
-        """Compare measured with planned positions and efforts; stop the arm if they differ."""
+        """Compare measured and planned positions and efforts; stop the arm if they differ."""
         if 0.0 <= now - self._tracked < 0.005:  # often enough
             return
         self._tracked = now
@@ -351,13 +351,13 @@ class ExcitationPublisherNode(ArmidNode):
             self._abort(contradiction or fault or overload, blocked=not contradiction)
 
     def _abort(self, reason: str, *, blocked: bool = False) -> None:
-        """Stop the arm and log the reason; a blocked arm is held at its position."""
+        """Stop the arm and log the reason; if it is blocked, hold it at its position."""
         elapsed = self._arm.now() - self._begun
         self._stop_run(reason, blocked)
         self._report_trouble(f'stopped {elapsed:.2f} s after the start: {reason}')
 
     def _stop_run(self, reason: str, blocked: bool = False) -> None:
-        """Send the motion that stops the arm on its path, or holds a blocked arm."""
+        """Send a motion that stops the arm on its path, or that holds a blocked arm."""
         gate, now = self._gate, self._arm.now()
         self._gate = self._rehearsal = None
         self._outcome = 'stopped'
@@ -368,14 +368,14 @@ class ExcitationPublisherNode(ArmidNode):
         self._controller.send_stop(write_trajectory(motion))
 
     def _current_ending(self) -> Ending | None:
-        """Return the last ended run, without its stop motion if another client moves the arm."""
+        """Return the last ended run; its stop is dropped if another client moves the arm."""
         ending = self._ending
         if ending is not None and self._controller.taken:
             self._ending = replace(ending, last=None) if ending.reason else None
         return self._ending
 
     def _supervise_ending(self) -> None:
-        """Check that the arm comes to rest after a run; hold a blocked arm at its position."""
+        """Check that the arm comes to rest after a run; hold it if it is blocked."""
         ending = self._current_ending()
         if ending is None:
             return
@@ -392,7 +392,7 @@ class ExcitationPublisherNode(ArmidNode):
         self.log(f'run complete: {gate.run.duration:.1f} s, approach included')
 
     def _on_goal_ended(self, reason: str) -> None:
-        """Process the end of a goal of the controller; `reason` is empty after a complete run."""
+        """React to the end of a controller goal; `reason` is empty after a complete run."""
         gate, elapsed = self._gate, self._arm.now() - self._begun
         if gate is None:  # the run was stopped before
             ending = self._ending
@@ -411,7 +411,7 @@ class ExcitationPublisherNode(ArmidNode):
             self._finish_run(gate)
 
     def _report_rehearsal(self, rehearsal: Rehearsal) -> None:
-        """Log the tracking errors and torques of a rehearsal, and advise the next step."""
+        """Log tracking errors and torques of a rehearsal, with advice on the next step."""
         self._rehearsal = None
         report, surprises = rehearsal.report()
         if surprises:
@@ -421,7 +421,7 @@ class ExcitationPublisherNode(ArmidNode):
             self._rehearsed = self.log(f'rehearsed: {report}; {advice}')
 
     def _on_experiment(self, message: String) -> None:
-        """Load an excitation from the topic experiment; only ~/start runs it."""
+        """Load an excitation from the topic experiment; it runs after ~/start only."""
         if self.elapsed is not None or self._waiting:
             raise TrajectoryError(
                 'an excitation is under way or begins soon; the new excitation is ignored'

@@ -37,13 +37,13 @@ Wait = tuple[str, Callable[[], Any]]
 
 
 def start_program(program: Program) -> subprocess.Popen[bytes]:
-    """Start an armid command in its own process, and return the process."""
+    """Start an armid command in a process of its own; return the process."""
     return subprocess.Popen([sys.executable, '-P', '-m', 'armid_ros.cli', *program])
 
 
 class IdentificationRunNode(ArmidNode):
     """
-    Node that runs a complete identification, from the excitation to the reports, and ends.
+    Node that runs a whole identification, from excitation to reports, and then ends.
 
     The node calls `recorder` and `excitation_publisher` for each run. After all runs it starts
     `armid identify` and `armid diagnose` on the recordings. The last of several runs is held out.
@@ -86,7 +86,7 @@ class IdentificationRunNode(ArmidNode):
 
     def __init__(self, start: Callable[[Program], Any] = start_program, **kwargs: Any) -> None:
         """
-        Make the node; ``start`` starts an armid command, by default in its own process.
+        Create the node; ``start`` starts armid commands, by default in own processes.
 
         Raises
         ------
@@ -125,16 +125,16 @@ class IdentificationRunNode(ArmidNode):
 
     @property
     def finished(self) -> bool:
-        """Whether all steps are done, or a step has failed."""
+        """Whether all steps are done or a step has failed."""
         return self._done
 
     @property
     def failure(self) -> str:
-        """Return the error of the failed step; empty if no step failed."""
+        """Error of the failed step; empty if no step has failed."""
         return self._failure
 
     def poll(self) -> None:
-        """Start the next step as soon as the present step is complete."""
+        """Start the next step once the present one is complete."""
         if self._done:
             return
         try:
@@ -151,14 +151,14 @@ class IdentificationRunNode(ArmidNode):
             self._stop_all()
 
     def condition(self) -> tuple[str, Mapping[str, object]]:
-        """Return the last error, the present step and the results so far."""
+        """Return the last error, the present step, and the results so far."""
         return self._failure or self._refused, {
             'step': self._step,
             'results': '; '.join(self._results),
         }
 
     def close(self) -> None:
-        """Stop the run, the recording and the armid command that this node started."""
+        """Stop the run, the recording and the command that this node has started."""
         self._stop_all()
         for future in self._stops:
             if self.executor is not None:  # the node to stop may have ended already
@@ -171,14 +171,14 @@ class IdentificationRunNode(ArmidNode):
                 self._program.kill()
 
     def _stop_all(self) -> None:
-        """Stop first the run and then the recording that this node started."""
+        """Stop the run, then the recording, if this node has started them."""
         for node in sorted(self._begun):
             if self._callers[node, 'stop'].service_is_ready():
                 self._stops.append(self._call(node, 'stop'))
         self._begun = []
 
     def _steps(self) -> Iterator[Wait]:
-        """Yield each step's name, and a function that returns whether the step is complete."""
+        """Yield for each step its name and a function that returns whether it is complete."""
         deadline = time.monotonic() + self.value('patience')
         yield (
             'waits for the other nodes',
@@ -206,7 +206,7 @@ class IdentificationRunNode(ArmidNode):
             yield from self._run_command('diagnose', folder, bags, *model)
 
     def _run_excitation(self, service: str, name: str = 'rehearsal') -> Iterator[Wait]:
-        """Call a service of excitation_publisher until a run starts, and wait for its end."""
+        """Call a service of excitation_publisher until a run starts; wait for its end."""
         before = int(self._state.get('runs', 0))
         deadline = time.monotonic() + self.value('patience')
         while True:
@@ -242,7 +242,7 @@ class IdentificationRunNode(ArmidNode):
                 raise TrajectoryError(report)
 
     def _call_service(self, node: str, service: str) -> Any:
-        """Call a service of another node, wait for its answer, and return the answer."""
+        """Call a service of another node; wait for its answer and return it."""
         future = self._call(node, service)
         yield self._step, future.done
         answer = future.result()
@@ -253,7 +253,7 @@ class IdentificationRunNode(ArmidNode):
     def _run_command(
         self, command: str, folder: Path, bags: list[str], *more: str
     ) -> Iterator[Wait]:
-        """Run an armid command on the recordings, and wait for its end."""
+        """Run an armid command on the recordings; wait for its end."""
         fitted, held_out = (bags[:-1], bags[-1:]) if len(bags) > 1 else (bags, [])
         validate = [part for bag in held_out for part in ('--validate', bag)]
         options = {name: self.value(name) for name in ('robot', 'gravity')}
@@ -280,7 +280,7 @@ class IdentificationRunNode(ArmidNode):
         self._results.append(f'{command}: {result or "done"} ({out / "report.html"})')
 
     def _missing(self) -> list[str]:
-        """Return the names of the nodes whose services are not available."""
+        """Return the names of nodes whose services are not available."""
         return [
             name
             for node, name in self._full.items()

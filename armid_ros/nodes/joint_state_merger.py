@@ -76,7 +76,7 @@ class JointStateMergerNode(ArmidNode):
     )
 
     def __init__(self, **kwargs: Any) -> None:
-        """Make the node; further arguments are those of rclpy's Node."""
+        """Create the node; other arguments are those of rclpy's Node."""
         super().__init__('joint_state_merger', **kwargs)
         self.joints: tuple[str, ...] = ()
         self._published = 0
@@ -103,7 +103,7 @@ class JointStateMergerNode(ArmidNode):
         self.create_steady_timer(LOOK_PERIOD, self.poll)
 
     def poll(self) -> None:
-        """Subscribe to the topics that have publishers now."""
+        """Subscribe to all topics that have publishers by now."""
         for subscription in self._positions:
             subscription.match()
         topic = self.value('effort_topic')
@@ -123,7 +123,7 @@ class JointStateMergerNode(ArmidNode):
                 )
 
     def condition(self) -> tuple[str, Mapping[str, object]]:
-        """Return the joints without positions or torques, and the number of published messages."""
+        """Return joints without positions or torques, and the number of published messages."""
         values: dict[str, object] = {'published': self._published}
         if not self.joints:
             return 'waiting for robot_description', values
@@ -208,7 +208,7 @@ class JointStateMergerNode(ArmidNode):
     def _merge_torques(
         self, stamp: int, known: Mapping[str, float], called: Sequence[str]
     ) -> None:
-        """Merge torques or currents, whose joints have the names `called`."""
+        """Merge torques or currents of the joints `called`, measured at a time stamp."""
         n = len(self.joints)
         some = [k for k, name in enumerate(called) if math.isfinite(known.get(name, math.nan))]
         if not some:
@@ -220,7 +220,7 @@ class JointStateMergerNode(ArmidNode):
         self._merge(tuple(n + k for k in some), stamp, np.vstack([torques, torques]))
 
     def _merge(self, some: tuple[int, ...], stamp: int, values: FloatArray) -> None:
-        """Merge values of some joints, and publish samples that now have values of all joints."""
+        """Merge values of some joints; publish samples that are complete now."""
         n = len(self.joints)
         # a float has too few digits for seconds since 1970
         self._epoch_ns = self._epoch_ns or stamp
@@ -234,7 +234,7 @@ class JointStateMergerNode(ArmidNode):
             self._published += 1
 
     def _stamp_ns(self, stamp: Any) -> int:
-        """Return the stamp of a message [ns]; the time of reception if the stamp is zero."""
+        """Return a message's time stamp [ns]; if it is zero, the time of reception."""
         return stamp.sec * 10**9 + stamp.nanosec or self.get_clock().now().nanoseconds
 
 

@@ -40,7 +40,7 @@ ROBOT_PARAMETERS = (
 
 class ListeningNode(ArmidNode):
     """
-    Node that processes the joint states of the robot of its parameters or of robot_description.
+    Base class of nodes that process the joint states of one robot.
 
     Attributes
     ----------
@@ -65,7 +65,7 @@ class ListeningNode(ArmidNode):
     joint_states: MatchedSubscription
 
     def __init__(self, name: str, **kwargs: Any) -> None:
-        """Make the node; further arguments are those of rclpy's Node."""
+        """Create the node; other arguments are those of rclpy's Node."""
         super().__init__(name, **kwargs)
         self.robot: Robot | None = None
         self.received = self.last_stamp_ns = 0
@@ -76,14 +76,14 @@ class ListeningNode(ArmidNode):
 
     @abstractmethod
     def take_description(self, urdf: str) -> None:
-        """Process a robot_description that has changed."""
+        """Process a new robot_description."""
 
     @abstractmethod
     def take_sample(self, sample: JointSample) -> None:
-        """Process a joint state with all joints of the robot."""
+        """Process a joint state that contains all joints of the robot."""
 
     def adopt(self, robot: Robot) -> None:
-        """Process the joint states of a robot from now on."""
+        """Process joint states of this robot from now on."""
         self.robot = robot
         self.reader = JointStateReader(robot.joints, self.complaints, self.get_clock())
 
@@ -98,22 +98,22 @@ class ListeningNode(ArmidNode):
 
     @property
     def hardware(self) -> str:
-        """Return the name of the robot, for diagnostics."""
+        """Name of the robot on /diagnostics."""
         return '' if self.robot is None else str(self.robot.name)
 
     @property
     def awaited(self) -> str:
-        """Return a text on the input that the node waits for; empty if all inputs have arrived."""
+        """Return which input the node waits for, as text; empty if none."""
         if self.robot is None:
             return 'waiting for robot_description'
         return '' if self.received else 'no joint states so far'
 
     def level(self, troubled: bool) -> bytes:
-        """Return the diagnostics level STALE if joint states have stopped."""
+        """Return the level on /diagnostics: STALE if joint states have stopped."""
         return DiagnosticStatus.STALE if self.freshness.stopped else super().level(troubled)
 
     def stream_trouble(self) -> str:
-        """Return a text on missing joint states or wrong stamps; empty if there is no problem."""
+        """Return a text on missing joint states or wrong time stamps; empty if none."""
         fresh = self.complaints.latest if self.complaints.fresh else ''
         if self.awaited:
             return self.awaited
@@ -123,7 +123,7 @@ class ListeningNode(ArmidNode):
 
     def report(self, reason: str, text: str = '') -> None:
         """
-        Count and log faulty joint states, with their publishers if these can be the cause.
+        Count and log faulty joint states; name their publishers if these may be the cause.
 
         Parameters
         ----------
@@ -138,14 +138,14 @@ class ListeningNode(ArmidNode):
         self.complaints.add(reason, '; '.join(filter(None, parts)))
 
     def poll(self) -> None:
-        """Match the QoS of publishers of joint states; report when joint states stop or resume."""
+        """Adopt the QoS of joint-state publishers; report when joint states stop or resume."""
         self.joint_states.match()
         if self.freshness.stopped != self._stopped:
             self._stopped = self.freshness.stopped
             self.publish_diagnostics()
 
     def take_joint_states(self, data: bytes) -> None:
-        """Decode a serialised joint state, and process it if it is valid."""
+        """Decode a serialised joint state; process it if it is valid."""
         self.received += 1
         self.freshness.mark_received()
         self.last_stamp_ns = header_stamp(data)
@@ -156,7 +156,7 @@ class ListeningNode(ArmidNode):
                 self.take_sample(sample)
 
     def described_robot(self, description: str | None) -> Robot:
-        """Return the robot of a URDF text, or of the parameter robot if the text is None."""
+        """Return the robot of a URDF text, or of the parameter `robot` if there is no text."""
         given = {'gravity': self.value('gravity'), 'joints': self.value('joints') or None}
         if description is None:
             return load_robot(self.value('robot'), **given)

@@ -64,7 +64,7 @@ LIVE_SETTINGS = (
 
 class LiveDiagnosisNode(ListeningNode):
     """
-    Node that diagnoses an arm while it moves, and proposes a patched model.
+    Node that diagnoses an arm while it moves, and proposes a corrected model.
 
     After enough new motion, a separate process diagnoses the arm, and the result is published on
     ~/diagnosis. If several diagnoses in a row agree, the patched model is published on ~/model,
@@ -109,7 +109,7 @@ class LiveDiagnosisNode(ListeningNode):
         self, live: LiveDiagnosis | None = None, helper: Assistant | None = None, **kwargs: Any
     ) -> None:
         """
-        Make the node, and publish the present model.
+        Create the node, and publish the present model.
 
         Parameters
         ----------
@@ -139,15 +139,15 @@ class LiveDiagnosisNode(ListeningNode):
 
     @property
     def busy(self) -> bool:
-        """Whether a diagnosis, a file or a motion is being computed."""
+        """Whether a diagnosis, result files or a motion are being computed."""
         return self._helper.busy
 
     def accept(self) -> str:
-        """Use the proposed model in later diagnoses."""
+        """Accept the proposed model for later diagnoses; return the answer of the service."""
         return self._decide('accepted', self._require().accept)
 
     def reject(self) -> str:
-        """Discard the proposed effects, and never propose them again."""
+        """Discard the proposed effects for ever; return the answer of the service."""
         return self._decide('rejected', self._require().reject)
 
     def _decide(self, decision: str, action: Callable[[], None]) -> str:
@@ -160,13 +160,13 @@ class LiveDiagnosisNode(ListeningNode):
         return self.log(f'{decision}: {named}')
 
     def reset(self) -> str:
-        """Restart the diagnosis with the original model."""
+        """Restart the diagnosis with the original model; return the answer of the service."""
         self._require().reset()
         self._publish_model()
         return 'the diagnosis begins anew, with the original model'
 
     def save(self) -> str:
-        """Start to write the files of the last diagnosis; a later log entry reports the end."""
+        """Start writing the files of the last diagnosis; the log reports when it is done."""
         self._require(diagnosed=True)
         folder = self.folder('save_to')
         refuse_replacing(folder, FILES)
@@ -174,18 +174,18 @@ class LiveDiagnosisNode(ListeningNode):
         return f'writing {", ".join(FILES)} to {folder}'
 
     def next_run(self) -> str:
-        """Start to plan a motion that separates the candidates, to be sent to ~/experiment."""
+        """Start planning a motion that separates the candidates, for the topic ~/experiment."""
         self._require(diagnosed=True)
         self._helper.ask('plan', self.value('seed'))
         return f'planning a motion; it will be published on {self._runs.topic_name}'
 
     def poll(self) -> None:
-        """Match the QoS of joint-state publishers; process results of the diagnosis process."""
+        """Adopt the QoS of joint-state publishers; process results of the diagnosis process."""
         super().poll()
         self.take_answer()
 
     def take_sample(self, sample: JointSample) -> None:
-        """Add a joint state to the window, and start a diagnosis after enough new motion."""
+        """Add a joint state to the window; start a diagnosis after enough new motion."""
         live = self._require()
         learning = live.learning
         late, self._last = self._last - sample.t, sample.t
@@ -198,7 +198,7 @@ class LiveDiagnosisNode(ListeningNode):
             self._helper.ask('diagnose', live.request())
 
     def take_answer(self) -> bool:
-        """Process a result of the diagnosis process; return whether there was a result."""
+        """Process one result of the diagnosis process; return whether there was one."""
         result = self._helper.poll()
         if result is None:
             return False
@@ -214,7 +214,7 @@ class LiveDiagnosisNode(ListeningNode):
         return True
 
     def condition(self) -> tuple[str, Mapping[str, object]]:
-        """Return the problem of the diagnosis, and numbers of samples and diagnoses."""
+        """Return the present problem, and numbers of samples and diagnoses."""
         live = self.live
         if live is None:
             return self.awaited, {'received': self.received}
@@ -237,7 +237,7 @@ class LiveDiagnosisNode(ListeningNode):
         return trouble, values
 
     def further_statuses(self) -> Sequence[DiagnosticStatus]:
-        """Return the last diagnosis, with residuals and found effects, for /diagnostics."""
+        """Return the last diagnosis for /diagnostics, with residuals and effects."""
         if self.live is None:
             return ()
         name = f'{self.get_fully_qualified_name()[1:]}: diagnosis'
@@ -278,16 +278,16 @@ class LiveDiagnosisNode(ListeningNode):
         self._helper.close()
 
     def take_description(self, urdf: str) -> None:
-        """Diagnose the robot of robot_description."""
+        """Diagnose the robot of a new robot_description."""
         self._adopt(self._described(urdf))
 
     def _settings(self, values: Mapping[str, Any]) -> LiveSettings:
-        """Return the settings that the ROS parameters define, with some new values."""
+        """Return settings from the ROS parameters, some of which have new values."""
         names = (*(entry.name for entry in LIVE_SETTINGS), 'learning')
         return LiveSettings(**{name: values.get(name, self.value(name)) for name in names})
 
     def _described(self, description: str | None = None) -> LiveDiagnosis:
-        """Return the diagnosis schedule of a URDF text, or of the robot that a parameter names."""
+        """Return a new diagnosis schedule, for a URDF text or for the robot parameter."""
         robot = model = None
         if description is not None or self.value('robot'):
             robot = self.described_robot(description)
@@ -305,7 +305,7 @@ class LiveDiagnosisNode(ListeningNode):
         return LiveDiagnosis(arm, settings, baseline=bags, misfit=misfit, seed=seed)
 
     def _take(self, answer: Answer) -> None:
-        """Publish a diagnosis, and the proposed model if it has changed."""
+        """Publish a diagnosis and, if it has changed, the proposed model."""
         live = self._require()
         latest = live.latest
         changed = live.take(answer)
@@ -356,7 +356,7 @@ class LiveDiagnosisNode(ListeningNode):
         self._publish_model()
 
     def _require(self, *, diagnosed: bool = False) -> LiveDiagnosis:
-        """Return the schedule; raise an error without a robot or, if required, a diagnosis."""
+        """Return the schedule; raise an error if there is no robot or no diagnosis yet."""
         if self.live is None:
             raise IdentificationError('the robot is not known: no robot_description was received')
         if diagnosed and self.live.latest is None:
@@ -365,7 +365,7 @@ class LiveDiagnosisNode(ListeningNode):
 
 
 def _residuals(answer: Answer) -> list[tuple[str, float, float, float]]:
-    """Return each joint with its residuals before and after the patch, and its floor [N m]."""
+    """Return for each joint the residuals before and after correction, and its floor [N m]."""
     gap = answer.gap
     if gap is None:
         return []

@@ -45,7 +45,7 @@ EPOCH_NS = 1_000 * 10**9
 
 class Progress(NamedTuple):
     """
-    Progress of a run in lock step.
+    Progress of a simulated run in lock step.
 
     Attributes
     ----------
@@ -75,7 +75,7 @@ def run_lockstep(
     on_progress: OnProgress | None = None,
 ) -> Progress:
     """
-    Excite and record a simulated arm over ROS topics, and optionally identify it online.
+    Excite and record a simulated arm over ROS topics, with optional online identification.
 
     The nodes are excitation_publisher, simulated_arm, recorder and, with an identifier,
     online_identifier. They communicate on this machine only.
@@ -159,7 +159,7 @@ def run_lockstep(
 
 
 def _stepped(step: Callable[[], int], duration: float, on_progress: OnProgress | None) -> Progress:
-    """Simulate until the end of a run, and report the progress every simulated second."""
+    """Simulate to the end of a run; report the progress every simulated second."""
     begun, due, t = time.monotonic(), 1.0, 0.0
     while t < duration:
         t = (step() - EPOCH_NS) * 1e-9
@@ -171,7 +171,7 @@ def _stepped(step: Callable[[], int], duration: float, on_progress: OnProgress |
 
 
 class Stage(ExitStack):
-    """ROS nodes in one process, with an executor and communication on this machine only."""
+    """ROS nodes in one process with a common executor; they communicate on this machine only."""
 
     def __enter__(self) -> Stage:
         domain = os.environ.get('ROS_DOMAIN_ID')
@@ -182,7 +182,7 @@ class Stage(ExitStack):
         return self
 
     def add(self, make: type[AnyNode], *core: Any, **parameters: Any) -> AnyNode:
-        """Make a node with the given parameters, and add it to the executor."""
+        """Create a node with the given parameters, and add it to the executor."""
         parameters = {'use_sim_time': True, **parameters}
         node = make(
             *core,
@@ -201,7 +201,7 @@ class Stage(ExitStack):
         node.destroy_node()
 
     def spin_until(self, done: Callable[[], object], topic: str) -> None:
-        """Run callbacks until a condition holds; ArmidError after the timeout."""
+        """Run callbacks until a condition is true; ArmidError after a timeout."""
         deadline = time.monotonic() + MESSAGE_TIMEOUT
         while not done():
             if time.monotonic() > deadline:  # after the timeout, done() is checked once more
@@ -213,6 +213,6 @@ class Stage(ExitStack):
 
 
 def matched(learner: OnlineIdentifierNode) -> bool:
-    """Match the QoS of publishers of joint states; return whether there is a publisher."""
+    """Adopt the QoS of joint-state publishers; return whether there is a publisher."""
     learner.joint_states.match()
     return learner.joint_states.publishers > 0

@@ -46,7 +46,7 @@ _FOLDER = 'online_identification'
 
 class OnlineIdentifierNode(ListeningNode):
     """
-    Node that estimates the parameters of an arm from joint_states while the arm moves.
+    Node that estimates an arm's parameters from joint_states while the arm moves.
 
     Attributes
     ----------
@@ -99,7 +99,7 @@ class OnlineIdentifierNode(ListeningNode):
     )
 
     def __init__(self, identifier: OnlineIdentifier | None = None, **kwargs: Any) -> None:
-        """Make the node; by default, its ROS parameters define the identifier."""
+        """Create the node; by default, ROS parameters define the identifier."""
         super().__init__('online_identifier', **kwargs)
         self.identifier: OnlineIdentifier | None = None
         self.update_times: deque[float] = deque(maxlen=2000)
@@ -121,14 +121,14 @@ class OnlineIdentifierNode(ListeningNode):
         self._timer = self.create_timer(period, self.publish_estimate)
 
     def reset(self) -> str:
-        """Delete the estimate, and restart the identification."""
+        """Delete the estimate and restart; return the answer of the service."""
         identifier = self._require()
         identifier.reset()
         self._adopt(identifier)
         return 'the estimate was deleted; the identification restarts'
 
     def save(self) -> str:
-        """Write the estimate, the arm model with the estimate, and the URDF to files."""
+        """Write estimate, arm model and URDF to files; return the answer of the service."""
         identifier = self._require()
         if not identifier.samples:
             raise IdentificationError('no sample was used so far, so no file was written')
@@ -156,7 +156,7 @@ class OnlineIdentifierNode(ListeningNode):
         return f'wrote {", ".join(map(str, paths))}'
 
     def close(self) -> None:
-        """Save the estimate if the parameter save_to is set."""
+        """Save the estimate if the parameter `save_to` is set."""
         if self.value('save_to') and self.identifier is not None and self.identifier.samples:
             try:
                 text = self.save()
@@ -165,7 +165,7 @@ class OnlineIdentifierNode(ListeningNode):
             print(text, file=sys.stderr)  # the logger is closed if a signal ends the node
 
     def publish_estimate(self) -> None:
-        """Publish the estimate if it contains new samples."""
+        """Publish the estimate if it has changed."""
         identifier = self.identifier
         if identifier is None or identifier.samples in (0, self._published):
             return
@@ -173,7 +173,7 @@ class OnlineIdentifierNode(ListeningNode):
         self._publish(self._estimates, identifier.estimate(), self._last_sample)
 
     def condition(self) -> tuple[str, Mapping[str, object]]:
-        """Return the problem of the identification, and numbers of samples and rejected states."""
+        """Return the present problem, and numbers of samples and rejected joint states."""
         identifier = self.identifier
         if identifier is None:
             return self.awaited, {'received': self.received}
@@ -214,7 +214,7 @@ class OnlineIdentifierNode(ListeningNode):
         return trouble, values
 
     def further_statuses(self) -> Sequence[DiagnosticStatus]:
-        """Return the estimate with confidence intervals, and the last change, for /diagnostics."""
+        """Return estimate with intervals, and the last change, for /diagnostics."""
         identifier, prefix = self.identifier, self.get_fully_qualified_name()[1:]
         if identifier is None:
             return ()
@@ -243,7 +243,7 @@ class OnlineIdentifierNode(ListeningNode):
             self.identifier.check(self._settings(values))
 
     def changed(self, names: frozenset[str]) -> None:
-        """Apply new settings and the new publishing rate."""
+        """Apply changed settings and publishing rate."""
         if 'estimate_rate' in names:
             self._timer.timer_period_ns = round(1e9 / self.value('estimate_rate'))
             self._timer.reset()  # otherwise the old period has to pass first
@@ -251,20 +251,20 @@ class OnlineIdentifierNode(ListeningNode):
             self.identifier.use(self._settings({}))
 
     def _settings(self, values: Mapping[str, Any]) -> OnlineSettings:
-        """Return the settings of the identifier with new values of changeable parameters."""
+        """Return the identifier's settings with new values of some parameters."""
         identifier = self._require()
         described = self._online_settings(identifier.arm, values)
         can_change = {name: getattr(described, name) for name in OnlineIdentifier.CHANGEABLE}
         return replace(identifier.settings, **can_change)
 
     def _described(self, description: str | None = None) -> OnlineIdentifier:
-        """Return the identifier for a URDF text, or for the robot that a parameter names."""
+        """Return an identifier for a URDF text, or for the robot parameter."""
         arm = ArmModel.of(self.described_robot(description), effects=self.value('effects'))
         settings = self._online_settings(arm, {})
         return OnlineIdentifier(arm, settings, rng=np.random.default_rng(0))
 
     def _online_settings(self, arm: ArmModel, values: Mapping[str, Any]) -> OnlineSettings:
-        """Return the settings that the ROS parameters define, with some new values."""
+        """Return settings from the ROS parameters, some of which have new values."""
 
         def value(name: str) -> Any:
             return values.get(name, self.value(name))
@@ -282,7 +282,7 @@ class OnlineIdentifierNode(ListeningNode):
         )
 
     def level(self, troubled: bool) -> bytes:
-        """Return the diagnostics level: STALE without joint states, ERROR if they are unusable."""
+        """Return the level on /diagnostics: STALE without joint states, ERROR if unusable."""
         failed = self.identifier is not None and bool(self.identifier.error)
         stopped = self.freshness.stopped
         return DiagnosticStatus.ERROR if failed and not stopped else super().level(troubled)
@@ -292,7 +292,7 @@ class OnlineIdentifierNode(ListeningNode):
         self._begin(self._described(urdf))
 
     def _on_model(self, message: String) -> None:
-        """Restart the identification with the effects of a received model if they are new."""
+        """Restart with the effects of a received model, if they are new."""
         # Effects from the parameters are kept, even if the model lacks them.
         before = self._require()
         arm = read_model(message.data, before.arm.robot, 'model')
@@ -310,7 +310,7 @@ class OnlineIdentifierNode(ListeningNode):
             self._adopt(OnlineIdentifier(arm, before.settings, rng=rng))
 
     def take_sample(self, sample: JointSample) -> None:
-        """Update the estimate with a joint state of all joints."""
+        """Update the estimate with a joint state."""
         identifier = self._require()
         begun = time.thread_time()
         identifier.update(*sample)
@@ -340,7 +340,7 @@ class OnlineIdentifierNode(ListeningNode):
             publisher.publish(message)
 
     def _begin(self, identifier: OnlineIdentifier) -> None:
-        """Use an identifier; models that arrive later do not remove its effects."""
+        """Start an identifier; later models do not remove its effects."""
         self._own_effects = identifier.arm.effects
         self._adopt(identifier)
 
@@ -361,7 +361,7 @@ class OnlineIdentifierNode(ListeningNode):
         )
 
     def _require(self) -> OnlineIdentifier:
-        """Return the identifier; raise an error while the robot is not known."""
+        """Return the identifier; raise an error if the robot is not known yet."""
         if self.identifier is None:
             raise IdentificationError('the robot is not known: no robot_description was received')
         return self.identifier

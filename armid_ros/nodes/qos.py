@@ -28,7 +28,7 @@ SAMPLES = QoSProfile(depth=DEPTH)
 
 def matching(publishers: Sequence[TopicEndpointInfo], depth: int) -> QoSProfile:
     """
-    Return the strictest QoS profile that all publishers of a topic satisfy, as rosbag2 does.
+    Return the strictest QoS profile that all publishers of a topic satisfy.
 
     The profile is reliable if all publishers are reliable, and transient local if all are
     transient local. Otherwise the weaker policy is used, which matches every publisher.
@@ -41,7 +41,7 @@ def matching(publishers: Sequence[TopicEndpointInfo], depth: int) -> QoSProfile:
 
 
 def recorded(publishers: Sequence[TopicEndpointInfo]) -> tuple[Qos, ...]:
-    """Return the QoS profiles of the publishers of a topic, in the format of a bag."""
+    """Return the QoS profiles of a topic's publishers, in the format of a bag."""
     return tuple(
         VOLATILE._replace(
             reliability=QosReliability[publisher.qos_profile.reliability.name],
@@ -52,7 +52,7 @@ def recorded(publishers: Sequence[TopicEndpointInfo]) -> tuple[Qos, ...]:
 
 
 def offered(profiles: Sequence[Qos]) -> QoSProfile:
-    """Return the QoS for the playback of a topic: the weakest of the recorded profiles."""
+    """Return the QoS profile for playback of a topic: the weakest recorded one."""
     best_effort = any(p.reliability is QosReliability.BEST_EFFORT for p in profiles)
     latched = {p.durability for p in profiles} == {QosDurability.TRANSIENT_LOCAL}
     return _profile(DEPTH, not best_effort, latched)
@@ -68,7 +68,7 @@ def _profile(depth: int, reliable: bool, latched: bool) -> QoSProfile:
 
 class MatchedSubscription:
     """
-    Subscription that starts once its topic has publishers, and adopts their quality of service.
+    Subscription that starts once its topic has publishers, with their QoS.
 
     A reliable subscription does not match a best-effort publisher. A best-effort subscription
     loses messages that a reliable publisher would send again. The QoS therefore depends on the
@@ -93,7 +93,7 @@ class MatchedSubscription:
         raw: bool = False,
         depth: int = DEPTH,
     ) -> None:
-        """Subscribe if the topic has publishers; otherwise `match` subscribes later."""
+        """Subscribe if the topic has publishers; otherwise `match` will."""
         self._node = node
         self._message_type = message_type
         self._callback = callback
@@ -106,12 +106,12 @@ class MatchedSubscription:
 
     @property
     def publishers(self) -> int:
-        """Return the number of publishers that the subscription is connected to."""
+        """Number of connected publishers."""
         return int(self.subscription.get_publisher_count()) if self.subscription else 0
 
     @property
     def several(self) -> str:
-        """Return a text on the publishers of the topic; empty for fewer than two publishers."""
+        """Return a text on the publishers of the topic if there are at least two, else ''."""
         found = self._node.get_publishers_info_by_topic(self.topic)
         if len(found) < 2:
             return ''
@@ -119,7 +119,7 @@ class MatchedSubscription:
         return f'{len(found)} nodes publish {self.topic}: {", ".join(sorted(nodes))}; stop one'
 
     def match(self) -> None:
-        """Subscribe if the topic has publishers, and again if their QoS has changed."""
+        """Subscribe if the topic has publishers; subscribe again if their QoS changed."""
         publishers = self._node.get_publishers_info_by_topic(self.topic)
         if not publishers:
             return

@@ -26,7 +26,7 @@ from armid_ros.recording.message_types import header_stamp
 
 class RecorderNode(ArmidNode):
     """
-    Node that records topics, without decoding, into a rosbag2 directory with an MCAP file.
+    Node that records topics, undecoded, as a rosbag2 folder with an MCAP file.
 
     Attributes
     ----------
@@ -65,7 +65,7 @@ class RecorderNode(ArmidNode):
     )
 
     def __init__(self, **kwargs: Any) -> None:
-        """Make the node, and start to record if the parameter `record` is true."""
+        """Create the node; start recording if the parameter `record` is true."""
         super().__init__('recorder', **kwargs)
         self._wanted = self._topics_wanted()
         self._writer: BagWriter | None = None
@@ -92,12 +92,12 @@ class RecorderNode(ArmidNode):
 
     @property
     def missing(self) -> tuple[str, ...]:
-        """Return the full names of the topics to record that have no publisher."""
+        """Full names of the topics to record that have no publisher."""
         heard = {t for t, s in self._subscriptions_by_topic.items() if s.publishers}
         return tuple(sorted(self._wanted - heard))
 
     def start(self) -> str:
-        """Start to record a new bag; RecordingError if a bag is open or cannot be created."""
+        """Start a new bag; RecordingError if one is open or it cannot be created."""
         if self._writer is not None:
             raise RecordingError(f'a recording into {self._writer.path} is already under way')
         name = self.value('bag') or f'armid_{datetime.now():%Y_%m_%d-%H_%M_%S}'
@@ -118,7 +118,7 @@ class RecorderNode(ArmidNode):
         return self.log(f'recording into {self._writer.path}')
 
     def stop(self) -> str:
-        """Close the bag, and return its path and number of messages."""
+        """Close the bag; return a text with its path and number of messages."""
         if self._writer is None:
             raise RecordingError('no recording is under way')
         for subscription in self._subscriptions_by_topic.values():
@@ -134,7 +134,7 @@ class RecorderNode(ArmidNode):
         return self.log(f'{writer.path}: {self.message_count} messages')
 
     def poll(self) -> None:
-        """Subscribe to topics with new publishers, with the QoS of these publishers."""
+        """Subscribe to topics that have publishers by now, with their QoS."""
         if self._writer is None:
             return
         for topic in list(self._subscriptions_by_topic):
@@ -148,7 +148,7 @@ class RecorderNode(ArmidNode):
 
     def watch(self) -> None:
         """
-        Check that the bag still exists and that the disk has free space.
+        Check that the bag still exists and that the disk is not full.
 
         Raises
         ------
@@ -174,7 +174,7 @@ class RecorderNode(ArmidNode):
             self.complaints.add('disk', text)
 
     def changed(self, names: frozenset[str]) -> None:
-        """Apply new topics, a new bag name and a new chunk age."""
+        """Apply changed parameters: topics, bag name and chunk age."""
         if 'topics' in names:
             self._wanted = self._topics_wanted()
             self.poll()
@@ -184,7 +184,7 @@ class RecorderNode(ArmidNode):
             self._writer.chunk_age = self.value('chunk_age')
 
     def condition(self) -> tuple[str, Mapping[str, object]]:
-        """Return the topics that are not recorded, the path of the bag and the message count."""
+        """Return topics that are not recorded, path of the bag, and message count."""
         refused = sorted(filter(self._is_wanted, self._refused))
         absent = sorted(set(self.missing) - set(refused))
         trouble = '; '.join(
@@ -201,7 +201,7 @@ class RecorderNode(ArmidNode):
         return (trouble if self.recording else ''), values
 
     def close(self) -> None:
-        """Close the bag that is being recorded."""
+        """Close the bag that is open."""
         if self._writer is not None:
             self.stop()
 
@@ -209,7 +209,7 @@ class RecorderNode(ArmidNode):
         return {self.resolve_topic_name(name) for name in self.value('topics')}
 
     def _is_wanted(self, topic: str) -> bool:
-        """Return whether to record a topic; hidden topics only if a parameter names them."""
+        """Return whether a topic is recorded; hidden topics only if a parameter names them."""
         return topic in self._wanted if self._wanted else '/_' not in topic
 
     def _record(self, writer: BagWriter, topic: str, types: Sequence[str]) -> None:
@@ -273,7 +273,7 @@ class RecorderNode(ArmidNode):
                 self._abort(str(error))
 
     def _abort(self, reason: str) -> NoReturn:
-        """Close the bag, and raise an error with the reason and the number of kept messages."""
+        """Close the bag; raise an error with the reason and the number of saved messages."""
         writer, self._writer = self._writer, None
         assert writer is not None
         index_error = ''

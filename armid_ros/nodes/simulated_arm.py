@@ -49,13 +49,13 @@ MAX_DURATION = 3600.0
 
 
 def _measurement_publisher(node: Node, kind: type, topic: str) -> Publisher:
-    """Return a publisher of measurements, whose quality of service users can override."""
+    """Create a publisher of measurements; users can override its QoS."""
     options = QoSOverridingOptions.with_default_policies()
     return node.create_publisher(kind, topic.lstrip('/'), SAMPLES, qos_overriding_options=options)
 
 
 class _ElasticTopics:
-    """Publishers of an elastic arm: positions of links, references of drives, accelerometers."""
+    """Publishers for an elastic arm: link positions, drive references, accelerometers."""
 
     def __init__(self, node: Node, arm: SimulatedArm) -> None:
         self._link = (
@@ -74,7 +74,7 @@ class _ElasticTopics:
             self._imus.append((_measurement_publisher(node, Imu, imu_topic(link)), message))
 
     def publish(self, sample: LinkSample, stamp: TimeMessage) -> None:
-        """Publish the measurements of all links and drives with the same stamp."""
+        """Publish measurements of all links and drives with one time stamp."""
         for (publisher, message), q, dq in (
             (self._link, sample.q, sample.dq),
             (self._reference, sample.asked_q, sample.asked_dq),
@@ -94,7 +94,7 @@ class _ElasticTopics:
 
 class SimulatedArmNode(ArmidNode):
     """
-    Node that simulates an arm, which follows trajectories and publishes joint states.
+    Node that simulates an arm: it follows trajectories and publishes joint states.
 
     In real time the stamps are those of the system clock. At another real_time_factor the node
     also publishes /clock. With use_sim_time the simulation follows /clock. A model on the topic
@@ -131,7 +131,7 @@ class SimulatedArmNode(ArmidNode):
         **kwargs: Any,
     ) -> None:
         """
-        Make the node, and publish the robot_description.
+        Create the node, and publish the robot_description.
 
         Parameters
         ----------
@@ -170,7 +170,7 @@ class SimulatedArmNode(ArmidNode):
         self.offer('~/reset', self.reset)
 
     def _described(self) -> SimulatedArm:
-        """Return the simulated arm that the ROS parameters define."""
+        """Return the simulated arm that the ROS parameters describe."""
         gravity, drives = self.value('gravity'), None
         if self.value('model'):
             arm = load_model(self.value('model'))
@@ -195,11 +195,11 @@ class SimulatedArmNode(ArmidNode):
         )
 
     def _steps_at(self, rate: float) -> int:
-        """Return the number of integration steps between two joint states at a rate [Hz]."""
+        """Return the number of simulation steps per joint state, for a rate [Hz]."""
         return whole_steps(1.0 / rate, self._arm.plant.dt, f'a rate of {rate:g} Hz')
 
     def _set_rates(self) -> None:
-        """Set the rates of joint_states, /clock and the simulation from the parameters."""
+        """Set the rates of joint states, /clock and simulation from the parameters."""
         rate = self.value('rate')
         self._stride = self._steps_at(rate)
         self._factor = 0.0 if self._follows else self.value('real_time_factor')
@@ -218,31 +218,31 @@ class SimulatedArmNode(ArmidNode):
 
     @property
     def stamp_ns(self) -> int:
-        """Return the stamp of the present state of the arm [ns]."""
+        """Time stamp of the arm's present state [ns]."""
         return (self._origin_ns or 0) + self._arm.steps * self._dt_ns
 
     @property
     def joint_state(self) -> JointState:
-        """Return the last published joint state message."""
+        """Joint state message that was published last."""
         return self._message
 
     @property
     def moving(self) -> bool:
-        """Whether the arm follows a trajectory, or will do so soon."""
+        """Whether the arm follows a trajectory, or is about to."""
         return self._pending is not None or self._arm.t < self._arm.ends_at
 
     @property
     def readers(self) -> int:
-        """Return the number of subscribers to joint_states."""
+        """Number of subscribers to joint_states."""
         return int(self._states.get_subscription_count())
 
     @property
     def hardware(self) -> str:
-        """Return the name of the robot, for diagnostics."""
+        """Name of the robot on /diagnostics."""
         return str(self._arm.plant.robot.name)
 
     def step(self) -> int:
-        """Simulate until the next joint state, publish it, and return its stamp [ns]."""
+        """Simulate to the next joint state and publish it; return its time stamp [ns]."""
         if self._pending is not None and self._pending[0] <= self.stamp_ns:
             (start_ns, reference), self._pending = self._pending, None
             reference = reference.remaining((self.stamp_ns - start_ns) * 1e-9)
@@ -268,13 +268,13 @@ class SimulatedArmNode(ArmidNode):
         return stamp_ns
 
     def publish_clock(self) -> None:
-        """Publish the simulated time on /clock, unless the node follows /clock."""
+        """Publish simulated time on /clock, unless another node does."""
         if self._clock_publisher is not None:
             stamp = Time(nanoseconds=self.stamp_ns).to_msg()
             self._clock_publisher.publish(ClockMessage(clock=stamp))
 
     def follow(self) -> None:
-        """Simulate until the present time of /clock, which this node follows."""
+        """Simulate to the present time of /clock, which another node publishes."""
         now = self.get_clock().now().nanoseconds
         # after a larger step, the clock was set, and the simulation does not catch up
         if self._origin_ns is None or not 0 <= now - self.stamp_ns <= 60 * 10**9:
@@ -283,7 +283,7 @@ class SimulatedArmNode(ArmidNode):
             self.step()
 
     def catch_up(self) -> None:
-        """Simulate in step with real time; skip time that the computer cannot catch up."""
+        """Simulate to the present real time; skip time if the computer is too slow."""
         self._skipped += self.real_time.catch_up(self._factor, self._stride * self._arm.plant.dt)
         # set the stamps to the system clock again, but not during a trajectory
         if self._skipped and self._clock_publisher is None and not self.moving:
@@ -291,13 +291,13 @@ class SimulatedArmNode(ArmidNode):
             self._skipped = 0.0
 
     def reset(self) -> str:
-        """Set the arm to its initial position; the simulated time continues."""
+        """Move the arm to its initial position; simulated time goes on."""
         self._arm.reset(self._arm.steps)
         self._pending = None
         return f'{self.hardware} is at its initial position'
 
     def condition(self) -> tuple[str, Mapping[str, object]]:
-        """Return the problem of the simulation, the simulated time and the skipped time."""
+        """Return the present problem, the simulated time and the skipped time."""
         trouble = ''
         if self._clock_publisher is None:  # with /clock, other nodes follow the simulated time
             trouble = self.real_time.trouble(
@@ -311,7 +311,7 @@ class SimulatedArmNode(ArmidNode):
         }
 
     def check(self, values: Mapping[str, Any]) -> None:
-        """Raise an ArmidError if new effects, noise or rates are not possible for the arm."""
+        """Raise an ArmidError if the arm cannot have new effects, noise or rates."""
         with reading(f'parameter {", ".join(map(repr, values))}', ArmidError):
             sensors_of(lambda name: values.get(name, self.value(name)), self._arm.joints)
             self._steps_at(values.get('rate', self.value('rate')))
@@ -319,7 +319,7 @@ class SimulatedArmNode(ArmidNode):
                 self._arm.successor(self._with_effects(values['effects']))
 
     def changed(self, names: frozenset[str]) -> None:
-        """Apply new effects, rates and sensors to the moving arm."""
+        """Apply changed effects, rates and sensors while the arm moves."""
         if 'effects' in names:
             self._replace_model(self._with_effects(self.value('effects')))
         if names & {'rate', 'real_time_factor', 'clock_rate'}:
@@ -330,7 +330,7 @@ class SimulatedArmNode(ArmidNode):
         self._arm.sensors = replace(self._arm.sensors, **known)
 
     def _with_effects(self, texts: Sequence[str]) -> ArmModel:
-        """Return the arm model that the ROS parameters define, with other effects."""
+        """Return the arm model that the ROS parameters describe, with other effects."""
         if self._without_effects is None:
             raise ModelError(
                 "the parameter 'effects' cannot change an arm that was given to the node in Python"

@@ -63,7 +63,7 @@ class _Goal:
 
 class TrajectoryController:
     """
-    Sender of trajectories to one controller, as goals of an action or as messages on a topic.
+    Client that sends trajectories to one controller, as action goals or messages.
 
     All trajectories of a run use the same interface.
 
@@ -83,7 +83,7 @@ class TrajectoryController:
 
     def __init__(self, node: Any, on_end: Callable[[str], None]) -> None:
         """
-        Make the publisher and the action client.
+        Create publisher and action client.
 
         Parameters
         ----------
@@ -121,12 +121,12 @@ class TrajectoryController:
 
     @property
     def readers(self) -> int:
-        """Return the number of subscribers to the topic joint_trajectory."""
+        """Number of subscribers to the topic joint_trajectory."""
         return int(self._publisher.get_subscription_count())
 
     @property
     def missing(self) -> str:
-        """Return why no controller can receive a trajectory; empty if a controller can."""
+        """Return why no controller can receive a trajectory; empty if one can."""
         if self._ready:
             return ''
         if self._kind == 'action':
@@ -135,22 +135,22 @@ class TrajectoryController:
 
     @property
     def under_way(self) -> bool:
-        """Whether the controller has not yet ended a goal of this node."""
+        """Whether the controller still executes a goal of this node."""
         return self._by_action and self._goal is not None
 
     @property
     def error(self) -> float:
-        """Return the largest joint error that the controller reported [rad or m], or NaN."""
+        """Largest joint error that the controller reported [rad or m], or NaN."""
         return self._error if self.under_way else math.nan
 
     def poll(self) -> None:
-        """Make an action client as soon as a controller offers the action."""
+        """Create the action client once a controller offers the action."""
         if self._possible and self.client is None and self._offered:
             self._make_client()
 
     def discover(self) -> None:
         """
-        Wait at most a second until a controller that offers the action accepts goals.
+        Wait for a controller that accepts goals, at most one second.
 
         Raises
         ------
@@ -167,7 +167,7 @@ class TrajectoryController:
             raise TrajectoryError(f'the arm is not started: {self.missing}')
 
     def begin(self, trajectory: JointTrajectory) -> str:
-        """Send the trajectory of a run after `discover`, and return the name of its receiver."""
+        """Send the trajectory of a run; return the name of the receiver."""
         self._by_action = self._ready
         if self._by_action:
             names = ('tracking_tolerance', 'goal_tolerance', 'goal_time_tolerance')
@@ -177,20 +177,20 @@ class TrajectoryController:
         return f'{self.readers} subscribers'
 
     def send_stop(self, trajectory: JointTrajectory) -> None:
-        """Send a stop trajectory as a goal or as a message, like the trajectory of the run."""
+        """Send a stop trajectory in the way in which the run was sent: as goal or message."""
         if self._by_action:
             self._send_goal(trajectory, NO_TOLERANCE, NO_TOLERANCE)
         else:
             self._publisher.publish(trajectory)
 
     def send_stop_again(self, trajectory: JointTrajectory) -> None:
-        """Send a stop trajectory as a message and, if the run is a goal, also as a goal."""
+        """Send a stop trajectory as message and, if the run is a goal, as goal too."""
         self.send_stop(trajectory)
         if self._by_action:
             self._publisher.publish(trajectory)
 
     def trouble(self, patience: float) -> str:
-        """Return a text if the controller is gone or silent for `patience` [s]; else empty."""
+        """Return a text if the controller is gone or has been silent for `patience` [s]."""
         goal, now = self._goal, time.monotonic()
         if goal is None or not self._by_action:
             return ''
@@ -203,7 +203,7 @@ class TrajectoryController:
         return ''
 
     def settle(self, patience: float) -> None:
-        """Wait at most `patience` [s] until sent messages have arrived and calls are answered."""
+        """Wait until messages have arrived and calls are answered, at most `patience` [s]."""
         if not self._by_action:
             self._publisher.wait_for_all_acked(Duration(seconds=patience))
             return
@@ -234,7 +234,7 @@ class TrajectoryController:
         return self.client is not None and bool(self.client.server_is_ready())
 
     def _make_client(self) -> None:
-        """Make the action client if control_msgs is installed; no goal is sent."""
+        """Create the action client if control_msgs is installed."""
         try:
             from control_msgs.action import FollowJointTrajectory
             from control_msgs.msg import JointTolerance
@@ -251,7 +251,7 @@ class TrajectoryController:
         self, trajectory: JointTrajectory, path: float, end: float, late: float = 0.0
     ) -> None:
         """
-        Send a goal that replaces the present goal.
+        Send a goal that replaces the present one.
 
         Controllers of ros2_control replace the old goal. It is also cancelled, because other
         controllers do not replace it.
@@ -288,7 +288,7 @@ class TrajectoryController:
             self._cancel(before)
 
     def _cancel(self, goal: _Goal) -> None:
-        """Cancel a goal at once, or as soon as the controller accepts it."""
+        """Cancel a goal now, or once the controller accepts it."""
         goal.unwanted = True
         if goal.handle is not None:
             self._await(goal.handle.cancel_goal_async(), lambda _: None)
@@ -317,7 +317,7 @@ class TrajectoryController:
             self._end(goal, f'{self.action} gave up the trajectory: {why}{detail}')
 
     def _on_status(self, message: GoalStatusArray) -> None:
-        """End the present goal if the controller has accepted a later goal of another client."""
+        """End the present goal if the controller has accepted another client's later goal."""
         active = (GoalStatus.STATUS_ACCEPTED, GoalStatus.STATUS_EXECUTING)
         goals = {
             bytes(s.goal_info.goal_id.uuid) for s in message.status_list if s.status in active
@@ -331,7 +331,7 @@ class TrajectoryController:
             self._end(goal, self._replacement_message())
 
     def _replacement_message(self) -> str:
-        """Return a text with the clients that may have replaced the goal."""
+        """Return a text that names the clients that may have replaced the goal."""
         node, service = self._node, f'{self.action}/_action/send_goal'
         found = []
         for name, space in node.get_node_names_and_namespaces():
@@ -362,6 +362,6 @@ class TrajectoryController:
         future.add_done_callback(self._guarded(done))
 
     def _guarded(self, callback: Callable[[Any], None]) -> Callable[[Any], None]:
-        """Return a callback whose exceptions stop the arm and are logged."""
+        """Wrap a callback so that exceptions stop the arm and are logged."""
         guarded: Callable[[Any], None] = self._node.guarded(callback, self.action)
         return guarded

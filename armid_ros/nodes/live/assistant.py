@@ -37,14 +37,14 @@ Result = Answer | tuple[str, str] | IdentificationError
 
 
 class Worker:
-    """Executor of the tasks of the diagnosis process; it keeps the last diagnosis."""
+    """Executor of tasks in the diagnosis process; it stores the last diagnosis."""
 
     def __init__(self) -> None:
         self._last: tuple[DiagnosisRequest, Diagnosis] | None = None
 
     def run(self, task: str, argument: Any) -> Result:
         """
-        Compute a diagnosis, save the last diagnosis, or plan a motion to separate its candidates.
+        Run one task: diagnose, save the last diagnosis, or plan a motion for its candidates.
 
         Errors of the data or the disk are returned, not raised. `argument` is that of
         `Assistant.ask`.
@@ -91,12 +91,12 @@ class Assistant:
 
     @property
     def busy(self) -> bool:
-        """Whether the process has a task that is not complete."""
+        """Whether the process has not completed all tasks."""
         return self._pending > 0
 
     def ask(self, task: str, argument: Any) -> None:
         """
-        Send a task to the process, which runs it after the pending tasks.
+        Send a task to the process, which runs tasks in order.
 
         A new process is started if the last process has ended. A diagnosis request is larger than
         the buffer of the socket; send it only without pending tasks, as it would wait for them.
@@ -126,7 +126,7 @@ class Assistant:
         self._pending += 1
 
     def poll(self) -> Result | None:
-        """Return the next result of the process; None if no result has arrived."""
+        """Return the next result of the process; None if there is none yet."""
         if self._pipe.closed or not self._pipe.poll():
             return None
         self._pending -= 1
@@ -140,7 +140,7 @@ class Assistant:
         return result
 
     def close(self) -> None:
-        """End the process at once."""
+        """End the process immediately."""
         self._process.kill()
         self._process.wait()
         self._pipe.close()
@@ -164,7 +164,7 @@ class Assistant:
 
 
 def main(fd: int) -> None:
-    """Run the tasks that arrive on a socket until its other end is closed."""
+    """Run the tasks that arrive on a socket, until its other end closes."""
     os.nice(10)  # lower priority than the nodes
     worker = Worker()
     with suppress(EOFError, OSError), Connection(fd) as pipe:

@@ -56,7 +56,7 @@ class LiveSettings:
     material: float = 0.01
 
     def __post_init__(self) -> None:
-        """Raise an IdentificationError if the window is shorter than the motion to diagnose."""
+        """Raise an IdentificationError if the window is shorter than a diagnosed motion."""
         if not 0.0 < self.shortest <= self.window:
             raise IdentificationError(
                 f'window, {self.window:g} s, is shorter than the shortest diagnosed motion: '
@@ -67,7 +67,7 @@ class LiveSettings:
 @dataclass(frozen=True)
 class DiagnosisRequest:
     """
-    Latest samples of an arm, with all inputs of their diagnosis.
+    Latest samples of an arm, and everything else that their diagnosis needs.
 
     Attributes
     ----------
@@ -146,7 +146,7 @@ class Answer:
 
     @property
     def named(self) -> tuple[Named, ...]:
-        """Return the names and joints of the found effects, the largest effect first."""
+        """Names and joints of the effects found, the largest effect first."""
         return tuple((finding.name, finding.joints) for finding in self.findings)
 
 

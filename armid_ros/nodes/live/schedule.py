@@ -24,7 +24,7 @@ NAMING_VERDICTS = ('named', 'ambiguous', 'partial')
 
 class LiveDiagnosis:
     """
-    Schedule of the diagnoses of a moving arm, with the model that they propose.
+    Schedule of repeated diagnoses of a moving arm, with the model that they propose.
 
     Parameters
     ----------
@@ -76,7 +76,7 @@ class LiveDiagnosis:
         self.reset()
 
     def reset(self) -> None:
-        """Restart the diagnoses with the original model."""
+        """Start the diagnoses again, with the original model."""
         arm, self._baseline, self._misfit = self._given
         self.accepted = arm
         self._rejected: set[Named] = set()
@@ -90,7 +90,7 @@ class LiveDiagnosis:
         self.learning = not known and self.settings.learning > 0.0
 
     def use(self, settings: LiveSettings) -> None:
-        """Change the settings, and clear the window of samples."""
+        """Change the settings; the window of samples is cleared."""
         self.settings = settings
         joints, period = self.accepted.robot.joints, 1.0 / settings.rate
         self.window = SampleWindow(joints, max(settings.window, settings.learning), period)
@@ -100,17 +100,17 @@ class LiveDiagnosis:
 
     @property
     def model(self) -> ArmModel:
-        """Return the proposed model; the accepted model if nothing is proposed."""
+        """Proposed model; the accepted model if nothing is proposed."""
         return self.accepted if self.proposed is None else self.proposed
 
     @property
     def confirmed(self) -> bool:
-        """Whether enough diagnoses in a row agree on an effect."""
+        """Whether enough successive diagnoses agree on an effect."""
         return bool(self._agreed) and len(self._agreed) >= self.settings.confirmations
 
     @property
     def due(self) -> bool:
-        """Whether the arm has moved long enough since the last request for a diagnosis."""
+        """Whether the arm has moved long enough for the next diagnosis."""
         if self.learning or not self._contains(self.settings.shortest):
             return False
         return self.window.moved - self._asked_at >= self._next
@@ -118,7 +118,7 @@ class LiveDiagnosis:
     def add(
         self, t: float, q: npt.ArrayLike, dq: npt.ArrayLike | None, tau: npt.ArrayLike
     ) -> None:
-        """Add a sample of the arm; the arguments are those of `SampleWindow.add`."""
+        """Add a sample of the arm to the window; see `SampleWindow.add`."""
         held = len(self.window)
         kept = self.window.add(t, q, dq, tau)
         if kept and held and len(self.window) == 1:
@@ -134,11 +134,11 @@ class LiveDiagnosis:
             self._asked_at = self.window.moved
 
     def _contains(self, seconds: float) -> bool:
-        """Return whether the window contains motion of at least a given duration [s]."""
+        """Return whether the arm moves for at least `seconds` in the window."""
         return self.window.moved >= seconds <= self.window.end - self.window.begin
 
     def request(self) -> DiagnosisRequest:
-        """Return the request for a diagnosis of the present window."""
+        """Return the request to diagnose the present window."""
         self._asked_at, self._next = self.window.moved, self.settings.every
         self.asked += 1
         self._under_way, self._outdated = True, False
@@ -157,7 +157,7 @@ class LiveDiagnosis:
 
     def take(self, answer: Answer) -> bool:
         """
-        Process a diagnosis; an outdated diagnosis is ignored.
+        Process a diagnosis, unless it is outdated.
 
         Returns
         -------
@@ -195,7 +195,7 @@ class LiveDiagnosis:
 
     def accept(self) -> None:
         """
-        Use the proposed model in later diagnoses; the last diagnosed window replaces the baseline.
+        Accept the proposed model; the last diagnosed window becomes the baseline.
 
         Raises
         ------
@@ -212,7 +212,7 @@ class LiveDiagnosis:
 
     def reject(self) -> None:
         """
-        Discard the proposed effects, and never propose them again.
+        Discard the proposed effects, which are then never proposed again.
 
         Raises
         ------
@@ -226,7 +226,7 @@ class LiveDiagnosis:
         self._clear_proposal()
 
     def _clear_proposal(self) -> None:
-        """Clear the proposal and the count of agreeing diagnoses."""
+        """Clear the proposal, and the count of diagnoses that agree."""
         self._propose(None)
         self._agreed = []
         self._outdated = self._under_way

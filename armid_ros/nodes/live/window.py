@@ -18,7 +18,7 @@ _MIN_SPACING = 0.75
 
 class SampleWindow:
     """
-    Latest samples of an arm at a constant rate, without gaps.
+    Latest samples of an arm, at constant rate and without gaps.
 
     Further samples are skipped, so that a period of 5 ms gives 200 samples per second at any input
     rate. Late and repeated samples are skipped too. The window is cleared after a gap or a jump
@@ -50,23 +50,23 @@ class SampleWindow:
         self._efforts = np.full((2, len(joints)), np.nan)
 
     def __len__(self) -> int:
-        """Return the number of kept samples."""
+        """Return the number of samples."""
         return len(self._rows)
 
     @property
     def begin(self) -> float:
-        """Return the time of the oldest sample [s]; infinite for an empty window."""
+        """Time of the oldest sample [s]; infinite if the window is empty."""
         return float(self._rows[0][0]) if self._rows else np.inf
 
     @property
     def end(self) -> float:
-        """Return the time of the newest sample [s]; minus infinity for an empty window."""
+        """Time of the newest sample [s]; minus infinity if the window is empty."""
         return float(self._rows[-1][0]) if self._rows else -np.inf
 
     @property
     def frozen(self) -> bool:
         """
-        Whether positions are no longer measured: they stay equal while efforts vary.
+        Whether positions are stuck: they are constant while efforts vary.
 
         The efforts of an arm at rest are constant except for noise. If no position changes while
         an effort varies over half of its range in motion, the positions are not measured.
@@ -87,7 +87,7 @@ class SampleWindow:
         self, t: float, q: npt.ArrayLike, dq: npt.ArrayLike | None, tau: npt.ArrayLike
     ) -> bool:
         """
-        Add a sample of the arm, unless it follows the last kept sample too early.
+        Add a sample of the arm, unless it follows the last one too early.
 
         Parameters
         ----------

@@ -13,7 +13,7 @@ from rclpy.type_support import check_for_type_support
 
 def message_class(type_name: str) -> type[Any]:
     """
-    Return the Python class of a ROS message type.
+    Return the Python class of a ROS message type, by its name.
 
     Raises
     ------

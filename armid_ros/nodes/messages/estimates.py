@@ -11,7 +11,7 @@ from armid_ros.estimate import Estimate
 def estimate_message(
     estimate: Estimate, samples: int, condition_number: float = 0.0
 ) -> ParameterEstimate:
-    """Convert an estimate to a ParameterEstimate message without a stamp."""
+    """Convert an estimate to a ParameterEstimate message; the stamp is not set."""
     return ParameterEstimate(
         name=[p.name for p in estimate.parameters],
         joint=[p.joint for p in estimate.parameters],
@@ -24,7 +24,7 @@ def estimate_message(
 
 
 def estimate_values(estimate: Estimate) -> dict[str, float]:
-    """Return estimated parameters and the ends of their 95 % intervals, for /diagnostics."""
+    """Return parameters and the ends of their 95 % intervals by name, for /diagnostics."""
     found: dict[str, float] = {}
     for parameter, value, (lower, upper) in zip(
         estimate.parameters, estimate.values, estimate.interval(), strict=True

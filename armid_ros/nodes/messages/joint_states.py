@@ -43,7 +43,7 @@ SENDER_CONFLICTS = frozenset(
 
 class JointSample(NamedTuple):
     """
-    Positions, velocities and torques of one joint state, in the joint order of the robot.
+    Positions, velocities and torques of a joint state, in the robot's joint order.
 
     Attributes
     ----------
@@ -64,7 +64,7 @@ class JointSample(NamedTuple):
 
 class JointStateReader:
     """
-    Decoder of JointState messages for one robot, which counts and logs unusable messages.
+    Decoder of the JointState messages of one robot; it counts and logs unusable ones.
 
     Parameters
     ----------
@@ -87,7 +87,7 @@ class JointStateReader:
         self._epoch: int | None = None
 
     def read(self, data: bytes) -> JointSample | None:
-        """Decode a serialised message; None if it is unusable or lacks joints of the robot."""
+        """Decode a serialised message; None if it is unusable or lacks a joint."""
         try:
             message = self._messages.read(data)
             if message.names is not self._names and message.names != self._names:
@@ -106,7 +106,7 @@ class JointStateReader:
         return JointSample(stamp, q, dq, tau)
 
     def _find_joints(self, names: Sequence[str]) -> None:
-        """Find the index of each joint of the robot in the joint names of a message."""
+        """Store the index of each robot joint among the joint names of a message."""
         self._names = None
         try:
             self._order = joint_places(self._joints, names)
@@ -118,7 +118,7 @@ class JointStateReader:
         self._names = names
 
     def stamp(self, t: float) -> Time:
-        """Convert the time of a sample of this reader [s] to a ROS stamp."""
+        """Convert the time of a decoded sample [s] to a ROS time stamp."""
         return Time(nanoseconds=(self._epoch or 0) * 10**9 + round(t * 1e9))
 
     def _time(self, sec: int, nanosec: int) -> float:
@@ -145,7 +145,7 @@ class JointStateReader:
         return field[self._order]
 
     def _values(self, names: Sequence[str], field: FloatArray, name: str) -> FloatArray:
-        """Return the values of a field in joint order; RecordingError if any is not a number."""
+        """Return a field's values in joint order; RecordingError if one is not a number."""
         values = self._ordered(names, field, name)
         # a sum is faster than isfinite; skipped joints may be NaN
         if not math.isfinite(sum(values.tolist())) and not np.all(np.isfinite(values)):

@@ -12,7 +12,7 @@ from rclpy.clock import ROSClock
 
 class Freshness:
     """
-    Time since the last message of a topic, measured independently of /clock.
+    Age of the last message of a topic in real time, whatever /clock says.
 
     Parameters
     ----------
@@ -27,27 +27,27 @@ class Freshness:
         self._received: float | None = None
 
     def mark_received(self) -> None:
-        """Register that a message has arrived."""
+        """Note that a message has arrived now."""
         self._received = self.now()
 
     @property
     def silence(self) -> float:
-        """Return the time since the last message [s]; 0 before the first message."""
+        """Return the time since the last message [s]; 0 if there was none."""
         return 0.0 if self._received is None else self.now() - self._received
 
     @property
     def stopped(self) -> bool:
-        """Whether messages arrived before, but have stopped."""
+        """Whether messages have arrived and then stopped."""
         return self.silence > 0.5  # joint states below 2 Hz are not usable for identification
 
     def trouble(self) -> str:
-        """Return a text on how long messages have been missing; empty while they arrive."""
+        """Return a text on how long messages have been missing; empty if they arrive."""
         return f'{self._kind} stopped {self.silence:.1f} s ago' if self.stopped else ''
 
 
 class StampDifference:
     """
-    Difference between the stamps of messages and the clock of the receiving node.
+    Difference between message time stamps and the clock of the receiving node.
 
     Parameters
     ----------
@@ -63,22 +63,22 @@ class StampDifference:
 
     @property
     def late(self) -> float:
-        """Return the smallest delay of recent stamps behind the clock [s]; negative if ahead."""
+        """Smallest recent delay of time stamps behind the clock [s]; negative if ahead."""
         return min(self._recent, key=abs, default=0.0)
 
     def take(self, stamp_ns: int, now_ns: int | None = None) -> None:
-        """Add the stamp of a message and its time of reception [ns]; 0 stands for no stamp."""
+        """Add a message's time stamp and time of reception [ns]; stamp 0 is ignored."""
         now = self._clock.now().nanoseconds if now_ns is None else now_ns
         self._late = (now - stamp_ns) * 1e-9 if stamp_ns and now else 0.0
         self._recent.append(self._late)
 
     def side(self, late: float) -> str:
-        """Return 'behind' or 'ahead of' with the name of the clock, for a delay of stamps [s]."""
+        """Return 'behind' or 'ahead of' and the clock's name, for a delay of stamps [s]."""
         clock = '/clock' if self._clock.ros_time_is_active else "this computer's clock"
         return f'{"behind" if late > 0.0 else "ahead of"} {clock}'
 
     def of_results(self, topic: str) -> str:
-        """Return a text if stamps, and so those of results, differ from the clock by over 10 s."""
+        """Return a text if stamps differ from the clock by over 10 s, as those of results will."""
         # tf2 keeps ten seconds, so RViz cannot draw older results; up to 1000 messages in the
         # queue of a busy node are younger
         if abs(self._late) <= 10.0:

@@ -57,7 +57,7 @@ SENSOR_PARAMETERS = ('torque_noise', 'position_noise', 'velocity_noise', 'resolu
 
 def sensors_of(value: Values, joints: Sequence[str]) -> Sensors:
     """
-    Return the noise, resolution and delay of the sensors that ROS parameters define.
+    Return sensors whose noise, resolution and delay are set by ROS parameters.
 
     Raises
     ------
@@ -76,7 +76,7 @@ def sensors_of(value: Values, joints: Sequence[str]) -> Sensors:
 
 def with_effects(arm: ArmModel, texts: Iterable[str]) -> ArmModel:
     """
-    Return an arm model with added effects.
+    Add effects, each described by a text, to an arm model.
 
     Parameters
     ----------

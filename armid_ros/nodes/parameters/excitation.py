@@ -188,7 +188,7 @@ PUBLISHER_PARAMETERS = (
 
 def make_planner(value: Values) -> tuple[TransferPlanner, tuple[str, ...]]:
     """
-    Return a planner of paths to an excitation for the robot and obstacles that parameters name.
+    Return a path planner for the robot and obstacles that ROS parameters name, and notes.
 
     Parameters
     ----------
@@ -224,7 +224,7 @@ def make_planner(value: Values) -> tuple[TransferPlanner, tuple[str, ...]]:
 
 def make_excitation(value: Values, rate: float, planner: TransferPlanner) -> Excitation:
     """
-    Load an excitation from the file that a parameter names; without a file, design an excitation.
+    Load the excitation file that a ROS parameter names; without one, design an excitation.
 
     Parameters
     ----------
@@ -263,7 +263,7 @@ def make_excitation(value: Values, rate: float, planner: TransferPlanner) -> Exc
 
 def checked(excitation: Excitation, planner: TransferPlanner, source: str) -> Excitation:
     """
-    Check an excitation for limits and collisions, and return it in the joint order of the arm.
+    Check limits and collisions of an excitation; return it in the arm's joint order.
 
     For a joint without an acceleration limit, the limit of `Limits.of` is assumed.
 

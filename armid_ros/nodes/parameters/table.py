@@ -28,7 +28,7 @@ Values = Callable[[str], Any]
 @dataclass(frozen=True)
 class NodeParameter:
     """
-    Parameter of a node: default, description, unit and permitted values.
+    Parameter of a node: default, description, unit and allowed values.
 
     Attributes
     ----------
@@ -73,14 +73,14 @@ class NodeParameter:
         return descriptor
 
     def text(self) -> str:
-        """Return the description of the parameter with its unit and permitted texts."""
+        """Return the description of the parameter with unit and allowed texts."""
         unit = f' [{self.unit}]' if self.unit else ''
         choices = f' One of: {", ".join(self.choices)}.' if self.choices else ''
         return f'{self.description}{unit}{choices}'
 
     def converted(self, value: Any) -> Value:
         """
-        Return a value converted to the type of the parameter.
+        Convert a value to the type of the parameter.
 
         An integer is accepted for a float, one value for a list, and [] for no names.
 
@@ -106,7 +106,7 @@ class NodeParameter:
         raise ParameterError(f"the parameter '{self.name}' cannot be {value}; {instead}")
 
     def objection(self, value: object) -> str:
-        """Return why a value of the right type is not permitted; empty if it is permitted."""
+        """Return why a value is not allowed; empty if it is allowed."""
         if isinstance(value, float) and not math.isfinite(value):
             return f"parameter '{self.name}' is {value}, not a finite number"
         if isinstance(value, int | float) and self.limits is not None:
@@ -132,12 +132,12 @@ setting = partial(NodeParameter, read_only=False)
 
 
 class ParameterError(ArmidError):
-    """Invalid parameter of a node."""
+    """Error in the value of a node's parameter."""
 
 
 def declare(node: Node, table: Iterable[NodeParameter]) -> dict[str, NodeParameter]:
     """
-    Declare the parameters of a table on a node, and return them by name.
+    Declare the parameters of a table on a node; return them by name.
 
     Raises
     ------
@@ -169,6 +169,6 @@ def declare(node: Node, table: Iterable[NodeParameter]) -> dict[str, NodeParamet
 
 
 def overrides(node: Node) -> Mapping[str, Parameter]:
-    """Return the parameters that were given at the start of a node, by name."""
+    """Return the parameter values given at the start of a node, by name."""
     given: Mapping[str, Parameter] = node._parameter_overrides
     return given

@@ -18,7 +18,7 @@ _RANGE = 'ROS_AUTOMATIC_DISCOVERY_RANGE'
 @contextmanager
 def private_context(domain: int | None = None) -> Iterator[Context]:
     """
-    Open a ROS context that communicates on this machine only.
+    Yield a ROS context that communicates on this machine only.
 
     Parameters
     ----------
@@ -51,7 +51,7 @@ def private_context(domain: int | None = None) -> Iterator[Context]:
 @contextmanager
 def reserved_domain() -> Iterator[int]:
     """
-    Reserve a ROS domain until the context is closed or the process ends.
+    Yield a ROS domain that no other process uses, until the block or process ends.
 
     Raises
     ------

@@ -43,7 +43,7 @@ class Argument(NamedTuple):
     default: str | None = ''
 
     def read(self, text: str) -> Any:
-        """Convert a text to the type of the argument; RuntimeError for a text of another type."""
+        """Convert text to the type of the argument; RuntimeError if this is impossible."""
         try:
             if self.kind is list:
                 return [part.strip() for part in listed(text) if part.strip()]
@@ -61,7 +61,7 @@ def described(
     arguments: Sequence[Argument], start: Callable[[dict[str, Any]], Sequence[Any]]
 ) -> Any:
     """
-    Return a launch description whose actions depend on the values of its arguments.
+    Return a launch description whose actions depend on the launch arguments.
 
     Parameters
     ----------
@@ -96,7 +96,7 @@ def node(
     **more: Any,
 ) -> Any:
     """
-    Return the launch action that starts a node of this package.
+    Return a launch action that starts a node of this package.
 
     Parameters
     ----------

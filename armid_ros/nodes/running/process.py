@@ -36,7 +36,7 @@ SHUTDOWN_TIMEOUT = 20.0
 @contextmanager
 def steady() -> Iterator[None]:
     """
-    Limit linear algebra to one thread, and exclude existing objects from garbage collection.
+    Limit linear algebra to one thread, and spare existing objects from garbage collection.
 
     For matrices of a hundred rows, the synchronisation of threads takes longer than the
     computation: 20 ms instead of 0.2 ms if the second core is busy. A garbage collection of the
@@ -53,7 +53,7 @@ def steady() -> Iterator[None]:
 
 
 class _Ending:
-    """Signal handler that lets a process end between two callbacks."""
+    """Signal handler that ends a process between two callbacks."""
 
     # A node must publish the stop of an arm after a signal, but the handlers of rclpy shut down
     # its context. During the construction of a node, SIGINT and SIGTERM end the process at once.
@@ -69,13 +69,13 @@ class _Ending:
 
     @property
     def due(self) -> bool:
-        """Whether the process has to end, after a signal or the end of its parent process."""
+        """Whether the process must end: a signal came, or the parent process ended."""
         ended = self.with_parent and os.getppid() != self._parent
         return self._requested or self.hung_up or ended
 
     @contextmanager
     def at_once(self) -> Iterator[None]:
-        """Let signals end the process at once inside this context."""
+        """Allow signals to end the process immediately in a `with` block."""
         self._at_once = True
         try:
             yield
@@ -93,12 +93,12 @@ class _Ending:
 
 
 class _EndedAtOnce(BaseException):
-    """Exception that a signal raises during the construction of a node; `run` catches it."""
+    """Exception that a signal raises while a node is constructed; `run` catches it."""
 
 
 def run(make_node: Callable[[], ArmidNode], args: Sequence[str] | None = None) -> None:
     """
-    Run a node until it is finished or a signal arrives; --help only prints its help.
+    Run a node until it is finished or a signal arrives; with --help, print its help.
 
     Raises
     ------
@@ -146,7 +146,7 @@ def run(make_node: Callable[[], ArmidNode], args: Sequence[str] | None = None) -
 
 
 def _made(make_node: Callable[[], ArmidNode], args: Sequence[str] | None) -> ArmidNode:
-    """Initialise ROS, and return a new node; ParameterError for invalid arguments."""
+    """Initialise ROS and create a node; ParameterError for invalid arguments."""
     own = sys.argv[1:] if args is None else args
     try:
         rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
@@ -161,7 +161,7 @@ def _made(make_node: Callable[[], ArmidNode], args: Sequence[str] | None) -> Arm
 
 
 def _shut_down(node: ArmidNode | None) -> list[str]:
-    """Close a node and shut down ROS; return the errors."""
+    """Close a node and shut down ROS; return error messages."""
     # Under `ros2 launch` Ctrl-C arrives twice; the second must not interrupt closing.
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, signal.SIG_IGN)
@@ -183,7 +183,7 @@ def _shut_down(node: ArmidNode | None) -> list[str]:
 
 def unreadable(error: Exception) -> str:
     """
-    Return a readable message, with the right syntax, for an error of rclpy in ROS arguments.
+    Return a readable message on invalid ROS arguments, with the correct syntax.
 
     Parameters
     ----------

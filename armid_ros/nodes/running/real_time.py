@@ -10,7 +10,7 @@ import time
 
 class RealTime:
     """
-    Synchronisation of a simulation with real time, which skips time that cannot be caught up.
+    Pacing of a simulation by real time; time that is too late is skipped.
 
     Parameters
     ----------
@@ -32,12 +32,12 @@ class RealTime:
         self.begin()
 
     def begin(self) -> None:
-        """Restart the synchronisation at the present time, and keep the sum of skipped time."""
+        """Restart the pacing now; the sum of skipped time is kept."""
         self._anchor = self._clock(), self._elapsed()
 
     def catch_up(self, factor: float, period: float) -> float:
         """
-        Simulate up to the present real time; skip time that cannot be caught up.
+        Simulate up to the present real time; skip what cannot be caught up.
 
         Parameters
         ----------
@@ -71,7 +71,7 @@ class RealTime:
         return behind
 
     def trouble(self, advice: str) -> str:
-        """Return a text with the skipped time and the remedy; empty if no time was skipped."""
+        """Return a text on skipped time with a remedy; empty if none was skipped."""
         if self.given_up <= 0.5:  # delays during the start are normal
             return ''
         return f'{self.given_up:.1f} s of real time were skipped: {advice}'
