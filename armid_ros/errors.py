@@ -9,20 +9,20 @@ from difflib import get_close_matches
 
 
 def nearest(name: str, names: Iterable[str]) -> str:
-    """Return the known name that is spelled most like a given name; empty if none is similar."""
+    """Return the known name with the most similar spelling; empty if none is similar."""
     # 0.75: up to a quarter of the letters may differ
     return next(iter(get_close_matches(name, list(names), 1, 0.75)), '')
 
 
 def meant(name: str, names: Iterable[str]) -> str:
-    """Return a suggestion such as "; did you mean 'elbow'?"; empty if no known name is similar."""
+    """Return a suggestion such as "; did you mean 'elbow'?"; empty if no name is similar."""
     found = nearest(name, names)
     return f"; did you mean '{found}'?" if found else ''
 
 
 def visible(text: str) -> str:
     """
-    Return a text with escaped control characters, safe for a terminal.
+    Replace control characters in a text by escapes, so that it is safe for a terminal.
 
     Names come from files and messages; their escape sequences must not control the terminal.
 
@@ -34,7 +34,7 @@ def visible(text: str) -> str:
 
 class ArmidError(Exception):
     """
-    Base class of errors caused by bad input; commands print the message and exit with code 2.
+    Base class of errors by bad input: commands print the message and exit with code 2.
 
     Examples
     --------
@@ -57,7 +57,7 @@ class RobotError(ArmidError):
 
 
 class RecordingError(ArmidError):
-    """Error in a recording that cannot be read or that does not fit the robot."""
+    """Error of a recording that is unreadable or does not fit the robot."""
 
 
 class ModelError(ArmidError):
@@ -65,20 +65,20 @@ class ModelError(ArmidError):
 
 
 class TrajectoryError(ArmidError):
-    """Error in a trajectory that violates limits of the robot, or failure to find a trajectory."""
+    """Error of a trajectory that violates limits, or that cannot be found."""
 
 
 class IdentificationError(ArmidError):
-    """Error in an identification whose data do not determine the parameters."""
+    """Error of an identification whose data do not determine the parameters."""
 
 
 class RecordingEnded(RecordingError):
-    """Error that ends a recording: the disk is full, or the file was removed."""
+    """Error that ends a recording: the disk is full or the file was removed."""
 
 
 class OutputError(ArmidError):
-    """Error in writing a result, or refusal to overwrite another result."""
+    """Error in writing a result, such as a folder that contains another result."""
 
 
 class FleetError(ArmidError):
-    """Error that prevents the start or the continuation of a run over a fleet."""
+    """Error that prevents a run over a fleet from starting or continuing."""

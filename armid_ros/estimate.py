@@ -23,7 +23,7 @@ _RIGID = re.compile(r'(m[xyz]?|I[xyz]{2})\d+( |$)')
 @dataclass(frozen=True)
 class ParameterName:
     """
-    Name, joint, unit and effect of one scalar parameter of a model.
+    Name, joint, unit and effect of a scalar parameter.
 
     Attributes
     ----------
@@ -54,18 +54,18 @@ class ParameterName:
 
     @property
     def rigid(self) -> bool:
-        """Whether the parameter is inertial, or a sum with an inertial first term."""
+        """Whether the parameter is inertial, or a sum that starts with an inertial one."""
         return _RIGID.match(self.name) is not None
 
 
 def name_in_words(name: str) -> str:
-    """Return an effect or parameter name in words: 'Coulomb friction' for 'coulomb_friction'."""
+    """Return an effect or parameter name as words: 'Coulomb friction' for 'coulomb_friction'."""
     words = name.replace('_', ' ')
     return words.replace('coulomb', 'Coulomb').replace('stribeck', 'Stribeck')
 
 
 def symbol_in_words(symbol: str) -> str:
-    """Return the symbol of an inertial parameter in words: 'product of inertia xy' for 'Ixy'."""
+    """Return an inertial parameter as words: 'product of inertia xy' for 'Ixy'."""
     if symbol == 'm':
         return 'mass'
     if symbol[0] == 'm':
@@ -118,7 +118,7 @@ class Estimate:
             )
 
     def __repr__(self) -> str:
-        """Return the first values and their standard deviations in at most ten lines."""
+        """Return the first values with standard deviations, in at most ten lines."""
         rows = [
             f'  {(p.joint + " ") if p.joint else ""}{p.name} {value:.4g} ± {std:.2g} {p.unit}'
             for p, value, std in zip(self.parameters, self.values, self.std, strict=True)
@@ -129,16 +129,16 @@ class Estimate:
 
     @property
     def std(self) -> FloatArray:
-        """Return the standard deviation of each parameter, shape (P,)."""
+        """Standard deviation of each parameter, shape (P,)."""
         return np.asarray(np.sqrt(np.diag(self.covariance)))
 
     def interval(self, confidence: float = 0.95) -> FloatArray:
-        """Return lower and upper limits of the parameters' confidence intervals, (P, 2)."""
+        """Return the confidence interval of each parameter, lower and upper end, (P, 2)."""
         reach = NormalDist().inv_cdf(0.5 + confidence / 2.0) * self.std
         return np.column_stack([self.values - reach, self.values + reach])
 
     def __getitem__(self, key: str | tuple[str, str]) -> float:
-        """Return the value of a parameter, or of the only parameter of an effect."""
+        """Return the value of a parameter, or of an effect that has only one parameter."""
         name, joint = (key, '') if isinstance(key, str) else key
         own = [
             k
@@ -148,7 +148,7 @@ class Estimate:
         return float(self.values[own[0] if len(own) == 1 else self.index(name, joint)])
 
     def index(self, name: str, joint: str = '') -> int:
-        """Return the index of a parameter in `parameters`; raise ModelError if it is missing."""
+        """Return the index of a parameter; raise ModelError if it is missing."""
         for position, parameter in enumerate(self.parameters):
             if parameter.name == name and parameter.joint == joint:
                 return position
@@ -161,7 +161,7 @@ class Estimate:
 def parameter_table(
     names: Sequence[ParameterName], values: FloatArray, std: Sequence[float | None]
 ) -> list[dict[str, Any]]:
-    """Return one dictionary per parameter (name, joint, value, std, unit) for YAML or JSON."""
+    """Return a dictionary (name, joint, value, std, unit) per parameter, for YAML or JSON."""
     return [
         {
             'name': name.name,
@@ -175,7 +175,7 @@ def parameter_table(
 
 
 def measured(value: float, reach: float) -> tuple[str, str]:
-    """Return a value and the half-width of its confidence interval as texts, rounded alike."""
+    """Return a value and its interval's half-width as texts with equally many digits."""
     if not (math.isfinite(reach) and reach > 0.0):
         return f'{value:.4g}', '0'
     decimals = max(0, 1 - math.floor(math.log10(reach)))

@@ -17,7 +17,7 @@ Samples = slice | npt.NDArray[np.intp] | npt.NDArray[np.bool_]
 
 def read_only(values: npt.ArrayLike) -> FloatArray:
     """
-    Return values as a contiguous float64 array that cannot be written to.
+    Convert values to a contiguous float64 array that cannot be written to.
 
     An array that is already a read-only view of immutable memory is not copied.
 
@@ -30,14 +30,14 @@ def read_only(values: npt.ArrayLike) -> FloatArray:
 
 
 def freeze(instance: object, *names: str) -> None:
-    """Make array attributes of a frozen dataclass read-only; for use in ``__post_init__``."""
+    """Make array attributes of a frozen dataclass read-only, in its ``__post_init__``."""
     for name in names:
         if getattr(instance, name) is not None:
             object.__setattr__(instance, name, read_only(getattr(instance, name)))
 
 
 def freeze_samples(where: str, samples: Any, *names: str) -> None:
-    """Make arrays of joint samples read-only; RecordingError unless their shape is (N, n)."""
+    """Make arrays of joint samples read-only; RecordingError unless of shape (N, n)."""
     freeze(samples, 't', *names)
     expected = (len(samples.t), len(samples.joints))
     for name in names:
@@ -56,7 +56,7 @@ def freeze_samples(where: str, samples: Any, *names: str) -> None:
 
 
 def selected(instance: object, samples: Samples, *names: str) -> dict[str, Any]:
-    """Return arrays of an object at selected samples, by attribute; missing arrays stay None."""
+    """Return selected samples of array attributes, by name; missing arrays stay None."""
     arrays = {name: getattr(instance, name) for name in names}
     return {name: None if array is None else array[samples] for name, array in arrays.items()}
 
@@ -64,7 +64,7 @@ def selected(instance: object, samples: Samples, *names: str) -> dict[str, Any]:
 @dataclass(frozen=True)
 class MovingPoints:
     """
-    Positions and velocities of points on a partner of the arm, such as an exoskeleton's wearer.
+    Positions and velocities of points on another machine or on a person.
 
     Attributes
     ----------
@@ -91,7 +91,7 @@ class MovingPoints:
 @dataclass(frozen=True, eq=False)
 class Temperatures:
     """
-    Measured temperatures of joints or motors, usually sampled less often than the motion.
+    Temperatures of joints or motors, usually measured less often than the motion.
 
     Attributes
     ----------
@@ -110,7 +110,7 @@ class Temperatures:
         freeze(self, 't', 'values')
 
     def at(self, t: npt.ArrayLike) -> FloatArray:
-        """Interpolate temperatures at times (N,), constant beyond the readings; (N, n) [degC]."""
+        """Interpolate temperatures at N times, (N, n) [degC]; constant beyond the readings."""
         return np.column_stack([np.interp(np.ravel(t), self.t, one) for one in self.values.T])
 
 
@@ -161,14 +161,14 @@ class Motion:
     temperature: Temperatures | None = field(default=None, kw_only=True)
 
     def __post_init__(self) -> None:
-        """Make the arrays read-only; raise RecordingError if their shapes differ."""
+        """Make the arrays read-only; RecordingError if their shapes differ."""
         freeze_samples('motion', self, 'q', 'dq', 'ddq', 'tau')
 
     @classmethod
     def of_states(
         cls, joints: tuple[str, ...], q: npt.ArrayLike, dq: npt.ArrayLike, ddq: npt.ArrayLike
     ) -> Motion:
-        """Return a motion of independent states, 1 s apart, each (N, n), (n,) or a number."""
+        """Return a motion whose samples are independent states, 1 s apart."""
         parts = np.broadcast_arrays(np.atleast_2d(q), dq, ddq)
         return cls(joints, np.arange(len(parts[0]), dtype=float), *map(np.array, parts))
 
@@ -182,13 +182,13 @@ class Motion:
         return len(self.joints)
 
     def select(self, samples: Samples) -> Motion:
-        """Return the motion at selected samples, on the same time base."""
+        """Return the motion with selected samples only; times are unchanged."""
         partner = None if self.partner is None else self.partner.select(samples)
         arrays = selected(self, samples, 't', 'q', 'dq', 'ddq', 'tau')
         return replace(self, **arrays, partner=partner)
 
     def at_rest(self) -> Motion:
-        """Return the motion with the same positions, and with zero velocity and acceleration."""
+        """Return the motion with its positions, but zero velocity and acceleration."""
         zero = np.zeros_like(self.q)
         return replace(self, dq=zero, ddq=zero)
 
@@ -200,7 +200,7 @@ class Motion:
 @dataclass(frozen=True)
 class BlurredMotion(Motion):
     """
-    Motion in which a smooth function, tanh(dq / width), replaces the sign of joint velocities.
+    Motion in which tanh(dq / width) replaces the sign of joint velocities.
 
     A search for trajectories needs a gradient, which the sign of a velocity does not have.
 

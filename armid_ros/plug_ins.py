@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 @cache
 def plug_ins(kind: str) -> dict[str, EntryPoint]:
     """
-    Return the entry points of all installed plug-ins whose module exists, by plug-in name.
+    Return the entry points of all installed plug-ins by name, if their modules exist.
 
     Parameters
     ----------
