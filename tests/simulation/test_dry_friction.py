@@ -32,14 +32,6 @@ def with_coulomb(robot, values) -> ArmModel:
     return ArmModel(robot).with_effect(make_effect('coulomb_friction', robot), values)
 
 
-@pytest.mark.parametrize('push', [9.99999, -9.99999])
-def test_a_block_pushed_less_than_breakaway_does_not_move_at_all(slider, push: float) -> None:
-    plant = Plant(with_coulomb(slider(), [10.0]))
-    for state in run(plant, plant.state([0.123456789]), 2.0, [push]):
-        assert state.q[0] == 0.123456789
-        assert state.dq[0] == 0.0
-
-
 @pytest.mark.parametrize('push', [10.001, -14.0])
 def test_a_block_pushed_more_slides_the_way_it_is_pushed(slider, push: float) -> None:
     plant = Plant(with_coulomb(slider(), [10.0]))
@@ -65,15 +57,6 @@ def test_asymmetric_levels_hold_between_both(slider) -> None:
     plant = Plant(arm)
     for push, moves in ((13.9, 0), (14.1, 1), (-5.9, 0), (-6.1, -1)):
         assert np.sign(run(plant, plant.state([0.0]), 0.5, [push])[-1].dq[0]) == moves
-
-
-def test_joints_stick_and_slip_each_for_itself(humanoid) -> None:
-    plant = Plant(with_coulomb(humanoid, [6.0, 6.0, 6.0, 6.0, 1e-3, 6.0]))
-    start = plant.state([0.1, -0.2, 0.3, 0.4, -0.1, 0.2])
-    final = run(plant, start, 0.1, [0.0, 0.0, 0.0, 0.0, 0.05, 0.0])[-1]
-    assert final.modes.count(0) == 5
-    np.testing.assert_array_equal(np.delete(final.q, 4), np.delete(start.q, 4))
-    assert final.q[4] > start.q[4]
 
 
 def test_a_shared_shaft_sticks_along_its_direction_only(pendulum) -> None:

@@ -142,16 +142,6 @@ def test_friction_with_load_holds_a_joint_against_less_than_its_share(pendulum) 
     assert np.ptp(free.truth.q) > 0.05
 
 
-def test_a_drive_that_gives_less_than_it_is_asked_for_reports_what_it_was_asked(
-    humanoid, reference
-) -> None:
-    effect = make_effect('actuator_saturation', humanoid).with_shape([1.5])
-    arm = ArmModel(humanoid).with_effect(effect, np.tile([1.0, 0.0], 6))
-    run = simulate(arm, reference, rng=np.random.default_rng(0))
-    assert np.abs(run.truth.tau).max() <= 1.5 + 1e-12
-    assert np.abs(run.tau).max() > 1.6
-
-
 @pytest.mark.parametrize('name', ['time_delay', 'torque_lag', 'torque_gain', 'encoder_offset'])
 def test_an_arm_that_is_read_step_by_step_reads_the_same(humanoid, reference, name) -> None:
     arm = arm_with(humanoid, name)

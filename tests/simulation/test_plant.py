@@ -47,18 +47,6 @@ def test_a_pendulum_swings_with_its_period(pendulum, amplitude: float) -> None:
     assert np.diff(crossing).mean() == pytest.approx(period, rel=1e-5)
 
 
-def test_without_friction_a_double_pendulum_keeps_its_energy_to_the_order_of_the_step(pendulum):
-    drift = []
-    for dt in (2e-3, 1e-3, 5e-4):
-        plant = Plant(ArmModel(pendulum(links=2)), dt=dt)
-        swing = states(plant, plant.state([1.0, 0.5]), round(2.0 / dt))
-        values = np.array([energy(plant, s) for s in swing])
-        drift.append(np.ptp(values) / (1.0 * 9.81 * 0.4))
-    assert drift[1] < 1e-4
-    np.testing.assert_allclose(drift[0] / drift[1], 4.0, rtol=0.2)
-    np.testing.assert_allclose(drift[1] / drift[2], 4.0, rtol=0.2)
-
-
 def test_the_integration_is_second_order_in_the_step(humanoid) -> None:
     arm = ArmModel(humanoid).with_effect(
         make_effect('viscous_friction', humanoid), [0.3, 0.3, 0.1, 0.1, 0.005, 0.005]
@@ -103,13 +91,6 @@ def test_friction_dissipates_what_it_does_in_work(pendulum) -> None:
     assert work * plant.dt == pytest.approx(lost, rel=1e-3)
 
 
-def test_asymmetric_friction_alone_is_an_offset_and_never_holds(slider) -> None:
-    robot = slider()
-    arm = ArmModel(robot).with_effect(make_effect('asymmetric_friction', robot), [4.0, 0.0])
-    plant = Plant(arm)
-    assert states(plant, plant.state([0.0]), 1000)[-1].dq[0] == pytest.approx(-2.0, rel=1e-12)
-
-
 def test_a_joint_stops_at_its_limit_and_stays_until_it_is_pushed_off(pendulum) -> None:
     plant = Plant(ArmModel(pendulum(links=2, stop=0.5)))
     swing = states(plant, plant.state([0.4, 0.4], [3.0, 2.0]), 300, [20.0, 5.0])
@@ -139,7 +120,7 @@ def test_an_arm_cannot_begin_beyond_its_stops(pendulum) -> None:
 
 def test_bodies_that_cannot_be_are_refused(slider) -> None:
     robot = slider()
-    with pytest.raises(ModelError, match='--physical'):
+    with pytest.raises(ModelError, match=r"'block'.*--physical"):
         Plant(ArmModel(robot.with_inertias(-robot.rigid_parameters)))
     with pytest.raises(ModelError, match='positive time'):
         Plant(ArmModel(robot), dt=0.0)

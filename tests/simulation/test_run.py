@@ -20,7 +20,6 @@ from armid_ros.simulation import (
     SimulatedRun,
 )
 from armid_ros.simulation.controller import Controller
-from armid_ros.simulation.run import record
 import numpy as np
 import pytest
 
@@ -86,14 +85,6 @@ def test_it_lasts_as_long_as_its_reference_at_the_rate_asked_for(arm) -> None:
     np.testing.assert_array_equal(run.tau, fine.tau[::5])
 
 
-def test_after_its_reference_the_arm_holds(arm) -> None:
-    reference = swinging(arm.robot, 1.0)
-    run = simulate(arm, reference, rng=np.random.default_rng(0), duration=3.0)
-    held = run.truth.q[run.t > 2.0]
-    np.testing.assert_allclose(held, np.tile(reference.q[-1], (len(held), 1)), atol=0.02)
-    assert np.ptp(held, axis=0).max() < 1e-6
-
-
 def test_the_same_generator_gives_the_same_run_and_another_one_other_noise(arm) -> None:
     sensors = Sensors(torque_noise=0.1, position_noise=1e-4, velocity_noise=0.01)
 
@@ -113,13 +104,6 @@ def test_delayed_torque_is_the_torque_of_some_steps_before(arm) -> None:
     late = simulate(arm, reference, rng=np.random.default_rng(0), sensors=Sensors(torque_delay=7))
     np.testing.assert_array_equal(late.tau[7:], late.truth.tau[:-7])
     np.testing.assert_array_equal(late.q, late.truth.q)
-
-
-def test_progress_goes_up_to_the_end(arm) -> None:
-    shares: list[float] = []
-    reference = swinging(arm.robot, 2.5)
-    record(SimulatedArm(arm, rng=np.random.default_rng(0)), reference, progress=shares.append)
-    assert len(shares) >= 2 and shares == sorted(shares) and shares[-1] == 1.0
 
 
 def test_what_does_not_fit_is_refused(arm) -> None:
@@ -158,15 +142,6 @@ def test_an_arm_of_one_joint_follows(kind):
     robot = one_joint(kind)
     run = simulate(ArmModel(robot), sine(robot.joints), rng=np.random.default_rng(0))
     assert np.abs(run.truth.q - run.reference.q).max() < 1e-3
-
-
-def test_a_link_of_negative_mass_is_named():
-    robot = load_robot('humanoid_arm')
-    bodies = robot.rigid_parameters.reshape(-1, 10).copy()
-    bodies[2] *= -1.0
-    arm = ArmModel(robot.with_inertias(bodies.ravel()))
-    with pytest.raises(ModelError, match=f"'{robot.links[2]}'.*-"):
-        simulate(arm, sine(robot.joints), rng=np.random.default_rng(0))
 
 
 def test_a_joint_that_moves_nothing_cannot_be_simulated():

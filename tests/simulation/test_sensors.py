@@ -42,18 +42,6 @@ def test_an_encoder_reads_whole_steps_within_half_a_step_of_the_truth() -> None:
     np.testing.assert_array_equal(read[:, 1], q[:, 1])
 
 
-def test_one_sample_at_a_time_reads_the_same_as_all_at_once() -> None:
-    q, dq, tau = np.random.default_rng(0).normal(size=(3, 20, 2))
-    sensors = Sensors(0.1, 0.2, 0.3, resolution=0.05)
-    together = sensors.measure(q, dq, tau, np.random.default_rng(5))
-    rng = np.random.default_rng(5)
-    for k in range(20):
-        row = slice(k, k + 1)
-        single = sensors.measure(q[row], dq[row], tau[row], rng)
-        for one, all_at_once in zip(single, together, strict=True):
-            np.testing.assert_array_equal(one, all_at_once[row])
-
-
 def test_nonsense_is_refused() -> None:
     with pytest.raises(ModelError, match='torque_noise'):
         Sensors(torque_noise=-0.1)

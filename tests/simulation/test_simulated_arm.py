@@ -45,14 +45,6 @@ def there_and_back(joints, duration: float = 1.5, first: float = 0.0) -> Referen
     return Reference(joints, first + t[:, 0], q, dq, ddq)
 
 
-def test_without_a_trajectory_it_stands_still(arm) -> None:
-    for _ in range(10):
-        sample = arm.advance(100)
-    assert (sample.steps, sample.t) == (1000, 1.0)
-    np.testing.assert_array_equal(arm.state.q, MIDDLE)
-    np.testing.assert_array_equal(arm.state.dq, 0.0)
-
-
 def test_noise_and_delay_are_those_of_simulate_sample_by_sample(model) -> None:
     reference = there_and_back(model.robot.joints)
     rng = np.random.default_rng(3)
