@@ -61,16 +61,35 @@ def iter_raw(path, settings=DEFAULT):
         yield from bag.messages()
 
 
+def messages_of(recording, stamps, joints=None, *, log=None, topic='/joint_states', **kept):
+    """Return messages of samples, one each, logged at their stamps; `kept` replaces arrays."""
+    names = list(joints or recording.joints)
+    columns = [recording.joints.index(name) for name in names]
+    values = []
+    for quantity in ('q', 'dq', 'tau'):
+        array = kept.get(quantity, getattr(recording, quantity))
+        values.append(None if array is None else array[:, columns])
+    cdr = serialised(names, stamps, *values)
+    times = np.asarray(stamps if log is None else log).tolist()
+    return [(topic, data, time) for data, time in zip(cdr, times, strict=True)]
+
+
+def assert_same(got, expected, samples=slice(None), joints=None):
+    """Compare a recording with some samples of another one."""
+    columns = [expected.joints.index(name) for name in joints or expected.joints]
+    assert got.joints == tuple(joints or expected.joints)
+    t = expected.t[samples]
+    np.testing.assert_allclose(got.t, t - t[0], rtol=0, atol=1e-9)
+    for quantity in ('q', 'dq', 'tau'):
+        np.testing.assert_array_equal(
+            getattr(got, quantity), getattr(expected, quantity)[samples][:, columns]
+        )
+
+
 @pytest.fixture
 def swinging():
     """Return a recording of three joints, 500 samples at 1 kHz."""
     return swing()
-
-
-@pytest.fixture
-def make_swing():
-    """Return the function that makes recordings."""
-    return swing
 
 
 @pytest.fixture
@@ -91,38 +110,3 @@ def write_bag(tmp_path):
         return tmp_path / name
 
     return write
-
-
-@pytest.fixture
-def messages_of():
-    """Return a function that makes messages of samples, one each, logged at their stamps."""
-
-    def make(recording, stamps, joints=None, *, log=None, topic='/joint_states', **kept):
-        names = list(joints or recording.joints)
-        columns = [recording.joints.index(name) for name in names]
-        values = []
-        for quantity in ('q', 'dq', 'tau'):
-            array = kept.get(quantity, getattr(recording, quantity))
-            values.append(None if array is None else array[:, columns])
-        cdr = serialised(names, stamps, *values)
-        times = np.asarray(stamps if log is None else log).tolist()
-        return [(topic, data, time) for data, time in zip(cdr, times, strict=True)]
-
-    return make
-
-
-@pytest.fixture
-def assert_same():
-    """Return a function that compares a recording with some samples of another one."""
-
-    def compare(got, expected, samples=slice(None), joints=None):
-        columns = [expected.joints.index(name) for name in joints or expected.joints]
-        assert got.joints == tuple(joints or expected.joints)
-        t = expected.t[samples]
-        np.testing.assert_allclose(got.t, t - t[0], rtol=0, atol=1e-9)
-        for quantity in ('q', 'dq', 'tau'):
-            np.testing.assert_array_equal(
-                getattr(got, quantity), getattr(expected, quantity)[samples][:, columns]
-            )
-
-    return compare

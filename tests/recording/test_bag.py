@@ -22,7 +22,7 @@ from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import get_typestore, Stores
 import yaml
 
-from .conftest import iter_raw, JOINTS, serialised, sqlite_bag
+from .conftest import assert_same, iter_raw, JOINTS, messages_of, serialised, sqlite_bag
 
 
 @pytest.fixture
@@ -38,7 +38,7 @@ def split_bag(swinging, tmp_path):
     return bag
 
 
-def test_a_split_bag_is_read_in_order_with_and_without_metadata(split_bag, swinging, assert_same):
+def test_a_split_bag_is_read_in_order_with_and_without_metadata(split_bag, swinging):
     without = read_recording(split_bag, joints=JOINTS)
     assert_same(without, swinging)
     assert without.report.clean
@@ -54,7 +54,7 @@ def test_a_split_bag_is_read_in_order_with_and_without_metadata(split_bag, swing
     assert_same(read_recording(split_bag, joints=JOINTS), swinging, slice(0, 462))
 
 
-def test_paths_of_old_metadata_begin_with_the_directory(swinging, tmp_path, assert_same):
+def test_paths_of_old_metadata_begin_with_the_directory(swinging, tmp_path):
     write_recording(tmp_path / 'bag', swinging)
     information = {'version': 3, 'relative_file_paths': ['bag/bag_0.mcap']}
     (tmp_path / 'bag' / 'metadata.yaml').write_text(
@@ -68,7 +68,7 @@ def test_paths_of_old_metadata_begin_with_the_directory(swinging, tmp_path, asse
 @pytest.mark.parametrize('chunked', [True, False])
 @pytest.mark.parametrize('summary', [True, False])
 def test_files_of_mcaps_own_writer_are_read_however_bare(
-    swinging, stamps, tmp_path, assert_same, compression, indexes, chunked, summary
+    swinging, stamps, tmp_path, compression, indexes, chunked, summary
 ):
     """Of two publishers there are two channels, which are one topic."""
     path = tmp_path / 'file.mcap'
@@ -105,9 +105,7 @@ def test_files_of_mcaps_own_writer_are_read_however_bare(
 
 
 @pytest.mark.parametrize('columns', ['', ', offered_qos_profiles TEXT NOT NULL'])
-def test_sqlite_files_of_the_first_distributions_are_read(
-    swinging, stamps, messages_of, tmp_path, assert_same, columns
-):
+def test_sqlite_files_of_the_first_distributions_are_read(swinging, stamps, tmp_path, columns):
     path = tmp_path / 'old.db3'
     sqlite_bag(path, messages_of(swinging, stamps), columns).close()
     before = path.read_bytes()
@@ -192,9 +190,7 @@ def test_metadata_that_lies_is_refused_with_what_there_is(swinging, tmp_path, ol
         read_recording(tmp_path / 'bag', joints=JOINTS)
 
 
-def test_a_crashed_sqlite_recording_is_read_with_its_journal(
-    swinging, stamps, tmp_path, assert_same
-):
+def test_a_crashed_sqlite_recording_is_read_with_its_journal(swinging, stamps, tmp_path):
     bag = tmp_path / 'bag'
     store = get_typestore(Stores.ROS2_JAZZY)
     messages = serialised(JOINTS, stamps, swinging.q, swinging.dq, swinging.tau)

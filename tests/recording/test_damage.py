@@ -25,13 +25,13 @@ import numpy as np
 import pytest
 from rosbags.rosbag2 import Reader
 
-from .conftest import iter_raw, JOINTS, sqlite_bag
+from .conftest import assert_same, iter_raw, JOINTS, messages_of, sqlite_bag, swing
 
 
 @pytest.fixture(params=['none', 'zstd', 'lz4'])
-def bag(request, make_swing, tmp_path):
+def bag(request, tmp_path):
     """Return a recording of 300 samples, and its bag of several chunks."""
-    recording = make_swing(300)
+    recording = swing(300)
     write_recording(tmp_path / 'bag', recording, compression=request.param, chunk_size=10_000)
     return recording, tmp_path / 'bag' / 'bag_0.mcap'
 
@@ -68,8 +68,8 @@ def test_a_damaged_chunk_is_left_out_and_said_with_its_time(bag, tmp_path):
     assert again.report.damage == ''
 
 
-def test_checksums_are_not_compared_for_who_does_not_want_it(make_swing, tmp_path):
-    write_recording(tmp_path / 'bag', make_swing(300), compression='none')
+def test_checksums_are_not_compared_for_who_does_not_want_it(tmp_path):
+    write_recording(tmp_path / 'bag', swing(300), compression='none')
     path = tmp_path / 'bag' / 'bag_0.mcap'
     change(path, chunks_of(path)[0].end - 40)
     got = read_recording(path, joints=JOINTS, settings=ReadSettings(check_crc=False))
@@ -104,16 +104,16 @@ def test_a_summary_that_is_damaged_is_not_believed(bag):
         ('name: /joint_states', 'name: /other', ('300', '/other')),
     ],
 )
-def test_counts_and_topics_of_metadata_are_compared(make_swing, tmp_path, old, new, facts):
-    write_recording(tmp_path / 'bag', make_swing(300))
+def test_counts_and_topics_of_metadata_are_compared(tmp_path, old, new, facts):
+    write_recording(tmp_path / 'bag', swing(300))
     metadata = tmp_path / 'bag' / 'metadata.yaml'
     metadata.write_text(metadata.read_text().replace(old, new))
     damage = read_recording(tmp_path / 'bag', joints=JOINTS).report.damage
     assert all(fact in damage for fact in facts)
 
 
-def test_a_message_of_2_63_bytes_or_less_than_its_head_is_no_message(make_swing, tmp_path):
-    write_recording(tmp_path / 'bag', make_swing(300), compression='none')
+def test_a_message_of_2_63_bytes_or_less_than_its_head_is_no_message(tmp_path):
+    write_recording(tmp_path / 'bag', swing(300), compression='none')
     path = tmp_path / 'bag' / 'bag_0.mcap'
     content = path.read_bytes()
     begin = chunks_of(path)[0].begin
@@ -129,8 +129,8 @@ def test_a_message_of_2_63_bytes_or_less_than_its_head_is_no_message(make_swing,
         read_recording(path, joints=JOINTS)
 
 
-def test_a_message_logged_after_2262_is_left_out_and_said(make_swing, tmp_path):
-    write_recording(tmp_path / 'bag', make_swing(300), compression='none')
+def test_a_message_logged_after_2262_is_left_out_and_said(tmp_path):
+    write_recording(tmp_path / 'bag', swing(300), compression='none')
     path = tmp_path / 'bag' / 'bag_0.mcap'
     content = path.read_bytes()
     chunk = chunks_of(path)[0]
@@ -148,7 +148,7 @@ def test_a_message_logged_after_2262_is_left_out_and_said(make_swing, tmp_path):
 @pytest.mark.parametrize('value', ['NULL', "'text'", '3.5', "CAST(x'ff' AS TEXT)"])
 @pytest.mark.parametrize('column', ['timestamp', 'data', 'topic_id'])
 def test_rows_that_are_no_messages_are_left_out_and_said(
-    swinging, stamps, messages_of, tmp_path, column, value
+    swinging, stamps, tmp_path, column, value
 ):
     path = tmp_path / 'bag.db3'
     with sqlite_bag(path, messages_of(swinging, stamps)) as database:
@@ -158,7 +158,7 @@ def test_rows_that_are_no_messages_are_left_out_and_said(
     assert '1 rows' in got.report.damage
 
 
-def test_a_view_in_place_of_a_table_is_refused(swinging, stamps, messages_of, tmp_path):
+def test_a_view_in_place_of_a_table_is_refused(swinging, stamps, tmp_path):
     path = tmp_path / 'bag.db3'
     with sqlite_bag(path, messages_of(swinging, stamps)) as database:
         database.executescript(
@@ -202,9 +202,9 @@ def test_a_file_cut_anywhere_gives_all_samples_before_the_cut(bag, tmp_path):
     assert before == 300
 
 
-def test_the_share_of_a_chunk_cut_off_is_the_share_of_its_messages(make_swing, tmp_path):
+def test_the_share_of_a_chunk_cut_off_is_the_share_of_its_messages(tmp_path):
     """A chunk that is cut off is read as far as it goes, beyond the last whole record."""
-    write_recording(tmp_path / 'bag', make_swing(6000), compression='zstd', chunk_size=10**9)
+    write_recording(tmp_path / 'bag', swing(6000), compression='zstd', chunk_size=10**9)
     path = tmp_path / 'bag' / 'bag_0.mcap'
     ends, counted = chunk_ends(path)
     largest = int(np.argmax(np.diff(ends))) + 1
@@ -216,7 +216,7 @@ def test_the_share_of_a_chunk_cut_off_is_the_share_of_its_messages(make_swing, t
     assert (len(got) - counted[largest - 1]) / inside == pytest.approx(read / of, abs=0.01)
 
 
-def test_a_recovered_bag_is_whole(bag, tmp_path, assert_same):
+def test_a_recovered_bag_is_whole(bag, tmp_path):
     recording, path = bag
     content = path.read_bytes()
     cut = tmp_path / 'cut.mcap'
@@ -236,7 +236,7 @@ def test_a_recovered_bag_is_whole(bag, tmp_path, assert_same):
             assert reader.message_count == len(list(reader.messages())) == len(as_read)
 
 
-def test_recovery_keeps_types_qos_and_times(swinging, stamps, messages_of, tmp_path):
+def test_recovery_keeps_types_qos_and_times(swinging, stamps, tmp_path):
     with BagWriter(tmp_path / 'bag') as writer:
         writer.add_topic('/robot_description', STRING, qos=[LATCHED])
         writer.write('/robot_description', string_cdr('<robot/>'), 5000, 4000)
@@ -257,8 +257,10 @@ def test_recovery_refuses_what_it_cannot_do(swinging, tmp_path):
     write_recording(tmp_path / 'bag', swinging)
     with BagWriter(tmp_path / 'empty') as writer:
         writer.add_topic('/chatter', STRING)
+    (tmp_path / 'run.bag').write_text('no bag of ROS 1')
     for source, out, fact in (
         (tmp_path / 'bag' / 'bag_0.mcap', tmp_path / 'bag', 'bag: '),
+        (tmp_path / 'run.bag', tmp_path / 'out', r'run\.bag: '),
         (tmp_path / 'absent', tmp_path / 'out', 'absent: '),
         (tmp_path, tmp_path / 'out', '.mcap'),
         (writer.file, tmp_path / 'out', 'empty_0.mcap: '),

@@ -10,20 +10,18 @@ import numpy as np
 import pytest
 from rosbags.typesys import get_typestore, Stores
 
-from .conftest import JOINTS, serialised
+from .conftest import assert_same, JOINTS, messages_of, serialised, swing
 
 
 @pytest.mark.parametrize('asked', [('elbow', 'wrist', 'shoulder'), ('wrist', 'elbow'), ('wrist',)])
 def test_joints_come_in_the_order_asked_and_others_are_passed_over(
-    swinging, stamps, write_bag, messages_of, assert_same, asked
+    swinging, stamps, write_bag, asked
 ):
     bag = write_bag(messages_of(swinging, stamps, ['wrist', 'shoulder', 'elbow']))
     assert_same(read_recording(bag, joints=asked), swinging, joints=asked)
 
 
-def test_where_joints_are_that_were_not_asked_for_is_kept(
-    swinging, stamps, write_bag, messages_of
-):
+def test_where_joints_are_that_were_not_asked_for_is_kept(swinging, stamps, write_bag):
     bag = write_bag(messages_of(swinging, stamps, ['wrist', 'shoulder', 'elbow']))
     others = read_recording(bag, joints=['elbow']).others
     assert [other.joint for other in others] == ['wrist', 'shoulder']
@@ -34,7 +32,7 @@ def test_where_joints_are_that_were_not_asked_for_is_kept(
 
 
 def test_an_order_and_a_layout_of_its_own_for_every_message_are_followed(
-    swinging, stamps, write_bag, assert_same
+    swinging, stamps, write_bag
 ):
     messages = []
     for at, stamp in enumerate(stamps.tolist()):
@@ -48,7 +46,7 @@ def test_an_order_and_a_layout_of_its_own_for_every_message_are_followed(
     assert recording.report.clean
 
 
-def test_big_endian_messages_are_read(swinging, stamps, write_bag, assert_same):
+def test_big_endian_messages_are_read(swinging, stamps, write_bag):
     store = get_typestore(Stores.ROS2_JAZZY)
     little = serialised(JOINTS, stamps, swinging.q, swinging.dq, swinging.tau)
     messages = []
@@ -59,9 +57,7 @@ def test_big_endian_messages_are_read(swinging, stamps, write_bag, assert_same):
     assert_same(read_recording(write_bag(messages), joints=JOINTS), swinging)
 
 
-def test_two_halves_with_equal_stamps_are_put_together_exactly(
-    swinging, stamps, write_bag, messages_of, assert_same
-):
+def test_two_halves_with_equal_stamps_are_put_together_exactly(swinging, stamps, write_bag):
     upper = messages_of(swinging, stamps, ['shoulder'])
     lower = messages_of(swinging, stamps, ['wrist', 'elbow'], log=stamps + 5000)
     messages = [message for pair in zip(upper, lower, strict=True) for message in pair]
@@ -72,9 +68,9 @@ def test_two_halves_with_equal_stamps_are_put_together_exactly(
     assert recording.report.duplicates == 0
 
 
-def test_two_halves_with_other_stamps_are_interpolated(make_swing, write_bag, messages_of):
-    fast = make_swing(2000, period_ns=1_000_000)
-    slow = make_swing(400, period_ns=5_000_000)
+def test_two_halves_with_other_stamps_are_interpolated(write_bag):
+    fast = swing(2000, period_ns=1_000_000)
+    slow = swing(400, period_ns=5_000_000)
     fast_stamps = fast.start_ns + 1_000_000 * np.arange(2000)
     slow_stamps = slow.start_ns + 5_000_000 * np.arange(400)
     messages = messages_of(fast, fast_stamps, ['shoulder', 'elbow'])
@@ -90,9 +86,7 @@ def test_two_halves_with_other_stamps_are_interpolated(make_swing, write_bag, me
     assert abs(recording.q[:, 2] - fast.q[:1996, 2]).max() <= bound
 
 
-def test_nothing_is_interpolated_over_a_gap_of_one_half(
-    swinging, stamps, write_bag, messages_of, assert_same
-):
+def test_nothing_is_interpolated_over_a_gap_of_one_half(swinging, stamps, write_bag):
     upper = messages_of(swinging, stamps, ['shoulder', 'elbow'])
     lower = messages_of(swinging, stamps, ['wrist'])
     del lower[100:200]
@@ -105,7 +99,7 @@ def test_nothing_is_interpolated_over_a_gap_of_one_half(
     assert recording.report.gaps[0].length == pytest.approx(0.101)
 
 
-def test_repeated_messages_count_once(swinging, stamps, write_bag, messages_of, assert_same):
+def test_repeated_messages_count_once(swinging, stamps, write_bag):
     messages = messages_of(swinging, stamps)
     doubled = [message for message in messages for _ in range(2)]
     recording = read_recording(write_bag(doubled), joints=JOINTS)
@@ -114,9 +108,7 @@ def test_repeated_messages_count_once(swinging, stamps, write_bag, messages_of, 
     assert recording.report.duplicates == len(swinging)
 
 
-def test_gaps_are_reported_with_place_and_length(
-    swinging, stamps, write_bag, messages_of, assert_same
-):
+def test_gaps_are_reported_with_place_and_length(swinging, stamps, write_bag):
     messages = messages_of(swinging, stamps)
     del messages[300:400], messages[50:52]
     recording = read_recording(write_bag(messages), joints=JOINTS)
@@ -128,9 +120,7 @@ def test_gaps_are_reported_with_place_and_length(
 
 @pytest.mark.parametrize('quantity', ['q', 'dq', 'tau'])
 @pytest.mark.parametrize('value', [np.nan, np.inf])
-def test_samples_that_are_not_finite_are_dropped(
-    swinging, stamps, write_bag, messages_of, assert_same, quantity, value
-):
+def test_samples_that_are_not_finite_are_dropped(swinging, stamps, write_bag, quantity, value):
     array = getattr(swinging, quantity).copy()
     array[[0, 20, 21, 499], 1] = value
     bag = write_bag(messages_of(swinging, stamps, **{quantity: array}))
@@ -142,7 +132,7 @@ def test_samples_that_are_not_finite_are_dropped(
     assert JOINTS[1] in lacking
 
 
-def test_many_samples_that_are_not_finite_are_refused(swinging, stamps, write_bag, messages_of):
+def test_many_samples_that_are_not_finite_are_refused(swinging, stamps, write_bag):
     tau = swinging.tau.copy()
     tau[100:300, 2] = np.nan
     bag = write_bag(messages_of(swinging, stamps, tau=tau))
@@ -151,7 +141,7 @@ def test_many_samples_that_are_not_finite_are_refused(swinging, stamps, write_ba
     assert len(read_recording(bag, joints=['shoulder', 'elbow'])) == 500
 
 
-def test_a_quantity_never_filled_in_is_absent(swinging, stamps, write_bag, messages_of):
+def test_a_quantity_never_filled_in_is_absent(swinging, stamps, write_bag):
     dq = swinging.dq.copy()
     dq[:, 1] = np.nan
     bag = write_bag(messages_of(swinging, stamps, dq=dq, tau=None))
@@ -174,7 +164,7 @@ def test_a_quantity_never_filled_in_is_absent(swinging, stamps, write_bag, messa
     ],
 )
 def test_headers_without_a_believable_clock_give_way_to_the_time_of_reception(
-    swinging, stamps, write_bag, messages_of, assert_same, header, why
+    swinging, stamps, write_bag, header, why
 ):
     bag = write_bag(messages_of(swinging, header(stamps), log=stamps))
     recording = read_recording(bag, joints=JOINTS)
@@ -183,9 +173,7 @@ def test_headers_without_a_believable_clock_give_way_to_the_time_of_reception(
     assert why in recording.report.clock_note
 
 
-def test_simulated_time_faster_than_the_clock_on_the_wall_is_believed(
-    swinging, stamps, write_bag, messages_of, assert_same
-):
+def test_simulated_time_faster_than_the_clock_on_the_wall_is_believed(swinging, stamps, write_bag):
     received = stamps[0] + (stamps - stamps[0]) // 20
     bag = write_bag(messages_of(swinging, stamps - stamps[0] + 10**9, log=received))
     recording = read_recording(bag, joints=JOINTS)
@@ -193,22 +181,7 @@ def test_simulated_time_faster_than_the_clock_on_the_wall_is_believed(
     assert recording.clock == 'header'
 
 
-def test_of_a_simulation_that_was_reset_the_longest_run_is_read(
-    make_swing, write_bag, messages_of, assert_same
-):
-    whole = make_swing(3000)
-    stamps = 10**9 + 1_000_000 * np.arange(3000)
-    first = messages_of(whole, stamps, log=stamps)[:1500]
-    again = messages_of(whole, stamps, log=stamps + 10**10)
-    recording = read_recording(write_bag(first + again), joints=JOINTS)
-    assert_same(recording, whole)
-    assert recording.report.restarted == 1500
-    assert recording.clock == 'header'
-
-
-def test_malformed_messages_are_dropped_and_counted(
-    swinging, stamps, write_bag, messages_of, assert_same
-):
+def test_malformed_messages_are_dropped_and_counted(swinging, stamps, write_bag):
     store = get_typestore(Stores.ROS2_JAZZY)
     messages = messages_of(swinging, stamps)
     topic, good, _ = messages[0]
@@ -231,16 +204,14 @@ def test_a_joint_the_topic_does_not_name_is_refused_with_those_it_names(swinging
         read_recording(tmp_path / 'bag', joints=['elbow', 'elbo', 'hip'])
 
 
-def test_an_only_topic_needs_no_name_and_names_may_be_relative(swinging, tmp_path, assert_same):
+def test_an_only_topic_needs_no_name_and_names_may_be_relative(swinging, tmp_path):
     write_recording(tmp_path / 'bag', swinging, topic='/arm/states')
     for topic in (None, 'arm/states', '/arm/states'):
         assert_same(read_recording(tmp_path / 'bag', joints=JOINTS, topic=topic), swinging)
 
 
-def test_of_several_topics_the_one_that_names_all_joints_is_read(
-    swinging, make_swing, stamps, write_bag, messages_of, assert_same
-):
-    gripper = make_swing(joints=('finger', 'elbow'))
+def test_of_several_topics_the_one_that_names_all_joints_is_read(swinging, stamps, write_bag):
+    gripper = swing(joints=('finger', 'elbow'))
     messages = messages_of(swinging, stamps, topic='/arm')
     messages += messages_of(gripper, stamps, topic='/gripper')
     bag = write_bag(messages)
@@ -254,15 +225,13 @@ def test_of_several_topics_the_one_that_names_all_joints_is_read(
     )
 
 
-def test_joint_states_is_preferred_to_what_is_computed_from_it(
-    swinging, stamps, write_bag, messages_of
-):
+def test_joint_states_is_preferred_to_what_is_computed_from_it(swinging, stamps, write_bag):
     topics = ('/online_identifier/residual', '/joint_states', '/online_identifier/predicted')
     bag = write_bag([m for topic in topics for m in messages_of(swinging, stamps, topic=topic)])
     assert read_recording(bag, joints=JOINTS).topic == '/joint_states'
 
 
-def test_a_wrong_topic_is_refused_with_those_there_are(swinging, stamps, write_bag, messages_of):
+def test_a_wrong_topic_is_refused_with_those_there_are(swinging, stamps, write_bag):
     bag = write_bag(messages_of(swinging, stamps))
     with pytest.raises(RecordingError, match=r'/joint,.*/joint_states.*500'):
         read_recording(bag, joints=JOINTS, topic='/joint')
@@ -273,38 +242,25 @@ def test_a_wrong_topic_is_refused_with_those_there_are(swinging, stamps, write_b
         read_recording(other, joints=JOINTS)
 
 
-def with_other_bytes(recording, stamps, messages_of):
-    """Return messages in another encapsulation than CDR."""
-    return [
-        (topic, b'\x00\x07' + cdr[2:], at) for topic, cdr, at in messages_of(recording, stamps)
-    ]
-
-
-def without_positions(recording, stamps, messages_of):
-    return messages_of(recording, stamps, q=None)
-
-
-def without_any_clock(recording, stamps, messages_of):
-    return messages_of(recording, 0 * stamps, log=0 * stamps)
-
-
-def of_one_message(recording, stamps, messages_of):
-    return messages_of(recording, stamps)[:1]
-
-
 @pytest.mark.parametrize(
     ('made', 'fact'),
     [
-        (with_other_bytes, '/joint_states.*00 07'),
-        (without_positions, '/joint_states.*position'),
-        (without_any_clock, 'time.*zero'),
-        (of_one_message, '1 samples'),
+        (
+            lambda run, stamps: [
+                (topic, b'\x00\x07' + cdr[2:], at) for topic, cdr, at in messages_of(run, stamps)
+            ],
+            '/joint_states.*00 07',
+        ),
+        (lambda run, stamps: messages_of(run, stamps, q=None), '/joint_states.*position'),
+        (lambda run, stamps: messages_of(run, 0 * stamps, log=0 * stamps), 'time.*zero'),
+        (lambda run, stamps: messages_of(run, stamps)[:1], '1 samples'),
     ],
+    ids=['another encapsulation', 'no positions', 'no clock', 'one message'],
 )
 def test_a_bag_without_motion_is_refused_with_what_it_lacks(
-    swinging, stamps, write_bag, messages_of, made, fact
+    swinging, stamps, write_bag, made, fact
 ):
-    bag = write_bag(made(swinging, stamps, messages_of))
+    bag = write_bag(made(swinging, stamps))
     with pytest.raises(RecordingError, match=f'bag: .*{fact}'):
         read_recording(bag, joints=JOINTS)
 
@@ -316,23 +272,28 @@ def test_joints_asked_for_must_differ(swinging, tmp_path):
             read_recording(tmp_path / 'bag', joints=joints)
 
 
-@pytest.mark.parametrize('back_ns', [30_000_000, 999_000_000])
-def test_a_clock_set_back_by_less_than_a_second_is_a_restart(
-    make_swing, write_bag, messages_of, assert_same, back_ns
+@pytest.mark.parametrize(
+    ('at', 'back_ns', 'kept'),
+    [
+        (1800, 30_000_000, slice(0, 1800)),
+        (1800, 999_000_000, slice(0, 1800)),
+        (1200, 10**12, slice(1200, 3000)),  # a simulation that was reset
+    ],
+)
+def test_of_a_recording_whose_clock_was_set_back_the_longest_run_is_read(
+    write_bag, at, back_ns, kept
 ):
     """Sorted in, the arm would be in two places at once."""
-    whole = make_swing(3000)
-    log = 10**12 + 1_000_000 * np.arange(3000)
-    header = log - np.where(np.arange(3000) < 1800, 0, back_ns)
+    whole = swing(3000)
+    log = 10**13 + 1_000_000 * np.arange(3000)
+    header = log - np.where(np.arange(3000) < at, 0, back_ns)
     recording = read_recording(write_bag(messages_of(whole, header, log=log)), joints=JOINTS)
-    assert recording.report.restarted == 1200
-    assert recording.report.out_of_order == 0
-    assert_same(recording, whole, slice(0, 1800))
+    assert (recording.report.restarted, recording.report.out_of_order) == (1200, 0)
+    assert recording.clock == 'header'
+    assert_same(recording, whole, kept)
 
 
-def test_messages_that_a_queue_held_back_are_late_and_no_restart(
-    swinging, stamps, write_bag, messages_of, assert_same
-):
+def test_messages_that_a_queue_held_back_are_late_and_no_restart(swinging, stamps, write_bag):
     messages = messages_of(swinging, stamps)
     held = [*messages[:100], *messages[150:200], *messages[100:150], *messages[200:]]
     recording = read_recording(write_bag(held), joints=JOINTS)
@@ -343,9 +304,7 @@ def test_messages_that_a_queue_held_back_are_late_and_no_restart(
 
 @pytest.mark.parametrize('off', [-(10**18), 50 * 10**9])
 @pytest.mark.parametrize('at', [[0], [200, 201], [499]])
-def test_a_stamp_that_fits_no_other_costs_its_message_alone(
-    swinging, stamps, write_bag, messages_of, off, at
-):
+def test_a_stamp_that_fits_no_other_costs_its_message_alone(swinging, stamps, write_bag, off, at):
     rubbish = stamps.copy()
     rubbish[at] += off
     bag = write_bag(messages_of(swinging, rubbish, log=rubbish))

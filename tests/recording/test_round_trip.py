@@ -24,14 +24,12 @@ from rosbags.rosbag2 import Reader, StoragePlugin, Writer
 from rosbags.rosbag2.enums import CompressionFormat, CompressionMode
 from rosbags.typesys import get_typestore, Stores
 
-from .conftest import serialised
+from .conftest import assert_same, serialised, swing
 
 
 @pytest.mark.parametrize('compression', ['zstd', 'lz4', 'none'])
 @pytest.mark.parametrize('chunk_size', [1, 4096, 1 << 20])
-def test_what_is_written_is_read_back_exactly(
-    swinging, tmp_path, assert_same, compression, chunk_size
-):
+def test_what_is_written_is_read_back_exactly(swinging, tmp_path, compression, chunk_size):
     write_recording(tmp_path / 'bag', swinging, compression=compression, chunk_size=chunk_size)
     back = read_recording(tmp_path / 'bag', joints=swinging.joints)
     assert_same(back, swinging)
@@ -91,7 +89,7 @@ def test_mcap_ros2_reads_what_is_written_by_its_own_schema(swinging, tmp_path, s
     + [(StoragePlugin.SQLITE3, m) for m in CompressionMode if m is not CompressionMode.STORAGE],
 )
 def test_what_rosbags_writes_is_read(
-    swinging, tmp_path, stamps, assert_same, version, distribution, storage, mode
+    swinging, tmp_path, stamps, version, distribution, storage, mode
 ):
     store = get_typestore(distribution)
     writer = Writer(tmp_path / 'bag', version=version, storage_plugin=storage)
@@ -156,8 +154,8 @@ def test_a_recording_of_no_samples_is_a_bag_that_says_so(tmp_path):
 
 
 @pytest.fixture
-def monday(make_swing):
-    return replace(make_swing(), source='monday')
+def monday():
+    return replace(swing(), source='monday')
 
 
 def test_a_copy_is_said_with_what_it_is_a_copy_of(monday):

@@ -122,18 +122,6 @@ def test_two_columns_of_one_name_are_refused_where_they_differ(tmp_path, columns
             assert 'effort' not in plan(open_table(path), ColumnSettings()).missing
 
 
-def test_what_is_not_read_is_listed_with_the_words_in_it(tmp_path):
-    text = 't,mode,q1,q2,heat[0],heat[1],eff1,eff2\n'
-    text += ''.join(f'{0.01 * k},run,{k},{k},20,21,{k},{k}\n' for k in range(50))
-    (tmp_path / 'run.csv').write_text(text)
-    (line,) = (
-        one
-        for one in plan(open_table(tmp_path / 'run.csv'), ColumnSettings()).lines()
-        if 'not read' in one
-    )
-    assert all(fact in line for fact in ('heat[0]', 'heat[1]', 'mode', 'run'))
-
-
 @pytest.mark.parametrize('word', ['eff', 'torque', 'tau', 'cur', 'i', 'load'])
 def test_abbreviations_of_efforts_are_known(tmp_path, word):
     text = f't,q1,q2,{word}_J1,{word}_J2\n'

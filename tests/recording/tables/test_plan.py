@@ -67,12 +67,6 @@ def test_currents_are_said_to_be_no_torques_until_a_gain_is_given():
     np.testing.assert_allclose(converted(settled).tau[-1], [3 * 11.2, -4 * 5.0])
 
 
-def test_degrees_are_those_of_joints_that_turn():
-    columns = ramps('q1', 'q2')
-    recording = converted(plan(columns, ColumnSettings(degrees=True), JOINTS, [True, False]))
-    np.testing.assert_allclose(recording.q[-1], [1.0, np.radians(2.0)])
-
-
 def test_elements_of_a_state_vector_are_told_apart_by_their_endings():
     """As LeRobot names them; what was commanded stands beside what was measured."""
     names = [f'{joint}.{kind}' for joint in JOINTS for kind in ('pos', 'vel', 'torque')]
