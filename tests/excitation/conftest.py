@@ -8,6 +8,12 @@ from armid_ros.excitation import DesignSettings
 from armid_ros.robots import collision_model, robot_from_urdf
 import pytest
 
+#: Joints of an arm of two links, as `urdf` takes them.
+TWO_LINKS = (
+    ('shoulder', 'revolute', 'base', 'upper', '0 0 0.5', '0 1 0', -2.5, 2.5, 60),
+    ('elbow', 'revolute', 'upper', 'lower', '0 0 0.4', '1 0 0', -2.5, 2.5, 30),
+)
+
 
 def urdf(*joints, name='small'):
     """Write a URDF of (name, kind, parent, child, xyz, axis, lower, upper, effort) joints."""
@@ -23,6 +29,14 @@ def urdf(*joints, name='small'):
             f'<limit lower="{lower}" upper="{upper}" velocity="2" effort="{effort}"/></joint>'
         )
     return f'<robot name="{name}">{"".join(parts)}</robot>'
+
+
+def with_effects(robot, *names):
+    """Return an arm with effects, without their values."""
+    arm = ArmModel(robot)
+    for name in names:
+        arm = arm.with_effect(make_effect(name, robot))
+    return arm
 
 
 @pytest.fixture(scope='session')
@@ -41,29 +55,11 @@ def tree():
 @pytest.fixture(scope='session')
 def two_link():
     """Return a robot with two joints."""
-    return robot_from_urdf(
-        urdf(
-            ('shoulder', 'revolute', 'base', 'upper', '0 0 0.5', '0 1 0', -2.5, 2.5, 60),
-            ('elbow', 'revolute', 'upper', 'lower', '0 0 0.4', '1 0 0', -2.5, 2.5, 30),
-        )
-    )
+    return robot_from_urdf(urdf(*TWO_LINKS))
 
 
 @pytest.fixture(scope='session')
-def with_effects():
-    """Return a function that makes an arm of a robot and names of effects."""
-
-    def build(robot, *names):
-        arm = ArmModel(robot)
-        for name in names:
-            arm = arm.with_effect(make_effect(name, robot))
-        return arm
-
-    return build
-
-
-@pytest.fixture(scope='session')
-def two_link_arm(two_link, with_effects):
+def two_link_arm(two_link):
     """Return the two-link arm with friction."""
     return with_effects(two_link, 'viscous_friction', 'coulomb_friction')
 

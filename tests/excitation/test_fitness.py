@@ -12,23 +12,19 @@ from armid_ros.robots import collision_model, robot_from_urdf
 import numpy as np
 import pytest
 
-from .conftest import urdf
+from .conftest import TWO_LINKS, urdf
 
-JOINTS = (
-    ('shoulder', 'revolute', 'base', 'upper', '0 0 0.5', '0 1 0', -2.5, 2.5, 60),
-    ('elbow', 'revolute', 'upper', 'lower', '0 0 0.4', '1 0 0', -2.5, 2.5, 30),
-)
 GROUND = Floor(0.0, np.array([0.0, 0.0, 1.0]), 'base plane')
 PLANE = (Obstacle('floor', 'plane'),)
 
 
 def unchecked(text=None, floor=GROUND, obstacles=PLANE, **limits):
-    robot = replace(robot_from_urdf(text or urdf(*JOINTS)), **limits)
+    robot = replace(robot_from_urdf(text or urdf(*TWO_LINKS)), **limits)
     return CollisionScene(collision_model(robot), floor, obstacles, 0.01).unchecked
 
 
 def without(tag):
-    return re.sub(f'<{tag}>.*?</{tag}>', '', urdf(*JOINTS), count=1)
+    return re.sub(f'<{tag}>.*?</{tag}>', '', urdf(*TWO_LINKS), count=1)
 
 
 MESH = '<mesh filename="nowhere/link.stl"/>'
@@ -45,13 +41,13 @@ CASES = {
         'environment.*plane',
     ),
     'mesh': (
-        {'text': urdf(*JOINTS).replace('<cylinder radius="0.04" length="0.3"/>', MESH, 1)},
+        {'text': urdf(*TWO_LINKS).replace('<cylinder radius="0.04" length="0.3"/>', MESH, 1)},
         'upper.*mesh',
     ),
     'collision': ({'text': without('collision')}, 'upper.*collision'),
     'a link fixed to a body': (
         {
-            'text': urdf(*JOINTS).replace(
+            'text': urdf(*TWO_LINKS).replace(
                 '</robot>',
                 '<link name="tool"><inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1"/>'
                 '</inertial></link><joint name="flange" type="fixed"><parent link="lower"/>'
@@ -62,7 +58,7 @@ CASES = {
     ),
     'inertia': ({'text': without('inertial')}, 'upper.*inertia'),
     'position': (
-        {'text': urdf(*JOINTS).replace('lower="-2.5" upper="2.5"', '', 1)},
+        {'text': urdf(*TWO_LINKS).replace('lower="-2.5" upper="2.5"', '', 1)},
         'position of shoulder',
     ),
     'velocity': (
@@ -78,7 +74,7 @@ def test_of_a_whole_description_everything_is_checked():
 
 
 def test_a_joint_that_is_described_as_turning_without_end_needs_no_limit():
-    endless = urdf(*JOINTS).replace('type="revolute"', 'type="continuous"', 1)
+    endless = urdf(*TWO_LINKS).replace('type="revolute"', 'type="continuous"', 1)
     assert unchecked(endless) == ()
 
 
@@ -87,7 +83,7 @@ def test_what_is_missing_is_named_and_is_in_the_verdict(case):
     options, words = CASES[case]
     (found,) = unchecked(**options)
     assert re.search(words, found)
-    result = judged({'floor': GROUND, 'obstacles': PLANE, 'text': urdf(*JOINTS), **options})
+    result = judged({'floor': GROUND, 'obstacles': PLANE, 'text': urdf(*TWO_LINKS), **options})
     assert result.word == PARTLY and FIT not in str(result)
     assert found in str(result)
     assert result.remedy.startswith('Give ')
@@ -105,7 +101,7 @@ def judged(options):
 
 def swung(angle):
     """Look at an arm that swings down from zero to an angle of its shoulder."""
-    robot = robot_from_urdf(urdf(*JOINTS))
+    robot = robot_from_urdf(urdf(*TWO_LINKS))
     q = np.column_stack([np.linspace(0.0, angle, 50), np.zeros(50)])
     motion = Motion(robot.joints, np.linspace(0.0, 1.0, 50), q, 0.0 * q, 0.0 * q)
     scene = CollisionScene(collision_model(robot), GROUND, PLANE, 0.01)

@@ -14,6 +14,8 @@ from armid_ros.model import random_motion
 import numpy as np
 import pytest
 
+from .conftest import with_effects
+
 
 def central(function, x, direction, step=1e-6):
     """Differentiate along a direction."""
@@ -50,9 +52,7 @@ EFFECTS = {
         ('humanoid', ('payload', 'viscous_friction'), {'target': 'effects'}),
     ],
 )
-def test_gradient_of_each_criterion_effect_and_target(
-    request, with_effects, robot, effects, settings
-):
+def test_gradient_of_each_criterion_effect_and_target(request, robot, effects, settings):
     arm = with_effects(request.getfixturevalue(robot), *effects)
     settings = DesignSettings(period=5.0, harmonics=2, **settings)
     problem = DesignProblem.of(arm, settings, np.random.default_rng(3))
@@ -67,7 +67,7 @@ def test_gradient_of_a_subset_with_prior_information(two_link_arm):
     assert_gradient(Objective(problem, known), problem)
 
 
-def test_gradient_against_a_rival(two_link, with_effects):
+def test_gradient_against_a_rival(two_link):
     settings = DesignSettings(period=5.0, harmonics=2, criterion='T')
     arm = ArmModel(two_link).with_effect(make_effect('viscous_friction', two_link), [0.5, 0.2])
     rival = with_effects(two_link, 'coulomb_friction', 'torque_offset')
@@ -95,7 +95,7 @@ def assert_gradient(objective, problem):
         ('presliding_hysteresis', 'joint_spring', 'payload'),
     ],
 )
-def test_gradient_of_the_constraints(humanoid, humanoid_collision, with_effects, effects):
+def test_gradient_of_the_constraints(humanoid, humanoid_collision, effects):
     settings = DesignSettings(period=5.0, harmonics=2)
     arm = with_effects(humanoid, *effects)
     arm = replace(arm, values=tuple(v + 0.3 for v in arm.values))

@@ -21,8 +21,10 @@ import pytest
 
 from tests.clearance import path_clearance
 
+from .conftest import with_effects
 
-def test_random_trajectories_keep_every_limit(humanoid, humanoid_collision, with_effects):
+
+def test_random_trajectories_keep_every_limit(humanoid, humanoid_collision):
     arm, limits = with_effects(humanoid), Limits.of(humanoid)
     rng = np.random.default_rng(0)
     for _ in range(5):

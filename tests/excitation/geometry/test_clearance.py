@@ -34,7 +34,7 @@ def clearance(humanoid_collision):
 
 def test_an_obstacle_is_checked_against_the_moving_links_alone():
     """Of arms of any length: the list of bodies moves in memory as it grows."""
-    for count in (*range(1, 12), 31, 32, 33, 63, 64, 65):
+    for count in (1, 2, 3, 4, 7, 8, 9, 16, 17, 33):
         text = '<robot name="r">' + ''.join(
             f'<link name="l{k}"><collision><geometry><sphere radius="0.1"/></geometry></collision>'
             '</link>'
