@@ -47,8 +47,7 @@ from armid_ros.identification.fitting.least_squares import Estimator
 from armid_ros.identification.known_payload import corrected, drive_gains, DriveGains, payloads_of
 from armid_ros.identification.output import SCHEMA, with_digests
 from armid_ros.identification.parameters_file import parameters_of
-from armid_ros.identification.physical.fit_among_bodies import far_from_described
-from armid_ros.identification.rows.checks import check_held_out
+from armid_ros.identification.rows.checks import resting
 from armid_ros.identification.rows.temperature import friction_per_kelvin
 from armid_ros.recording import Recording, require_once
 from armid_ros.recording.curves import draw_joints
@@ -258,11 +257,9 @@ class IdentificationResult(ShownModel):
         if core.bodies_cost is not None:
             grows = f'(torque error {100.0 * max(core.bodies_cost, 0.0):.2g} % larger)'
             bodies = [f'physically consistent links fit worse {grows}; --physical fits them']
-            if self.exports:
+            if core.physical is not None:
                 bodies = [f'links are physically consistent {grows}; {", ".join(self.exports)}']
-                bodies += far_from_described(
-                    self.description.robot, core.arm.robot.rigid_parameters[::10]
-                )
+                bodies += core.physical.notes
         columns = joint_columns(core, self.description, held_out)
         return Summary(
             self.graded.reasons[0],
@@ -372,7 +369,8 @@ def identify(
         recordings_of(validate, model.robot),
     )
     require_once(training, held_out)
-    check_held_out(model.robot, held_out)
+    for recording in held_out:  # a recording without motion validates no model
+        resting(model.robot, recording.source, np.ptp(recording.q, axis=0))
     tick, source = progress or (lambda *_: None), np.random.default_rng(rng)
     known = PhysicalSettings() if physical is True else physical or None
     settings = IdentificationSettings(

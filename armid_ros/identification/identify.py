@@ -269,7 +269,7 @@ def identify(
         bodies = _fit_consistent_links(arm, theory, data, settings, rng)
         if bodies is not None and (settings.physical or bodies[3].cost <= 0.1):
             settings, theory, fit, _ = bodies
-            notes += bodies[3].sentences()
+            notes += (*bodies[3].constraint_notes, *bodies[3].notes)
         else:
             theory, fit = _fitted(arm, theory, data, settings, rng)
     if settings.method == 'iv':

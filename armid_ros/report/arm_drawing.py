@@ -30,16 +30,9 @@ _CIRCLE_CORNERS = 16
 OBSTACLE = 'var(--line)'
 #: Smallest size of a body that is drawn; links without a body have smaller ones [m].
 _MIN_SIZE = 1e-3
-
-
-def _view() -> FloatArray:
-    """Return the axes of the drawing as rows, (3, 3): right, up, towards the viewer."""
-    azimuth, elevation = np.radians(-55.0), np.radians(18.0)
-    (sa, ca), (se, ce) = ((np.sin(x), np.cos(x)) for x in (azimuth, elevation))
-    return np.array([[-sa, ca, 0.0], [-ca * se, -sa * se, ce], [ca * ce, sa * ce, se]])
-
-
-_VIEW = _view()
+#: Axes of the drawing, (3, 3): right, up, and towards the viewer, who is at an azimuth of -55 and
+#: an elevation of 18 degrees.
+_VIEW = pin.rpy.rpyToMatrix(np.radians(72.0), 0.0, np.radians(35.0)).T
 
 
 @dataclass(frozen=True)

@@ -34,7 +34,6 @@ from armid_ros.report.page import Page, Section
 from armid_ros.report.parameter_tables import (
     arm_facts,
     full_label,
-    not_as_described,
     parameter_section,
 )
 from armid_ros.report.provenance import DEFAULT_ORIGIN, ResultOrigin
@@ -88,7 +87,6 @@ def identification_report(
     shown = held_out or list(result.training)
     unusable = grade.word == 'unusable'
     beware, steps = judge(result, validation, recordings, verification, unusable)
-    findings = findings_of(result, verification)
     read = [
         (one, 'held-out', validation[one.source])
         if one.source in validation
@@ -100,7 +98,7 @@ def identification_report(
         VerdictSection(
             grade.word,
             TONES[grade.word],
-            (*grade.reasons, *_contradictions(result, description), *findings),
+            (*grade.reasons, *findings_of(result, description, verification)),
             beware,
             error_bars(described, training, validation, result.halves),
             ''.join(steps[:1]),
@@ -150,17 +148,6 @@ def parameter_sections(
         parameter_section(result.estimate, values, result.unidentified, links, name),
         *([_physical_section(result.physical, exports or {})] if result.physical else []),
     ]
-
-
-def _contradictions(result: Identification, description: ArmModel) -> list[str]:
-    """Return a sentence on how many inertial parameters differ from the URDF; [] if none."""
-    counts = not_as_described(result, description)
-    joints = [joint for joint, (differ, _) in counts.items() if differ]
-    differ, count = (sum(numbers) for numbers in zip(*counts.values(), strict=True))
-    return [
-        f'{differ} of {count} rigid-body parameters of the URDF are outside their 95 % intervals, '
-        f'at {", ".join(joints)}. Chance alone gives 5 %.'
-    ] * bool(joints)
 
 
 def _input_section(result: Identification, robot: str) -> ContentSection:

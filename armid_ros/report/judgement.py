@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 
+from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.estimate import name_in_words
 from armid_ros.identification import Fit, Identification, Score, Verification
@@ -13,7 +14,8 @@ from armid_ros.identification.assess.grade_limits import LIMITS
 from armid_ros.identification.fitting.identifiability import excludes_zero
 from armid_ros.recording import Recording
 from armid_ros.report.notation import counted, digits, plain, sentence
-from armid_ros.report.statistics import explained_shares, MIN_TREND_SHARE, Whiteness
+from armid_ros.report.parameter_tables import not_as_described
+from armid_ros.report.statistics import MIN_TREND_SHARE, trends_of, Whiteness
 import numpy as np
 
 #: Condition numbers: an excitation is good below the first (Presse and Gautier 1993), and weak
@@ -54,11 +56,6 @@ def judge(
     held_out = Score.of(fits) if fits else None
     worst = float(training.joint_relative_error_percent.max())
     misfits = unusable and worst > LIMITS.unusable  # more data do not help
-    # only active constraints and notes of a physical certificate
-    known = set()
-    if result.physical is not None:
-        given = result.physical
-        known = set(given.sentences()) - set(given.constraint_notes) - set(given.notes)
     findings: list[Caution] = [
         *(
             (f'{recording.source or "A recording"}: {recording.report.describe()}', '')
@@ -68,7 +65,7 @@ def judge(
         *_of_errors(result, training, held_out, misfits),
         *_of_residuals(result, fits or result.training),
         *([] if verification is None else _of_verification(verification, misfits)),
-        *((sentence(note), '') for note in result.notes if note not in known),
+        *((sentence(note), '') for note in result.notes),
     ]
     steps = [step for _, step in findings if step]
     if held_out is not None and not steps:
@@ -76,8 +73,18 @@ def judge(
     return tuple(text for text, _ in findings if text), tuple(dict.fromkeys(steps))
 
 
-def findings_of(result: Identification, verification: Verification | None) -> Iterator[str]:
-    """Yield sentences on identified parameters and on position errors in simulation."""
+def findings_of(
+    result: Identification, description: ArmModel, verification: Verification | None
+) -> Iterator[str]:
+    """Yield sentences on the identified parameters, and on the position error in simulation."""
+    unlike = not_as_described(result, description)
+    joints = [joint for joint, (differ, _) in unlike.items() if differ]
+    if joints:
+        differ, compared = (sum(numbers) for numbers in zip(*unlike.values(), strict=True))
+        yield (
+            f'{differ} of {compared} rigid-body parameters of the URDF are outside their 95 % '
+            f'intervals, at {", ".join(joints)}. Chance alone gives 5 %.'
+        )
     robot = result.arm.robot
     effects = [name_in_words(effect.name) for effect in result.arm.effects]
     time = sum(float(fit.motion.t[-1] - fit.motion.t[0]) for fit in result.training)
@@ -145,8 +152,8 @@ def residual_trends(joints: Sequence[str], fits: Sequence[Fit]) -> tuple[str, ..
     least = 100.0 * DiagnosisSettings.material
     matters = [(joint, name) for joint, name in enumerate(joints) if errors[joint] >= least]
     for joint, name in matters:
-        for key, share in explained_shares(fits, joint).items():
-            if share > MIN_TREND_SHARE:
+        for key, trend in trends_of(fits, joint).items():
+            if trend.share > MIN_TREND_SHARE:
                 depends.setdefault(key, []).append(name)
     parts = [
         f'{key} ({", ".join(names) if len(names) <= 3 else f"{len(names)} joints"})'

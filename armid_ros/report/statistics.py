@@ -25,6 +25,8 @@ import numpy as np
 
 #: Share of a joint's residual explained by one variable, above which the trend is reported.
 MIN_TREND_SHARE = 0.15
+#: Smallest number of samples for a trend.
+_MIN_SAMPLES = 20
 
 
 @dataclass(frozen=True)
@@ -34,27 +36,34 @@ class Trend:
 
     Attributes
     ----------
+    x, residual : ndarray, shape (N,)
+        The other quantity, and the residual.
     centre, mean : ndarray, shape (B,)
         Mean abscissa and mean residual of each bin, equally many samples in each.
     share : float
-        Share of the residual's variance that the means explain, 0 to 1.
+        Share of the residual's variance that the means explain, 0 to 1; 0 for too few samples.
 
     """
 
+    x: FloatArray
+    residual: FloatArray
     centre: FloatArray
     mean: FloatArray
     share: float
 
     @staticmethod
     def of(x: FloatArray, residual: FloatArray, bins: int = 20) -> Trend:
-        """Compute the mean of a residual (N,) in bins of a quantity x (N,)."""
+        """Return the mean of a residual, shape (N,), in bins of a quantity x, shape (N,)."""
+        if len(x) == 0:
+            return Trend(x, residual, x, x, 0.0)
         groups = np.array_split(np.argsort(x, kind='stable'), max(1, min(bins, len(x) // 25)))
         centre = np.array([x[group].mean() for group in groups])
         mean = np.array([residual[group].mean() for group in groups])
         sizes = np.array([len(group) for group in groups])
         total = float(np.sum((residual - residual.mean()) ** 2))
         between = float(np.sum(sizes * (mean - residual.mean()) ** 2))
-        return Trend(centre, mean, between / total if total > 0.0 else 0.0)
+        share = between / total if total > 0.0 and len(x) >= _MIN_SAMPLES else 0.0
+        return Trend(x, residual, centre, mean, share)
 
 
 @dataclass(frozen=True)
@@ -130,18 +139,20 @@ def residual_section(robot: Robot, fits: Sequence[Fit], role: str) -> ContentSec
         'held-out' or 'training'.
 
     """
-    shares = [list(explained_shares(fits, joint).values()) for joint in range(robot.n_joints)]
-    most = [max(own, default=0.0) for own in shares]
+    trends = [trends_of(fits, joint) for joint in range(robot.n_joints)]
+    most = [max(trend.share for trend in own.values()) for own in trends]
     rows: list[Cells] = []
     folds = []
     for joint in np.argsort(-np.array(most), kind='stable'):
-        name = robot.joints[joint]
+        name, own = robot.joints[joint], trends[joint].values()
         cells: Cells = [
-            TableCell(f'{100 * share:.0f} %', 'telling' if share > MIN_TREND_SHARE else '')
-            for share in shares[joint]
+            TableCell(
+                f'{100 * trend.share:.0f} %', 'telling' if trend.share > MIN_TREND_SHARE else ''
+            )
+            for trend in own
         ]
-        rows.append([name, *(cells or ('too few samples in motion', '', ''))])
-        residual, axes = residual_by_variable(fits, joint)
+        few = len(trends[joint]['speed'].x) < _MIN_SAMPLES
+        rows.append([name, *(('too few samples in motion', '', '') if few else cells)])
         torque, length = robot.torque_units[joint], robot.position_units[joint]
         labels = (
             f'speed [{length}/s]',
@@ -149,8 +160,8 @@ def residual_section(robot: Robot, fits: Sequence[Fit], role: str) -> ContentSec
             f'load: predicted torque [{torque}]',
         )
         charts = [
-            _cloud(x, residual, label, f'residual [{torque}]')
-            for x, label in zip(axes.values(), labels, strict=True)
+            _cloud(trend, label, f'residual [{torque}]')
+            for trend, label in zip(own, labels, strict=True)
         ]
         opened = most[joint] == max(most) or most[joint] > MIN_TREND_SHARE
         panels = Panels([('', '', [chart]) for chart in charts], three=True)
@@ -170,9 +181,9 @@ def residual_section(robot: Robot, fits: Sequence[Fit], role: str) -> ContentSec
     )
 
 
-def _cloud(x: FloatArray, residual: FloatArray, xlabel: str, ylabel: str) -> Chart:
-    """Return a chart of a residual over a variable, with its mean in bins."""
-    trend = Trend.of(x, residual)
+def _cloud(trend: Trend, xlabel: str, ylabel: str) -> Chart:
+    """Return a chart of a residual against a variable, with the mean residual in bins."""
+    x, residual = trend.x, trend.residual
     # largest number of points of a cloud
     chosen = np.unique(np.linspace(0, max(len(x) - 1, 0), min(500, len(x))).astype(np.intp))
     abscissa = np.concatenate([x[chosen], trend.centre])
@@ -216,10 +227,8 @@ def whiteness_section(robot: Robot, fits: Sequence[Fit], role: str) -> ContentSe
     return ContentSection('Whiteness', [Paragraph(text), Panels(panels, three=True)])
 
 
-def residual_by_variable(
-    fits: Sequence[Fit], joint: int
-) -> tuple[FloatArray, dict[str, FloatArray]]:
-    """Return a joint's residual (N,), and its speed, position and predicted torque by name."""
+def trends_of(fits: Sequence[Fit], joint: int) -> dict[str, Trend]:
+    """Return the trend of a joint's residual with its speed, position and predicted torque."""
     used = np.concatenate([fit.informative[:, joint] for fit in fits])
     parts = {
         'speed': [fit.motion.dq for fit in fits],
@@ -227,13 +236,6 @@ def residual_by_variable(
         'load': [fit.predicted for fit in fits],
     }
     residual = np.concatenate([fit.residual[:, joint] for fit in fits])[used]
-    return residual, {key: np.concatenate(own)[used, joint] for key, own in parts.items()}
-
-
-def explained_shares(fits: Sequence[Fit], joint: int) -> dict[str, float]:
-    """Return which share of a joint's residual each of speed, position and load explains."""
-    residual, axes = residual_by_variable(fits, joint)
-    # smallest number of samples for a trend
-    if len(residual) < 20:
-        return {}
-    return {name: Trend.of(x, residual).share for name, x in axes.items()}
+    return {
+        key: Trend.of(np.concatenate(own)[used, joint], residual) for key, own in parts.items()
+    }

@@ -12,7 +12,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import product
 
 from armid_ros.identification.assess.grade_limits import FREEDOM, LIMITS
 from armid_ros.identification.fitting.identifiability import near_deviation
@@ -22,6 +21,7 @@ from armid_ros.model import inverse_dynamics, regressor
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.robots import Robot
 import numpy as np
+from scipy.optimize import nnls
 from scipy.stats import t as student
 
 #: Number of columns of each joint: offset, viscous and Coulomb friction, drive inertia.
@@ -104,10 +104,13 @@ def prediction_error(robot: Robot, motion: Motion, *, near: bool) -> PredictionE
     assert motion.tau is not None
     scale, (own, weight) = root_mean_square(motion.tau), _friction_columns(motion)
     if not near:
-        target_torque = (motion.tau - inverse_dynamics(robot, motion)) / scale * weight
-        residual = target_torque - np.einsum(
-            'rja,ja->rj', own, _nonnegative_fit(own, target_torque)
-        )
+        residual = (motion.tau - inverse_dynamics(robot, motion)) / scale * weight
+        # an offset is the difference of two nonnegative values
+        columns = np.concatenate([-own[:, :, :1], own], axis=2)
+        prior = LIMITS.floor * np.eye(columns.shape[2])
+        for joint, rows in enumerate(columns.transpose(1, 0, 2)):
+            target = np.append(residual[:, joint], np.zeros(len(prior)))
+            residual[:, joint] -= rows @ nnls(np.concatenate([rows, prior]), target)[0]
         return PredictionError(np.sqrt(np.mean(residual**2, axis=0)), scale)
     (count, n), joints = motion.q.shape, np.arange(motion.n_joints)
     body = regressor(robot, motion)
@@ -128,25 +131,6 @@ def prediction_error(robot: Robot, motion: Motion, *, near: bool) -> PredictionE
     residual = target_torque - (stacked @ values).reshape(target_torque.shape)
     off = float(np.sum(values[:bodies] ** 2)) * FREEDOM / count
     return PredictionError(np.sqrt(np.mean(residual**2, axis=0)), scale, off)
-
-
-def _nonnegative_fit(own: FloatArray, target_torque: FloatArray) -> FloatArray:
-    """
-    Fit each joint's friction and drive inertia (nonnegative) and torque offset to torques.
-
-    The columns of each joint have shape (N, n, 4), the torques (N, n) and the values (n, 4). The
-    joints are independent. The best feasible solution of eight sets of active bounds is used.
-
-    """
-    normal = np.einsum('rja,rjb->jab', own, own) + LIMITS.floor**2 * np.eye(_N_OWN)
-    aim = np.einsum('rja,rj->ja', own, target_torque)
-    free = np.array([(True, *some) for some in product((True, False), repeat=_N_OWN - 1)])
-    both = free[:, np.newaxis, :, np.newaxis] & free[:, np.newaxis, np.newaxis, :]
-    held = aim * free[:, np.newaxis]
-    values = np.linalg.solve(np.where(both, normal, np.eye(_N_OWN)), held[..., np.newaxis])[..., 0]
-    feasible = np.all(values[:, :, 1:] >= 0.0, axis=2)
-    explained = np.where(feasible, np.sum(values * aim, axis=2), -np.inf)
-    return np.asarray(values[np.argmax(explained, axis=0), np.arange(len(aim))])
 
 
 def common_values(motion: Motion, fixed: FloatArray, columns: FloatArray) -> FloatArray:

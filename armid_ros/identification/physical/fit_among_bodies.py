@@ -104,7 +104,7 @@ class PhysicalCertificate:
     misfit_ratio : float
         Weighted error on the training data, relative to the unconstrained fit's.
     notes : tuple of str
-        Assumptions on links without a body in the description.
+        Assumptions on links without a body in the description, and masses far from described.
     at_mass : tuple of str
         Links at the lower or upper limit of their mass.
 
@@ -170,21 +170,6 @@ class PhysicalCertificate:
             names = ', '.join(f'{p.words} of {p.joint}' for p in self.at_bound)
             notes.append(f'parameters at their bounds: {names}')
         return tuple(notes)
-
-    def sentences(self) -> tuple[str, ...]:
-        """Return sentences on consistency, cost of the constraints, and assumptions."""
-        least = min(self.links, key=lambda link: float(link.eigenvalues[0]))
-        verdict = 'every link is' if self.consistent else 'not every link is'
-        return (
-            f'{verdict} physically consistent: the smallest eigenvalue of a pseudo-inertia is '
-            f'{least.eigenvalues[0]:.3g} ({least.link})',
-            'the physical constraints change the torque error by '
-            f'{100.0 * (self.misfit_ratio - 1.0):+.2f} % on the training data and by '
-            f'{100.0 * (self.held_out_ratio - 1.0):+.2f} % on held-out blocks; weight of the '
-            f'description {self.weight:g}',
-            *(self.constraint_notes or ('no constraint is active',)),
-            *self.notes,
-        )
 
     def document(self) -> dict[str, Any]:
         """Return the certificate in the form of identification.json."""
@@ -315,7 +300,7 @@ def _fit_links(
         weight=weight,
         tried=tried,
         misfit_ratio=max(_misfit(whole, values) / least, 1.0),
-        notes=(*notes, *far_from_described(arm.robot, rigid[:, 0])),
+        notes=(*notes, *_far_from_described(arm.robot, rigid[:, 0])),
         at_mass=tuple(arm.robot.links[k] for k in np.flatnonzero(off)),
     )
     predicted = tuple(part.torque(values) for part in problem)
@@ -332,8 +317,8 @@ def _walls_reached(parameters: FloatArray, box: Box) -> list[str]:
     return [wall for wall, at in zip(walls, near, strict=True) if at]
 
 
-def far_from_described(robot: Robot, masses: FloatArray) -> tuple[str, ...]:
-    """Return a note on links whose fitted mass (n,) [kg] is far from the described mass."""
+def _far_from_described(robot: Robot, masses: FloatArray) -> tuple[str, ...]:
+    """Return a note on links whose mass, (n,) [kg], is far from that described; empty if none."""
     # ratio of a mass to the described one above which a note is given
     heavy = 3.0
     described = robot.rigid_parameters[::PER_LINK]

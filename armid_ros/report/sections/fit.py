@@ -46,22 +46,23 @@ def error_bars(robot: Robot, training: Fits, validation: Fits, halves: Score) ->
     predicted by the fit to the other half.
 
     """
-
-    def errors(fits: Fits) -> FloatArray:
-        return Score.of([f for part in fits.values() for f in part]).joint_relative_error_percent
-
-    test = errors(validation) if validation else halves.joint_relative_error_percent
-    label = 'torque error in a cross-check: each half of the data predicted from the other'
-    if validation:
-        label = 'torque error on recordings not used for the fit'
-    shown: list[tuple[Role, str, FloatArray]] = [
-        ('after', label, test),
-        ('faint', 'torque error on the recordings of the fit', errors(training)),
+    fitted, held_out = (
+        [fit for part in fits.values() for fit in part] for fits in (training, validation)
+    )
+    test, label = halves, 'in a cross-check: each half of the data predicted from the other'
+    if held_out:
+        test, label = Score.of(held_out), 'on recordings not used for the fit'
+    shown: list[tuple[Role, str, Score]] = [
+        ('after', f'torque error {label}', test),
+        ('faint', 'torque error on the recordings of the fit', Score.of(fitted)),
     ]
     rows = []
-    for joint in np.argsort(-test):
-        pairs = [(role, float(each[joint])) for role, _, each in shown]
-        bars = [Bar(error, role, f'{digits(error)} %') for role, error in pairs]
+    for joint in np.argsort(-test.joint_relative_error_percent):
+        errors = [float(score.joint_relative_error_percent[joint]) for *_, score in shown]
+        bars = [
+            Bar(error, role, f'{digits(error)} %')
+            for error, (role, *_) in zip(errors, shown, strict=True)
+        ]
         rows.append((robot.joints[joint], bars))
     return BarChart(rows, [(role, label) for role, label, _ in shown])
 
