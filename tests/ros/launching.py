@@ -67,6 +67,7 @@ class Node:
         name,
         namespace,
         parameters,
+        ros_arguments=(),
         remappings=(),
         output='log',
         on_exit=None,
@@ -74,11 +75,14 @@ class Node:
         self.package, self.executable, self.name = package, executable, name
         self.namespace, self.remappings = '/' + namespace.strip('/'), list(remappings)
         self.parameters, self.on_exit = [evaluated(p) for p in parameters], on_exit
+        self.ros_arguments = list(ros_arguments)
+        pairs = [word.split(':=', 1) for word in self.ros_arguments[1::2]]
+        self.defaults = {key: yaml.safe_load(text) for key, text in pairs}
         self.execute = lambda context: []
 
     def arguments(self, folder):
         """Write the parameter files, and return the ROS arguments in order; node.py, execute."""
-        words = ['-r', f'__node:={self.name}', '-r', f'__ns:={self.namespace}']
+        words = ['--ros-args', '-r', f'__node:={self.name}', '-r', f'__ns:={self.namespace}']
         for number, given in enumerate(self.parameters):
             if isinstance(given, dict):
                 # node.py, _create_params_file_from_dict: the full name, as both parts are given
@@ -87,7 +91,7 @@ class Node:
             words += ['--params-file', str(given)]
         for pair in self.remappings:
             words += ['-r', ':='.join(pair)]
-        return ['--ros-args', *words]
+        return ['--ros-args', *self.ros_arguments, *words]  # node.py, __init__
 
 
 def evaluated(given):

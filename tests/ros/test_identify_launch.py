@@ -32,7 +32,7 @@ def identify(**arguments):
 
 def parameters(node):
     """Return what a node gets in the end."""
-    found = {}
+    found = dict(node.defaults)
     for given in node.parameters:
         if isinstance(given, str):
             content = yaml.safe_load(Path(given).read_text())
@@ -74,7 +74,7 @@ def test_the_arm_begins_when_the_node_asks_and_all_end_with_it(tmp_path):
         'arm.urdf',
     )
     assert nodes['identification_run'].on_exit
-    assert nodes['excitation_publisher'].parameters[1] == str(CONFIG)
+    assert nodes['excitation_publisher'].parameters[0] == str(CONFIG)
     remapped = dict(nodes['excitation_publisher'].remappings)
     assert remapped['joint_trajectory'] == 'jtc/joint_trajectory'
 

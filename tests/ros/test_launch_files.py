@@ -2,16 +2,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """Launch files: what an argument says overrules the parameter file, and nothing else does."""
 
-from pathlib import Path
-
 from armid_ros.nodes.parameters.table import declare
 import pytest
 from rclpy.node import Node
 import yaml
 
-from tests.ros.launching import declared, launched
+from tests.ros.launching import declared, LAUNCH, launched
 from tests.ros.test_files import TABLES
 
+SHIPPED = LAUNCH.parent / 'config' / 'real_robot.yaml'
 #: Arguments that a launch file needs, and some that are given: text, node, and two values of the
 #: parameter, that of the argument and one of a parameter file.
 FILES = {
@@ -70,9 +69,8 @@ def test_without_a_parameter_file_nodes_get_parameters_they_have(bench, tmp_path
     for executable, node in nodes.items():
         values = read_back(bench, node, tmp_path)
         given = {key for p in node.parameters if isinstance(p, dict) for key in p}
-        given |= yaml.safe_load(Path(node.parameters[0]).read_text())['/**'][
-            'ros__parameters'
-        ].keys()
+        given |= node.defaults.keys()
+        assert {p for p in node.parameters if isinstance(p, str)} <= {str(SHIPPED)}
         assert given <= {*TABLES[executable], 'use_sim_time'}
         assert values['use_sim_time'] is (executable == 'online_identifier' and name == 'replay')
     assert all(one.description for one in declared(name))

@@ -5,11 +5,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from tempfile import NamedTemporaryFile
+import json
 from typing import Any, NamedTuple
 
 from armid_ros.files.cells import listed
-import yaml
 
 #: Default parameters of the simulated arm in launch files.
 SIMULATED_DRIVES: Mapping[str, Any] = {
@@ -115,17 +114,20 @@ def node(
     from launch_ros.actions import Node
 
     file = given.get('params_file', shipped)
-    with NamedTemporaryFile('w', prefix='armid_', suffix='.yaml', delete=False) as defaults:
-        yaml.safe_dump({'/**': {'ros__parameters': {'end_with_parent': True, **usual}}}, defaults)
+    defaults = {'end_with_parent': True, **usual}
     clock = {k: given[k] for k in ('use_sim_time',) if k in given}
-    # Of two matching patterns in parameter files, the later one takes precedence. With name and
-    # namespace given, launch writes the values under the full name as the last pattern.
+    # Of two matching patterns in arguments and parameter files, the later one takes precedence.
+    # ROS arguments, with the pattern /**, come before the files. With name and namespace given,
+    # launch writes the values under the full name as the last pattern.
     return Node(
         package='armid_ros',
         executable=executable,
         name=executable,
         namespace=given.get('namespace', ''),
-        parameters=[defaults.name, *filter(None, (file, clock | dict(chosen)))],
+        ros_arguments=[
+            word for k, x in defaults.items() for word in ('-p', f'{k}:={json.dumps(x)}')
+        ],
+        parameters=[*filter(None, (file, clock | dict(chosen)))],
         output='screen',
         **more,
     )
