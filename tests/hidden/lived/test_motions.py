@@ -42,17 +42,3 @@ def test_motions_rest_at_both_ends_and_keep_the_limits(style):
     assert np.all(wanted.q < ROBOT.upper)
     assert np.all(np.abs(wanted.dq).max(axis=0) < ROBOT.velocity_limit)
     assert np.all(np.ptp(wanted.q, axis=0) > 0.1)
-
-
-def test_only_periodic_motions_repeat():
-    """The largest likeness of the motion a second or more later."""
-    likeness = {}
-    for style in STYLES:
-        dq = draw(style)[0].dq[::20, 1]
-        lags = range(round(1.0 / (20 * STEP)), len(dq) // 2)
-        likeness[style] = max(
-            float(dq[lag:] @ dq[:-lag] / np.linalg.norm(dq[lag:]) / np.linalg.norm(dq[:-lag]))
-            for lag in lags
-        )
-    assert likeness.pop('periodic') > 0.9
-    assert max(likeness.values()) < 0.9
