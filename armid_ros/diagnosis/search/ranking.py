@@ -118,24 +118,25 @@ class RankedCause:
 
     def log_odds_over(self, other: RankedCause, levels: Thresholds) -> float:
         """
-        Return the log odds of this cause over another; positive if this one is likelier.
+        Return the log odds of this cause over another cause; positive if this cause is likelier.
 
         As torque laws are inexact, a difference of the explained squares is ignored below the
         share `inexact` of them, or below the share `same_fit` - 1 of the smaller residual. The
-        number of values and the prior odds decide then.
+        number of values and the prior odds decide then. Each value has the mean penalty of the
+        values of both causes: how well data determine a value says nothing about inexact laws.
 
         """
+        pair = self, other
         lead = self.fit.explained - other.fit.explained
         slack = min(
-            levels.inexact * max(self.fit.explained, other.fit.explained),
-            (levels.same_fit - 1.0) * max(min(self.remaining_loss, other.remaining_loss), 0.0),
+            levels.inexact * max(one.fit.explained for one in pair),
+            (levels.same_fit - 1.0) * max(min(one.remaining_loss for one in pair), 0.0),
         )
         seen = float(np.sign(lead)) * max(abs(lead) - slack, 0.0)
-        return (
-            seen
-            + (self.log_posterior - self.fit.explained)
-            - (other.log_posterior - other.fit.explained)
-        )
+        penalty = sum(one.fit.explained - one.log_bayes_factor for one in pair)
+        own, theirs = (len(one.fit.values) for one in pair)
+        seen -= penalty * (own - theirs) / (own + theirs)
+        return seen + self.cause.prior - other.cause.prior
 
 
 @dataclass(frozen=True)
