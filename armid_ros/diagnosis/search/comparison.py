@@ -207,20 +207,17 @@ class CauseComparison:
         able = [one for one in telling if one.odds > levels.alone]
         if not able or max(one.odds for one in able) < levels.alarm:
             return None
-        first = able[0]
-        name, joints = first.cause.effect.name, set(first.cause.effect.joints)
-        # the winner may be the best law on fewer joints, unless the lead exceeds the error of laws
-        parts = [
-            one
-            for one in able
-            if one is first
-            or (one.cause.effect.name == name and set(one.cause.effect.joints) < joints)
-        ]
-        winner = min(parts, key=lambda one: first.log_odds_over(one, levels))
+        # of causes whose lead is within the error of laws, the likeliest a priori
+        winner = min(able, key=lambda one: able[0].log_odds_over(one, levels))
         others = [one for one in able if one is not winner]
-        # log odds of rivals over the winner: the larger of those with and without a small lead
+        name, joints = winner.cause.effect.name, set(winner.cause.effect.joints)
+        # log odds of rivals over the winner: the larger of those with and without a small lead;
+        # the small lead of the same law on more joints never counts
         full = [
-            -math.inf if x is first else x.log_posterior - winner.log_posterior for x in others
+            -math.inf
+            if x.cause.effect.name == name and joints < set(x.cause.effect.joints)
+            else x.log_posterior - winner.log_posterior
+            for x in others
         ]
         reduced = [-winner.log_odds_over(x, levels) for x in others]
         behind = np.minimum(np.maximum(reduced, full), 0.0)
