@@ -22,7 +22,7 @@ from ..conftest import urdf
 Z = np.array([0.0, 0.0, 1.0])
 ABOVE = ('shoulder', 'revolute', 'base', 'upper', '0 0 0.3', '0 1 0', -2.5, 2.5, 60)
 LOW = ('shoulder', 'revolute', 'base', 'upper', '0 0 0.15', '0 1 0', -2.5, 2.5, 60)
-BELOW = ('shoulder', 'revolute', 'base', 'upper', '0 0 -0.5', '0 1 0', -2.5, 2.5, 60)
+BELOW = ('shoulder', 'revolute', 'base', 'upper', '0 0 -0.2', '0 1 0', -2.5, 2.5, 60)
 TURRET = ('turn', 'revolute', 'base', 'upper', '0 0 0.0', '0 0 1', -3, 3, 60)
 ON_TURRET = ('lift', 'revolute', 'upper', 'lower', '0 0 0.3', '0 1 0', -2.5, 2.5, 30)
 
@@ -59,7 +59,7 @@ def test_a_mount_below_a_world_is_no_floor(mount):
 @pytest.mark.parametrize(
     'shape', ['<cylinder radius="0.04" length="0.3"/>', '<box size="1 1 1"/>']
 )
-def test_an_arm_that_reaches_below_its_base_is_asked_for(shape):
+def test_an_arm_that_reaches_further_below_its_base_than_above_is_asked_for(shape):
     text = urdf(BELOW).replace('<cylinder radius="0.04" length="0.3"/>', shape)
     collision = collision_model(robot_from_urdf(text))
     with pytest.raises(TrajectoryError, match=r'0\.\d+ m.*upper.*--floor.*none'):
