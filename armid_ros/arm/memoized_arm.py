@@ -6,15 +6,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from functools import cached_property
-from typing import Any, TypeVar
+from functools import cached_property, wraps
+from typing import Any, cast, TypeVar
 
 from armid_ros.arm.arm_model import ArmModel
-from armid_ros.model import LinkFrames, regressor
+from armid_ros.model import regressor
 from armid_ros.motion import FloatArray, Motion
 import numpy as np
 
-_Result = TypeVar('_Result')
+_Method = TypeVar('_Method', bound=Callable[..., Any])
 
 
 @dataclass
@@ -24,6 +24,19 @@ class _Regressor:
     motion: Motion
     columns: FloatArray
     rows: FloatArray | None = None
+
+
+def _once(compute: _Method) -> _Method:
+    """Return a method of `ArmModel` that computes its result only once for each motion."""
+
+    @wraps(compute)
+    def cached(arm: _Memoized, motion: Motion) -> Any:
+        key = compute.__name__, id(motion)
+        if key not in arm.known:
+            arm.known[key] = motion, compute(arm, motion)
+        return arm.known[key][1]
+
+    return cast(_Method, cached)
 
 
 @dataclass(frozen=True, repr=False)
@@ -38,27 +51,23 @@ class _Memoized(ArmModel):
     regressors: dict[tuple[object, ...], _Regressor] = field(default_factory=dict, compare=False)
 
     @cached_property
-    def _known(self) -> dict[tuple[str, int], tuple[Motion, Any]]:
-        """Return the cached results, by quantity and motion."""
+    def known(self) -> dict[tuple[str, int], tuple[Motion, Any]]:
+        """Return the cached results, by name of the quantity and identity of the motion."""
         return {}
 
-    def _once(self, name: str, motion: Motion, compute: Callable[[Motion], _Result]) -> _Result:
-        """Return a cached quantity along a motion; compute it at the first call."""
-        key = name, id(motion)
-        if key not in self._known:
-            self._known[key] = motion, compute(motion)
-        result: _Result = self._known[key][1]
-        return result
+    link_frames = _once(ArmModel.link_frames)
+    gravity_columns = _once(ArmModel.gravity_columns)
+    smoothed = _once(ArmModel.smoothed)
+    load_derivatives = _once(ArmModel.load_derivatives)
+    link_torque_derivatives = _once(ArmModel.link_torque_derivatives)
+    _moved = _once(ArmModel.link_motion)
+    _load = _once(ArmModel.load)
+    _body_columns = _once(ArmModel.body_columns)
+    _joint_torque = _once(ArmModel.joint_torque)
 
     def link_motion(self, motion: Motion) -> Motion:
-        """Return the true motion of the links for a motion that sensors recorded."""
-        if self.action().displacement is None:
-            return motion
-        return self._once('link', motion, super().link_motion)
-
-    def link_frames(self, motion: Motion) -> LinkFrames:
-        """Return the frames of all links in each sample of a recorded motion."""
-        return self._once('frames', motion, super().link_frames)
+        """Return the true motion of the links, given the motion that sensors recorded."""
+        return motion if self.action().displacement is None else self._moved(motion)
 
     def regressor(self, motion: Motion) -> _Regressor | None:
         """Return the rigid-body regressor of a motion from the cache; None if not cacheable."""
@@ -85,32 +94,16 @@ class _Memoized(ArmModel):
         known = self.regressors.get(self._key(motion))
         if known is not None:
             return known.columns @ self.body.rigid_parameters
-        return np.array(self._once('load', motion, super().load))
+        return np.array(self._load(motion))
 
     def body_columns(self, motion: Motion) -> FloatArray:
         """Return the rigid-body regressor along a recorded motion, shape (N, n, 10 n)."""
         known = self.regressor(motion)
-        return self._once('body', motion, super().body_columns) if known is None else known.columns
-
-    def gravity_columns(self, motion: Motion) -> FloatArray:
-        """Return the derivatives of the rigid-body torque by the gravity vector, (N, n, 3)."""
-        return self._once('gravity', motion, super().gravity_columns)
-
-    def smoothed(self, motion: Motion) -> Motion:
-        """Return a recorded motion without frequencies above its band limit ``band_hz``."""
-        return self._once('smooth', motion, super().smoothed)
-
-    def load_derivatives(self, motion: Motion) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return the derivatives of the rigid-body torque by q, dq and ddq, (N, n, n) each."""
-        return self._once('derivatives', motion, super().load_derivatives)
-
-    def link_torque_derivatives(self, motion: Motion) -> tuple[FloatArray, FloatArray] | None:
-        """Return derivatives of the effects' torques on links by q and dq; None without any."""
-        return self._once('holding', motion, super().link_torque_derivatives)
+        return self._body_columns(motion) if known is None else known.columns
 
     def joint_torque(self, motion: Motion) -> FloatArray:
         """Return the true joint torque along a recorded motion, shape (N, n) [N m or N]."""
-        return np.array(self._once('torque', motion, super().joint_torque))
+        return np.array(self._joint_torque(motion))
 
 
 def memoized_arm(arm: ArmModel) -> ArmModel:
