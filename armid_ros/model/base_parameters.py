@@ -13,6 +13,7 @@ factorisation; the length of each column outside the span of the kept columns re
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from string import digits
 
 from armid_ros.estimate import ParameterName
 from armid_ros.motion import FloatArray, read_only
@@ -107,7 +108,7 @@ class BaseParameters:
 
         """
         prior = np.array(prior, dtype=float)
-        masses = [_symbol_of(parameter) == 'm' for parameter in self.standard]
+        masses = [parameter.name.rstrip(digits) == 'm' for parameter in self.standard]
         # assumed mass of a link without described mass, so that first moments are possible [kg]
         prior[masses & (np.abs(prior) < NO_MASS)] = 1e-6
         correction = np.linalg.pinv(self.grouping) @ (np.asarray(beta) - self.values(prior))
@@ -137,17 +138,17 @@ def group_columns(
         Identifiable combinations.
 
     """
-
-    def kept_first(position: int) -> tuple[int, int]:
-        name = _symbol_of(standard[position])
-        number = standard[position].name[len(name) :]
-        if name in _KEEP_ORDER and number:
-            return int(number), _KEEP_ORDER.index(name)
-        return len(standard), position
-
+    order = []  # sorting key of each column
+    for position, parameter in enumerate(standard):
+        name = parameter.name.rstrip(digits)
+        number = parameter.name[len(name) :]
+        of_link = name in _KEEP_ORDER and number
+        order.append(
+            (int(number), _KEEP_ORDER.index(name)) if of_link else (len(standard), position)
+        )
     scale = np.linalg.norm(w, axis=0)
     seen = scale > RANK_TOLERANCE * scale.max(initial=1e-300)
-    candidates = sorted(np.flatnonzero(seen).tolist(), key=kept_first)
+    candidates = sorted(np.flatnonzero(seen).tolist(), key=order.__getitem__)
     triangle = np.asarray(np.linalg.qr(w[:, candidates] / scale[candidates], mode='r'))
 
     basis = np.empty((len(triangle), 0))
@@ -214,11 +215,6 @@ def levelled(robot: Robot) -> Robot:
     own = turn.T @ robot.gravity
     across = np.abs(own) < 2e-3 * np.linalg.norm(own)
     return robot.with_gravity(turn @ np.where(across, 0.0, own)) if np.any(own[across]) else robot
-
-
-def _symbol_of(parameter: ParameterName) -> str:
-    """Return a parameter's name without the number of its link: 'mx' for 'mx2'."""
-    return parameter.name.rstrip('0123456789')
 
 
 def symbol(parameter: ParameterName) -> str:

@@ -16,30 +16,17 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from armid_ros.errors import ModelError
-from armid_ros.motion import FloatArray
+from armid_ros.motion import FloatArray, read_only
 from armid_ros.robots import NO_MASS
 from armid_ros.robots.robot import PER_LINK
 import numpy as np
 import numpy.typing as npt
-
-
-def _basis() -> FloatArray:
-    """Return derivatives of the pseudo-inertia by the inertial parameters, shape (10, 4, 4)."""
-    basis = np.zeros((PER_LINK, 4, 4))
-    basis[0, 3, 3] = 1.0
-    for axis in range(3):
-        basis[1 + axis, axis, 3] = basis[1 + axis, 3, axis] = 1.0
-    for index, axis in ((4, 0), (6, 1), (9, 2)):
-        basis[index, :3, :3] = 0.5 * np.eye(3)
-        basis[index, axis, axis] = -0.5
-    for index, (row, column) in ((5, (0, 1)), (7, (0, 2)), (8, (1, 2))):
-        basis[index, row, column] = basis[index, column, row] = -1.0
-    basis.setflags(write=False)
-    return basis
-
+import pinocchio as pin
 
 #: Pseudo-inertia of each unit parameter, since a pseudo-inertia is linear in the ten parameters.
-BASIS = _basis()
+BASIS = read_only(
+    [pin.PseudoInertia.FromDynamicParameters(unit).toMatrix() for unit in np.eye(PER_LINK)]
+)
 
 
 def pseudo_inertia(parameters: npt.ArrayLike) -> FloatArray:
