@@ -165,23 +165,18 @@ def _stacked(
         np.full((len(part), len(part.joints)), np.nan) if values is None else values
         for values, part in zip(arrays, parts, strict=True)
     ]
-    together = None if axis else _adjacent(filled)
-    return np.concatenate(filled, axis=axis) if together is None else together
-
-
-def _adjacent(arrays: Sequence[FloatArray]) -> FloatArray | None:
-    """Return arrays as one view if they are successive rows of one array, else None."""
-    base = arrays[0].base
-    if not isinstance(base, np.ndarray) or base.ndim != 2:
-        return None
-    first = at = arrays[0].ctypes.data
-    for array in arrays:
-        if array.base is not base or array.ctypes.data != at or array.shape[1:] != base.shape[1:]:
-            return None
-        at += array.nbytes
-    row = base.strides[0]
-    begin = base.ctypes.data
-    return base[(first - begin) // row : (at - begin) // row]
+    # consecutive rows of the same array are a single view of it
+    base, begins = filled[0].base, [part.ctypes.data for part in filled]
+    ends = [begin + part.nbytes for begin, part in zip(begins, filled, strict=True)]
+    if (
+        axis == 0
+        and isinstance(base, np.ndarray)
+        and all(part.base is base and part.shape[1:] == base.shape[1:] for part in filled)
+        and begins[1:] == ends[:-1]
+    ):
+        first = (begins[0] - base.ctypes.data) // base.strides[0]
+        return base[first : first + sum(map(len, filled))]
+    return np.concatenate(filled, axis=axis)
 
 
 def longest_run(stamps: IntArray) -> slice | None:

@@ -68,7 +68,8 @@ def _inside(described: MessageType) -> str:
 
 @cache
 def _standard(described: MessageType) -> bool:
-    """Return whether a bag defines the type JointState as ROS 2 does."""
-    if not described.definition:
+    """Return whether the definition of JointState in a bag is that of ROS 2."""
+    stated = described.type_hash if described.name == JOINT_STATE else ''
+    if not described.definition or stated == JOINT_STATE_HASH:
         return True
     return bool(store_for(described).hash_rihs01(JOINT_STATE) == JOINT_STATE_HASH)

@@ -190,11 +190,17 @@ class JointStateDecoder:
                 return plan
         try:
             layout = JointStateLayout.of(first.tobytes())
-            layout.require_one_value_per_joint()
+            names = layout.names
+            if len(set(names)) != len(names):
+                raise MalformedMessage(f'a joint occurs twice in the names {", ".join(names)}')
+            for quantity, count in zip(QUANTITIES, layout.counts, strict=True):
+                if count not in (0, len(names)):
+                    raise MalformedMessage(
+                        f'the message has {count} values of {quantity} for {len(names)} joints'
+                    )
         except MalformedMessage as problem:
             self.first_problem = self.first_problem or str(problem)
             return None
-        names = layout.names
         self.names_seen.update(dict.fromkeys(names))
         joints = tuple(name for name in self._wanted if name in names)
         columns = [names.index(name) for name in joints]

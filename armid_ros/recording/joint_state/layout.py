@@ -100,16 +100,6 @@ class JointStateLayout:
             )
         return layout
 
-    def require_one_value_per_joint(self) -> None:
-        """Raise MalformedMessage if a joint occurs twice, or an array has a wrong length."""
-        if len(set(self.names)) != len(self.names):
-            raise MalformedMessage(f'a joint occurs twice in the names {", ".join(self.names)}')
-        for quantity, count in zip(QUANTITIES, self.counts, strict=True):
-            if count not in (0, len(self.names)):
-                raise MalformedMessage(
-                    f'the message has {count} values of {quantity} for {len(self.names)} joints'
-                )
-
     @property
     def names_offset(self) -> int:
         """Return the byte position of the field that has the number of joint names."""
