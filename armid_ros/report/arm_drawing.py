@@ -17,8 +17,8 @@ from typing import ClassVar
 from armid_ros.excitation.geometry.floor import outline
 from armid_ros.motion import FloatArray
 from armid_ros.report.page import Templated
-from armid_ros.robots import collision_model, CollisionModel, Robot
-from armid_ros.robots.geometry import sticks
+from armid_ros.robots import CollisionModel, Robot
+from armid_ros.robots.geometry import collision_geometry, sticks
 import coal
 import numpy as np
 import pinocchio as pin
@@ -92,7 +92,7 @@ def draw_poses(
         Poses along the path of the last body [rad or m].
 
     """
-    robot, solids = collision.robot, _solids(collision)
+    robot, solids = collision.robot, _solids(collision.robot, collision.geometry)
     last = max(solids, key=lambda solid: solid.joint)
     frames, along = (
         [_frames(robot.model, q) for q in robot.positions(some)] for some in (poses, path)
@@ -146,7 +146,8 @@ def draw_arm(
     tried = [_frames(robot.model, pose) for pose in poses]
     seen = [np.array([_flat(one.translation) for one in frames]) for frames in tried]
     frames = tried[int(np.argmax([np.prod(np.ptp(one, axis=0) + _MIN_SIZE) for one in seen]))]
-    strip = _Strip.of(_solids(collision_model(robot)), [frames], (300.0, 240.0))
+    solids = _solids(robot, collision_geometry(robot)[0])
+    strip = _Strip.of(solids, [frames], (300.0, 240.0))
 
     def colour(joint: int, other: str) -> str:
         chosen = joint > 0 and robot.moving[joint - 1] in marked
@@ -195,10 +196,10 @@ class _Solid:
         return cloud[ConvexHull(cloud).vertices], float((points @ _VIEW[2]).mean())
 
 
-def _solids(collision: CollisionModel) -> list[_Solid]:
-    """Return the bodies of an arm and its obstacles; links without bodies become bars."""
+def _solids(robot: Robot, geometry: pin.GeometryModel) -> list[_Solid]:
+    """Return collision bodies of an arm and its obstacles, and bars for links without a body."""
     solids = []
-    for body in collision.geometry.geometryObjects:
+    for body in geometry.geometryObjects:
         shape = body.geometry
         if isinstance(shape, coal.Cylinder):
             turn = np.linspace(0.0, 2.0 * np.pi, _CIRCLE_CORNERS, endpoint=False)
@@ -211,7 +212,7 @@ def _solids(collision: CollisionModel) -> list[_Solid]:
             placed = points @ body.placement.rotation.T + body.placement.translation
             solids.append(_Solid(int(body.parentJoint), body.parentFrame > 0, placed, radius))
     drawn = {solid.joint for solid in solids}
-    bars = [(k, end) for k, end in sticks(collision.robot.model) if k not in drawn]
+    bars = [(k, end) for k, end in sticks(robot.model) if k not in drawn]
     # radius of a bar [m]
     return solids + [_Solid(k, True, np.stack([np.zeros(3), end]), 0.02) for k, end in bars]
 

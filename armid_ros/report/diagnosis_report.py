@@ -253,25 +253,23 @@ def overlay_section(diagnosis: Diagnosis, gap: Gap) -> ContentSection:
     """
     robot, patched = diagnosis.arm.robot, bool(diagnosis.findings)
     j = int(np.argmax(gap.chi2_before))
-
-    def size(overlay: Overlay) -> float:
-        residual = (overlay.measured - overlay.before)[:, j] / overlay.sigma[j]
-        return float(np.mean(residual**2))
-
-    shown = max(gap.overlays, key=size)
+    shown = max(
+        gap.overlays,
+        key=lambda one: np.mean(np.square((one.measured - one.before)[:, j] / one.sigma[j])),
+    )
     t, measured, before, after = _of_recording(gap, shown, j)
     unit = robot.torque_units[j]
     acting = [one for one in diagnosis.spans if one.source == shown.source and not one.whole]
     marks = [(one.start, f'from {one.start:.1f} s', True) for one in acting]
     marks += [(one.stop, f'to {one.stop:.1f} s', False) for one in acting]
     band: FloatArray = np.full(len(t), 2.0 * shown.sigma[j])
-
-    def models(first: FloatArray, second: FloatArray) -> list[Series]:
-        if not patched:
-            return [Series('model', second, 'after')]
-        given = Series('given model', first, 'before')
-        return [given, Series('with the named cause', second, 'after')]
-
+    torques, residuals = (
+        [
+            *([Series('given model', given, 'before')] if patched else []),
+            Series('with the named cause' if patched else 'model', last, 'after'),
+        ]
+        for given, last in ((before, after), (measured - before, measured - after))
+    )
     dashes = ', dashes on it are the model with the named cause' * patched
     return ContentSection(
         'Measured and modelled',
@@ -281,7 +279,7 @@ def overlay_section(diagnosis: Diagnosis, gap: Gap) -> ContentSection:
             ),
             Chart.over_time(
                 t,
-                [Series('measured', measured, 'measured'), *models(before, after)],
+                [Series('measured', measured, 'measured'), *torques],
                 f'torque [{unit}]',
                 link='overlay',
                 marks=marks,
@@ -290,7 +288,7 @@ def overlay_section(diagnosis: Diagnosis, gap: Gap) -> ContentSection:
                 t,
                 [
                     Series('twice the usual error', -band, 'floor', 'band', band),
-                    *models(measured - before, measured - after),
+                    *residuals,
                 ],
                 f'residual [{unit}]',
                 height=170,

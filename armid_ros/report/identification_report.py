@@ -38,7 +38,7 @@ from armid_ros.report.parameter_tables import (
 )
 from armid_ros.report.provenance import DEFAULT_ORIGIN, ResultOrigin
 from armid_ros.report.sections.data_quality import data_quality_section
-from armid_ros.report.sections.fit import by_recording, error_bars, fit_section, forward_section
+from armid_ros.report.sections.fit import error_bars, fit_section, forward_section
 from armid_ros.report.statistics import residual_section, torque_reach, whiteness_section
 from armid_ros.robots import Robot
 import numpy as np
@@ -81,7 +81,10 @@ def identification_report(
         Robot, files, versions, settings, seed.
 
     """
-    described, training = result.arm.robot, by_recording(result.training)
+    described = result.arm.robot
+    training: dict[str, list[Fit]] = {}
+    for fit in result.training:
+        training.setdefault(fit.source, []).append(fit)
     held_out = [fit for fits in validation.values() for fit in fits]
     role = 'held-out' if held_out else 'training'
     shown = held_out or list(result.training)

@@ -136,15 +136,6 @@ def common_prefix(names: Sequence[str]) -> str:
     return max(fitting, default='')
 
 
-def without_prefix(text: str, names: Sequence[str]) -> str:
-    """Remove the common prefix of joint and link names from a label, but not from paths."""
-    prefix = common_prefix(names)
-    if not prefix:
-        return text
-    rests = '|'.join(re.escape(name.removeprefix(prefix)) for name in names)
-    return re.sub(rf'(?<![\w/.-]){re.escape(prefix)}(?=(?:{rests})(?![\w/]|\.\w))', '', text)
-
-
 def explained(text: str) -> Markup:
     """Convert a text to HTML; the first use of each of the `TERMS` gets a tooltip."""
     html = str(escape(text))

@@ -23,7 +23,6 @@ from armid_ros.report.notation import (
     explained,
     plain,
     pretty,
-    without_prefix,
 )
 from armid_ros.version import GENERATOR
 from jinja2 import Environment, PackageLoader, StrictUndefined
@@ -111,8 +110,12 @@ class Page:
             'script': asset('report.js'),
             'style': asset('report.css'),
         }
-        text = render('page.html', {'page': self, 'prefix': common_prefix(self.names), **assets})
-        shown = _LABELS.sub(lambda label: without_prefix(label[0], self.names), text)
+        prefix = common_prefix(self.names)
+        shown = str(render('page.html', {'page': self, 'prefix': prefix, **assets}))
+        if prefix:  # labels leave it out of names, but not of paths
+            rests = '|'.join(re.escape(name.removeprefix(prefix)) for name in self.names)
+            name = re.compile(rf'(?<![\w/.-]){re.escape(prefix)}(?=(?:{rests})(?![\w/]|\.\w))')
+            shown = _LABELS.sub(lambda label: name.sub('', label[0]), shown)
         # passwords in arguments and in URLs
         shown = re.sub(r'(\w*(?:passw|token|secret)\w*:?=)[^\s<"&]+', r'\1***', shown)
         shown = re.sub(r'://[^/\s@<>"]+:[^/\s@<>"]+@', '://***@', shown)

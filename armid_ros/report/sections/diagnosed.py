@@ -242,21 +242,17 @@ def isolability_section(isolability: Isolability) -> ContentSection:
 
 
 def _detectable_row(name: str, sizes: Sequence[Detectable]) -> tuple[str, str, str, str]:
-    """Return the table row of one effect, with the columns `_DETECTABLE`."""
-
-    def place(one: Detectable) -> str:
-        return ', '.join(one.joints) or 'the arm'
-
-    def size(one: Detectable) -> str:
-        unit = '' if one.parameter is None else pretty(one.parameter.unit)
-        where = f' in {place(one)}' if one.joints else ''
-        return f'{digits(one.size)} {unit}'.strip() + where
-
+    """Return the table cells of one effect, with the columns `_DETECTABLE`."""
     own = [one for one in sizes if one.name == name]
     finite = sorted((s for s in own if math.isfinite(s.size)), key=lambda s: s.size)
-    best, worst = (size(finite[0]), size(finite[-1])) if finite else ('', '')
-    never = '; '.join(place(s) for s in own if not math.isfinite(s.size))
-    return name_in_words(name), best, worst if worst != best else '', never
+    ends = []  # the smallest and the largest detectable size, each with its joints
+    for one in (*finite[:1], *finite[-1:]):
+        unit = '' if one.parameter is None else f' {pretty(one.parameter.unit)}'
+        where = f' in {", ".join(one.joints)}' if one.joints else ''
+        ends.append(f'{digits(one.size)}{unit.rstrip()}{where}')
+    best, worst = (*dict.fromkeys(ends), '', '')[:2]
+    never = '; '.join(', '.join(s.joints) or 'the arm' for s in own if not math.isfinite(s.size))
+    return name_in_words(name), best, worst, never
 
 
 def candidates_section(diagnosis: Diagnosis) -> ContentSection:

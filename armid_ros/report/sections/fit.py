@@ -30,14 +30,6 @@ Fits = Mapping[str, Sequence[Fit]]
 ZOOM = 'Drag across a plot, or pinch it, to zoom; double-click or double-tap to reset.'
 
 
-def by_recording(fits: Sequence[Fit]) -> dict[str, list[Fit]]:
-    """Group fits by recording."""
-    found: dict[str, list[Fit]] = {}
-    for fit in fits:
-        found.setdefault(fit.source, []).append(fit)
-    return found
-
-
 def error_bars(robot: Robot, training: Fits, validation: Fits, halves: Score) -> BarChart:
     """
     Return bars of each joint's relative torque error, the worst joint first.
