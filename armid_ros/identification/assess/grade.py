@@ -256,10 +256,7 @@ def beyond_noise(errors: FloatArray, fits: Sequence[Fit], used: Conditioning) ->
         Errors without the noise [%]; zero for a joint at rest throughout.
 
     """
-    informative = np.concatenate([fit.informative for fit in fits])
-    torque = informative * np.concatenate([fit.tau for fit in fits])
-    rows = np.maximum(np.count_nonzero(informative, axis=0), 1)
-    size = np.sqrt(np.sum(torque**2, axis=0) / rows)
+    size = Score.of(fits).torque_rms
     differences = np.concatenate([np.abs(np.diff(fit.tau, 2, axis=0)) for fit in fits])
     noise = np.zeros_like(size)
     if len(differences):

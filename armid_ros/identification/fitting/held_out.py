@@ -232,21 +232,16 @@ def _losses(
     _, x, _, y, informative = _some_rows(shared, _MAX_ROWS)
     fold = np.arange(len(y)) * n_folds // len(y)
     residual = np.zeros_like(y)
-    whole = _fit(x, y, informative)
-    weight = 1.0 / np.maximum(_rms(y - x @ whole, informative), 1e-12)
+    score = Score.of_rows(y - x @ _fit(x, y, informative), y, informative)
+    weight = 1.0 / np.maximum(score.rms, 1e-12)
     for odd in (0, 1):
         chosen = fold % 2 == odd
         value = _fit(x[chosen], y[chosen], informative[chosen] * weight)
         residual[~chosen] = y[~chosen] - x[~chosen] @ value
-    rms = np.array([_rms(residual[fold == k], informative[fold == k]) for k in range(n_folds)])
-    least = np.maximum(TORQUE_RESOLUTION * _rms(y, informative), 1e-12)
+    folds = [fold == k for k in range(n_folds)]
+    rms = np.array([Score.of_rows(residual[own], y[own], informative[own]).rms for own in folds])
+    least = np.maximum(TORQUE_RESOLUTION * score.torque_rms, 1e-12)
     return np.asarray(np.mean(np.log(np.maximum(rms, least)), axis=1))
-
-
-def _rms(values: FloatArray, informative: npt.NDArray[np.bool_]) -> FloatArray:
-    """Return the root mean square of each joint's values at informative samples, shape (n,)."""
-    count = np.maximum(informative.sum(axis=0), 1)
-    return np.asarray(np.sqrt(np.sum(values**2, axis=0, where=informative) / count))
 
 
 def _fit(

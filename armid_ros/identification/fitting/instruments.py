@@ -25,7 +25,7 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 from armid_ros.errors import IdentificationError
-from armid_ros.estimate import Estimate
+from armid_ros.estimate import Estimate, ParameterName
 from armid_ros.identification.fitting.covariance import noise_products, sandwich
 from armid_ros.identification.fitting.identifiability import bounds
 from armid_ros.identification.fitting.least_squares import Method, solve, within_bounds
@@ -166,8 +166,8 @@ class NoiseCheck:
         Degrees of freedom, 1 or more: expected statistic without an effect of encoder noise.
     p_value : float
         Probability of a larger statistic without an effect of encoder noise.
-    instrumental : Estimate
-        The fit with instruments.
+    parameters : tuple of ParameterName
+        Names of the r parameters.
     position_noise : ndarray, shape (n,)
         Standard deviation of the position noise [rad or m].
     bias : ndarray, shape (r,)
@@ -182,7 +182,7 @@ class NoiseCheck:
     statistic: float
     freedom: float
     p_value: float
-    instrumental: Estimate
+    parameters: tuple[ParameterName, ...]
     position_noise: FloatArray
     bias: FloatArray
     bias_std: FloatArray
@@ -221,7 +221,7 @@ class NoiseCheck:
                 'effect that the model lacks is the likelier cause'
             )
         worst = int(np.argmax(np.abs(self.relative_bias)))
-        name = self.instrumental.parameters[worst]
+        name = self.parameters[worst]
         words = replace(name, name=name.name.split(' ')[0]).words
         where = f'{words} of {name.joint}' if name.joint else words
         verdict = 'negligible' if self.harmless else 'it shifts the intervals'
@@ -308,7 +308,7 @@ def check_noise(
         statistic=statistic,
         freedom=freedom,
         p_value=float(chi2.sf(statistic, freedom)),
-        instrumental=Estimate(estimate.parameters, found.values, found.covariance),
+        parameters=estimate.parameters,
         position_noise=noise,
         bias=scale * np.mean(biases, axis=0),
         bias_std=scale * np.std(biases, axis=0, ddof=1) / np.sqrt(repeats),

@@ -164,40 +164,37 @@ class PhysicalProgram:
         self, change: FloatArray, origin: FloatArray
     ) -> tuple[sparse.csc_matrix, FloatArray, list[Any]]:
         """Return the constraints b - A x in K: matrix A, vector b and cones K."""
-        blocks: list[sparse.spmatrix] = []
-        offsets: list[FloatArray] = []
-        cones: list[Any] = []
-        empty = sparse.csr_matrix((1, _LOG_DETERMINANT * self.n_links))
-        rigid = len(self.prior) - len(self.lower)
-
-        def linear(cone: Any, normal: FloatArray, offset: FloatArray) -> None:
-            """Add the constraint that normal @ theta + offset is in a cone."""
-            if len(normal):
-                side = sparse.vstack([empty] * len(normal))
-                blocks.append(sparse.hstack([-sparse.csr_matrix(normal @ change), side]))
-                offsets.append(normal @ origin + offset)
-                cones.append(cone(len(normal)))
-
+        size, rigid = len(self.prior), len(self.prior) - len(self.lower)
+        unit = np.eye(size)
+        # conditions on theta: the vector normal @ theta + offset is inside a cone
+        conditions: list[tuple[Any, FloatArray, FloatArray]] = []
         if self.total_mass is not None:
-            masses = np.zeros((1, len(self.prior)))
-            masses[0, :rigid:PER_LINK] = 1.0
-            linear(clarabel.ZeroConeT, masses, np.array([-self.total_mass]))
-        unit = np.eye(len(self.prior))[rigid:]
+            masses = unit[:rigid:PER_LINK].sum(axis=0, keepdims=True)
+            conditions.append((clarabel.ZeroConeT, masses, np.array([-self.total_mass])))
         for sign, bound in ((1.0, self.lower), (-1.0, self.upper)):
             finite = np.isfinite(bound)
-            linear(clarabel.NonnegativeConeT, sign * unit[finite], -sign * bound[finite])
+            normal, offset = sign * unit[rigid:][finite], -sign * bound[finite]
+            conditions.append((clarabel.NonnegativeConeT, normal, offset))
         if self.mass_range is not None:
-            mass = np.eye(len(self.prior))[:rigid:PER_LINK]
-            described = self.prior[:rigid:PER_LINK]
-            linear(clarabel.NonnegativeConeT, mass, -described / self.mass_range)
-            linear(clarabel.NonnegativeConeT, -mass, described * self.mass_range)
+            mass, described = unit[:rigid:PER_LINK], self.prior[:rigid:PER_LINK]
+            conditions += [
+                (clarabel.NonnegativeConeT, mass, -described / self.mass_range),
+                (clarabel.NonnegativeConeT, -mass, described * self.mass_range),
+            ]
         for link, box in self.boxes.items():
-            normal = np.zeros((9, len(self.prior)))
+            normal = np.zeros((9, size))
             normal[:, PER_LINK * link : PER_LINK * (link + 1)] = box_conditions(box)
-            linear(clarabel.NonnegativeConeT, normal, np.zeros(9))
+            conditions.append((clarabel.NonnegativeConeT, normal, np.zeros(9)))
         rows, offset, others = self._log_determinants
-        rows = sparse.vstack([*blocks, rows], format='csc')
-        return rows, np.concatenate([*offsets, offset]), [*cones, *others]
+        blocks, offsets, cones = [], [], []
+        for cone, normal, own in conditions:
+            if len(normal):
+                side = sparse.csr_matrix((len(normal), _LOG_DETERMINANT * self.n_links))
+                blocks.append(sparse.hstack([-sparse.csr_matrix(normal @ change), side]))
+                offsets.append(normal @ origin + own)
+                cones.append(cone(len(normal)))
+        matrix = sparse.vstack([*blocks, rows], format='csc')
+        return matrix, np.concatenate([*offsets, offset]), [*cones, *others]
 
     @cached_property
     def _log_determinants(self) -> tuple[sparse.spmatrix, FloatArray, list[Any]]:
