@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -112,17 +113,18 @@ def recordings_of(
 
 
 def with_unique_sources(*groups: list[Recording]) -> tuple[list[Recording], ...]:
-    """Make source names of recordings unique by numbers; paths of existing files are kept."""
-    taken: dict[str, int] = {}
-
-    def named(recording: Recording) -> Recording:
-        source = recording.source or 'recording'
-        if Path(source).exists():  # a recording that is given twice is read only once
-            return recording
-        taken[source] = count = taken.get(source, 0) + 1
-        return replace(recording, source=source if count == 1 else f'{source} {count}')
-
-    return tuple([named(recording) for recording in group] for group in groups)
+    """Append numbers to equal source names of recordings, except paths of existing files."""
+    taken: Counter[str] = Counter()
+    named = [list(group) for group in groups]
+    for group in named:
+        for k, recording in enumerate(group):
+            source = recording.source or 'recording'
+            if Path(source).exists():  # a recording that is given twice is read only once
+                continue
+            taken[source] += 1
+            number = f' {taken[source]}' if taken[source] > 1 else ''
+            group[k] = replace(recording, source=f'{source}{number}')
+    return tuple(named)
 
 
 def motion_of(recording: Recording, cutoff: float | None = None) -> Motion:

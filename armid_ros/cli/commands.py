@@ -81,9 +81,11 @@ class Commands(click.Group):
             raise click.UsageError(error.message.rstrip('.') + near, ctx) from error
         ctx.meta[TYPED] = tuple(rest)
         if name and command and not {'-h', '--help'} & set(rest):
-            listed = self.list_commands(ctx)
-            others = partial(map, _imported, listed)
-            ctx.default_map = {name: project_options(name, command, rest, others)}
+            ctx.default_map = {
+                name: project_options(
+                    name, command, rest, lambda: map(_imported, self.list_commands(ctx))
+                )
+            }
         return name, command, rest
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:

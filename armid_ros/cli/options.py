@@ -31,7 +31,7 @@ from armid_ros.files import (
     write_file,
 )
 from armid_ros.files.cells import listed, parted
-from armid_ros.files.output import hash_files, written_by
+from armid_ros.files.output import hash_files, WRITES
 from armid_ros.identification import write_document
 from armid_ros.motion import FloatArray
 from armid_ros.recording import read_robot_description, ReadSettings, Recording
@@ -77,7 +77,7 @@ def stage(out: Path, schema: str, robot: str = '', also: Collection[str] = ()) -
     context = click.get_current_context()
     forced = bool(context.meta.get(FORCE, False))
     context.with_resource(result_folder(out, schema, robot, also=also, force=forced))
-    replaced = () if forced else written_by(schema, also)
+    replaced = () if forced else (*WRITES.get(schema, ()), *also)
     spared = (out / 'robot.urdf', *(Path(part) for part in (robot, robot.split(' ')[0]) if part))
     return context.with_resource(staged(out, replaced, spared))
 
@@ -235,8 +235,8 @@ def open_robot(
             )
         path, text = held
         robot = robot_from_urdf(text, gravity=gravity, joints=named or None, source=str(path))
-    lines = driven_in_words(robot) if joints is None else ()
     if tell:
+        lines = driven_in_words(robot) if joints is None else ()
         notes = click.get_current_context().meta.setdefault(NOTES, [])
         doubts = robot.description.inertia_doubts()
         found = [visible(f'note: {line}') for line in (*lines, *doubts)]

@@ -36,7 +36,7 @@ from armid_ros.version import GENERATOR
 _MODEL = 'model.yaml'
 _SCHEMAS_WITH_MODEL = ('armid/identification/1', 'armid/diagnosis/1')
 #: Files and folders of each result, by schema; the JSON document comes first.
-_WRITES = {
+WRITES = {
     'armid/identification/1': (
         'identification.json',
         'model.yaml',
@@ -84,9 +84,7 @@ _WRITES = {
     ),
 }
 #: JSON documents whose schema identifies the results in a folder; a command writes them last.
-DOCUMENTS = tuple(
-    dict.fromkeys(first for first, *_ in _WRITES.values() if first.endswith('.json'))
-)
+DOCUMENTS = tuple(dict.fromkeys(first for first, *_ in WRITES.values() if first.endswith('.json')))
 #: Name of the folder to which a run writes until its result is complete.
 STAGING = '.armid-part'
 #: Message types in metadata.yaml, and the message types of a bag with a planned motion.
@@ -278,11 +276,6 @@ def hash_files(paths: Iterable[str | Path]) -> tuple[tuple[str, int, str], ...]:
     return tuple(found)
 
 
-def written_by(schema: str, also: Collection[str] = ()) -> tuple[str, ...]:
-    """Return the names or patterns ('*.png') of all files that belong to a schema."""
-    return (*_WRITES.get(schema, ()), *also)
-
-
 def refuse_foreign(folder: Path, schema: str, also: Collection[str] = ()) -> None:
     """
     Raise OutputError if a folder contains files that the command did not write.
@@ -302,9 +295,9 @@ def refuse_foreign(folder: Path, schema: str, also: Collection[str] = ()) -> Non
         If the folder has such a file; the message names folder and file.
 
     """
-    if schema not in _WRITES:
+    if schema not in WRITES:
         return
-    writes = written_by(schema, also)
+    writes = (*WRITES[schema], *also)
     names = sorted(path.name for path in folder.iterdir() if path.name != STAGING)
     for name in names:
         if not any(fnmatch(name.removeprefix('.').removesuffix('.part'), one) for one in writes):
