@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Drive a knee of the exoskeleton by its computed torque in MuJoCo, over a gait cycle."""
+"""Drive a knee of the exoskeleton by its computed torque over a simulated gait cycle."""
 
 from armid_ros.papers.exo.plant.gait import read_gait
 from armid_ros.papers.exo.plant.gait_cycle import check_cycle, gait_cycle
