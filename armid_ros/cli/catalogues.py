@@ -27,10 +27,11 @@ def robots(as_json: bool) -> None:
         _say_wrapped(f'{name}: {text}')
 
 
-@click.command(epilog='Example: armid effects --json')
+@click.command(epilog='Example: armid effects payload')
+@click.argument('names', nargs=-1, metavar='[NAME]...', shell_complete=parameters.completed)
 @parameters.as_json
-def effects(as_json: bool) -> None:
-    """List the effects that can be simulated and estimated."""
+def effects(names: tuple[str, ...], as_json: bool) -> None:
+    """List the effects that can be simulated and estimated: all, or those named."""
     from armid_ros.effects import CATALOGUE
     from armid_ros.files import json_text
 
@@ -41,7 +42,7 @@ def effects(as_json: bool) -> None:
             'parameters': [_with_unit(q.name, q.unit) for q in effect.quantities],
             'shapes': [_with_unit(s.name, s.unit) for s in effect.shapes],
         }
-        for name, effect in CATALOGUE.items()
+        for name, effect in ((name, CATALOGUE.find(name)) for name in names or CATALOGUE)
     ]
     if as_json:
         click.echo(json_text(rows, indent=1))

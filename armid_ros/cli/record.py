@@ -128,7 +128,10 @@ def simulate(
 def _parse_effect(text: str, robot: Robot) -> tuple[Effect, FloatArray]:
     """Parse --effect; ModelError for an effect of size zero, warning for an impossible payload."""
     from armid_ros.effects import parse_effect
+    from armid_ros.model.rigid_body import LINK_PARAMETERS
     from armid_ros.simulation.plant import possible_loads
+    import numpy as np
+    import pinocchio as pin
 
     effect, values = parse_effect(text, robot)
     if not any(values):
@@ -141,10 +144,16 @@ def _parse_effect(text: str, robot: Robot) -> tuple[Effect, FloatArray]:
             + f'; write {text.partition(":")[0]}:{first}=0.1'
         )
     if effect.traits.weighs and not possible_loads(robot, values):
+        least = 'payload_m times distance squared'
+        if values[0] > 0.0:
+            point = pin.Inertia(values[0], values[1:4] / values[0], np.zeros((3, 3)))
+            inertia = zip(LINK_PARAMETERS, point.toDynamicParameters(), strict=True)
+            parts = [f'payload_{name}={size:.6g}' for name, size in list(inertia)[4:] if size]
+            least = f'at least those of a point mass: {",".join(parts) or 0}'
         say(
             f"warning: --effect '{text}': no body within reach of the arm has these values. "
-            'payload_mx etc. are payload_m times distance; payload_Ixx etc. are about the '
-            'joint, with payload_m times distance squared',
+            'payload_mx etc. are payload_m times distance. payload_Ixx etc. are about the joint, '
+            f'{least}',
             'yellow',
         )
     return effect, values
