@@ -32,7 +32,7 @@ HEADS = ('parameter', 'before', 'after', 'difference, 95 %')
 _WHY = {
     'motion': 'not identified by the motion of the {other}',
     'effect': 'not in the model of the {other}',
-    'grouping': 'grouped differently by the data of the {other}',
+    'grouping': 'summed with other parameters by the data of the {other}',
 }
 
 

@@ -47,14 +47,14 @@ def full_label(name: ParameterName, links: Sequence[str] = ()) -> str:
     Returns
     -------
     str
-        'moment of inertia about z of forearm', with '(grouped)' for the first one of a linear
+        'moment of inertia about z of forearm', with '+ others' for the first one of a linear
         combination; or 'Coulomb torque of elbow'.
 
     """
     if name.rigid:
         words, link = _words_and_link(name, links)
         label = f'{words} of {link or f"the link of {name.joint}"}'
-        return f'{label} (grouped)' if grouping(name) else label
+        return f'{label} + others' if grouping(name) else label
     return f'{name.words} of {name.joint}' if name.joint else name.words
 
 

@@ -35,7 +35,7 @@ def test_joints_that_slide_and_that_turn_are_kept_apart():
         ('mx1', 'first moment along x of upper arm'),
         ('Izz2', 'moment of inertia about z of forearm'),
         ('Ixy2', 'product of inertia xy of forearm'),
-        ('Iyy1 + 0.25 (m2 + mz2)', 'moment of inertia about y of upper arm (grouped)'),
+        ('Iyy1 + 0.25 (m2 + mz2)', 'moment of inertia about y of upper arm + others'),
     ],
 )
 def test_a_parameter_of_a_link_is_said_in_words(name, label):
