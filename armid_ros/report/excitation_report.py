@@ -195,19 +195,23 @@ def identifiable(design: Design, links: Sequence[str]) -> list[str]:
     if seen < len(names):
         return [f'{seen} of {len(names)} parameters can be identified.']
     worst = int(np.argmax(std / information.scale))
+    least = f'{full_label(names[worst], links)}: ± {digits(float(std[worst]))}'
+    least = f'Least accurate: {" ".join([least, pretty(names[worst].unit)]).rstrip()}.'
     size = np.abs(design.described)
     accurate, known = int(np.sum(std <= 0.1 * size)), int(np.sum(size > 0.0))
+    if not known:  # the condition number depends on the size of the parameters
+        return [f'All {len(names)} parameters can be identified.', least]
     remark = '; the others hardly change the torque' * (accurate < known)
     grade = 'good'
     if information.condition >= GOOD_CONDITION:
-        grade = 'fair' if information.condition < WEAK_CONDITION else 'weak'
-        grade += f'; below {GOOD_CONDITION:g} is good'
+        weak = information.condition >= WEAK_CONDITION
+        grade = f'{"weak" if weak else "fair"}; below {GOOD_CONDITION:g} is good'
+        grade += '; a longer duration helps' * weak
     return [
         f'All {len(names)} parameters can be identified (condition number '
         f'{plain(information.condition)}: {grade}).',
         f'{accurate} of {known} parameters that are not zero in the description will be known to '
-        f'10 %{remark}. Least accurate: {full_label(names[worst], links)}: '
-        f'± {digits(float(std[worst]))} {pretty(names[worst].unit)}.',
+        f'10 %{remark}. {least}',
     ]
 
 

@@ -69,9 +69,7 @@ def plan(
             f'play {out / "excitation.yaml"} with excitation_publisher, record it, then '
             f'armid zero fit BAG --robot {robot_source} --out zeros'
         )
-        shown = result.summary()
-        # the last line states the precision relative to described zeros, tilt and tool of 0
-        summary = replace(shown, then='', lines=shown.lines[:-1], steps=[step])
+        summary = replace(result.summary(), then='', steps=[step])
         origin = options.origin(robot_source, read, result.seed)
         options.deliver(result, staged, origin, as_json, summary)
 
