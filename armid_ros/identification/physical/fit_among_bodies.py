@@ -323,15 +323,16 @@ def _far_from_described(robot: Robot, masses: FloatArray) -> tuple[str, ...]:
     heavy = 3.0
     described = robot.rigid_parameters[::PER_LINK]
     named = [
-        f'{link} {mass:.3g} kg, described {known:.3g} kg'
+        link
         for link, known, mass in zip(robot.links, described, masses, strict=True)
         if known > 0.0 and not known / heavy <= mass <= heavy * known
     ]
     if not named:
         return ()
     return (
-        f'masses that differ more than {heavy:g} times from the description: {"; ".join(named)}; '
-        'correct the description, or add missing parts, such as rotors, springs or a load',
+        f'masses that differ more than {heavy:g} times from the description: {", ".join(named)}; '
+        'compare them by armid check. Correct the description, or add missing parts, such as '
+        'rotors, springs or a load',
     )
 
 
