@@ -12,7 +12,7 @@ from rclpy.clock import ROSClock
 
 class Freshness:
     """
-    Age of the last message of a topic in real time, whatever /clock says.
+    Age of the last message of a topic in real time, independent of /clock.
 
     Parameters
     ----------
