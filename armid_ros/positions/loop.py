@@ -60,7 +60,7 @@ class CommandedMotion:
         return cls(t, commanded.q, dq)
 
     def mean(self, edges: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return mean commanded position and velocity between successive edges, (K - 1, n)."""
+        """Return mean commanded position and velocity in each time interval, shape (K - 1, n)."""
         ends = min(self.t[0], edges[0]) - 1.0, max(self.t[-1], edges[-1]) + 1.0
         t = np.concatenate([ends[:1], self.t, ends[1:]])
         values = np.hstack([self.q, self.dq])
