@@ -104,7 +104,7 @@ def _cells(rows: JointRows, labels: npt.NDArray[np.intp], used: npt.NDArray[np.b
 
 
 def _fitted(cells: _Cells, knee: float) -> tuple[float, _Scales]:
-    """Fit the hyperparameters by maximum likelihood; return log likelihood per cell, and them."""
+    """Return the largest log likelihood per cluster, and the hyperparameters that give it."""
     from sklearn.gaussian_process import GaussianProcessRegressor, kernels
 
     size = max(float(np.sqrt(np.mean(cells.torque**2))), 1e-12)

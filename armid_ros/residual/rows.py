@@ -56,7 +56,7 @@ class JointRows:
 
 def joint_rows(arm: ArmModel, data: Sequence[Trajectory]) -> list[JointRows]:
     """
-    Return for each joint the residual torques of a model on recordings, with the states.
+    Return samples of each joint: residual torque of a model, position, velocity and load.
 
     Parameters
     ----------
