@@ -67,7 +67,7 @@ class FittedQuantity:
 @dataclass(frozen=True)
 class ZeroFit:
     """
-    Fit of torque sensor zeros and gains, gravity and tool to K rests of an arm.
+    Torque sensor zeros and gains, gravity and tool, fitted to K rests of an arm.
 
     Attributes
     ----------
