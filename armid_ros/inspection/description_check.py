@@ -365,7 +365,7 @@ def _selected(rows: FloatArray, spread: FloatArray, total: float) -> list[int]:
 def _fit(
     rows: FloatArray, spread: FloatArray, links: Sequence[int]
 ) -> tuple[FloatArray, FloatArray, float]:
-    """Fit inertial parameters of links; return their changes, covariance and the chi-squared."""
+    """Fit inertial parameters of links; return changes, covariance and remaining chi-squared."""
     size = PER_LINK
     own = [size * k + i for k in links for i in range(size)]
     columns, target = rows[:, own] * spread[own], rows[:, -1]

@@ -196,7 +196,7 @@ def _contains_any(text: str, others: Iterable[str]) -> bool:
 
 
 def _fit_remarks(trial: TrialFit, known: Sequence[str]) -> Iterator[Remark]:
-    """Yield remarks on faults that the quick identification found and others do not name."""
+    """Yield remarks on faults that only the quick identification has found."""
     weight: Weight = 'bad' if trial.grade == 'unusable' else 'doubt'
     others = [*known, *trial.elsewhere]
     yield from (
