@@ -116,7 +116,7 @@ class Spread:
 @dataclass(frozen=True)
 class HistoryChange:
     """
-    Largest step of a parameter between its estimates over time, or their linear trend.
+    Largest step in the estimates of a parameter over time, or their linear trend.
 
     Attributes
     ----------

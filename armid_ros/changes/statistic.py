@@ -78,7 +78,7 @@ def limits(chance: float, rank: FloatArray, freedom: FloatArray) -> FloatArray:
 
 def two_means(x: FloatArray, weights: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     """
-    Return the weighted mean before and the one after each possible change point.
+    Return weighted means of values before and after each possible change point.
 
     Parameters
     ----------
