@@ -82,7 +82,7 @@ class PaperTable:
 
     @property
     def ratio(self) -> FloatArray:
-        """Published torque error relative to peak torque, in Table 6 to torque noise, (6,)."""
+        """Published torque errors (6,) relative to peak torque; in Table 6, to torque noise."""
         return self.error / (self.noise if self.uniform else self.peak)
 
 

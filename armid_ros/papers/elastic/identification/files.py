@@ -149,7 +149,7 @@ def _motor_topic(path: str | Path, settings: ReadSettings) -> str:
 def _experiments(
     t: FloatArray, moving: npt.NDArray[np.bool_], period: float
 ) -> list[tuple[int, int, int]]:
-    """Return of each experiment the sample indices: start of rest, start and end of motion."""
+    """Return the sample indices of each experiment: start of rest, start and end of motion."""
     # time of rest between two experiments [s]
     pause, shortest = round(0.1 / period), round(_MIN_DURATION / period)
     found = []

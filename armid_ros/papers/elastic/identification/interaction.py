@@ -37,7 +37,7 @@ HOLD: tuple[Hold, Hold] = ('zero', 'first')
 
 def link_columns(q: FloatArray, dq: FloatArray, ddq: FloatArray) -> FloatArray:
     """
-    Return the regressor of link torques; its columns are the inertias alpha, beta and gamma.
+    Return the regressor of link torques for the inertias alpha, beta and gamma.
 
     Parameters
     ----------

@@ -159,7 +159,7 @@ class GaitCycle:
     def torques(
         self, pair: TiedPair | None = None, ground: FloatArray | None = None
     ) -> FloatArray:
-        """Return exoskeleton torques (N, n), if given for other straps or foot forces."""
+        """Return exoskeleton torques (N, n), optionally with other straps or foot forces."""
         feet = self.own.ground if ground is None else ground
         forces = (feet, self.other.ground)
         return walking_torques(pair or self.pair, self.motions, forces).tau

@@ -81,7 +81,7 @@ class TiedPair(TiedMachines):
 
     def forces(self, way: FloatArray) -> FloatArray:
         """
-        Return the strap forces on the first machine, for vectors along the straps.
+        Return the strap forces on the first machine, for given vectors between strap ends.
 
         The forces on the other machine are opposite.
 
