@@ -198,7 +198,7 @@ def _verdict(found: Watch, diagnoses: Diagnoses) -> VerdictSection:
 
 
 def _diagnosed(arm: WatchedArm, diagnosis: Mapping[str, Any] | None) -> str:
-    """Return the verdict on an arm without change in which a diagnosis found a fault."""
+    """Return the verdict of a diagnosis that found a fault in an unchanged arm; else empty."""
     if arm.named or diagnosis is None or diagnosis['verdict'] in ('consistent', 'failed'):
         return ''
     return str(diagnosis['verdict']).replace('_', ' ')
