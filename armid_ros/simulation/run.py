@@ -203,7 +203,7 @@ def _simulated_motion(
 
 def whole_steps(time: float, dt: float, setting: str) -> int:
     """
-    Return a time as a whole number of plant steps.
+    Convert a time [s] to a whole number of simulation steps.
 
     Raises
     ------

@@ -161,7 +161,7 @@ class ElasticJoints:
         return np.hstack([-w.T * stiffness, -self.damping - (w.T * damping) @ w])
 
     def meshing(self, twist: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return `pull` for springs out of their backlash, and backlash torque offsets (e,)."""
+        """Return `pull` for the springs in contact, and torque offsets (e,) due to backlash."""
         springs = self.transmission
         meshes = np.abs(twist) > springs.gap
         stiffness = np.where(meshes, springs.stiffness, 0.0)
