@@ -97,7 +97,7 @@ def find_path(
 def clear_line(
     clearance: ClearanceModel | None, start: FloatArray, goal: FloatArray
 ) -> Approach | None:
-    """Return an approach of bodies that is too close on a straight line of poses, if any."""
+    """Return a too close approach of bodies on the straight line between poses; None if none."""
     if clearance is None:
         return None
     difference = goal - start
