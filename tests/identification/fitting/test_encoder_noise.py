@@ -18,6 +18,12 @@ def motion(arm):
     return multisine(arm.robot.joints, 15.0, 200.0, seed=1)
 
 
+@pytest.fixture(scope='module')
+def biased(arm, structure, motion):
+    """Return a fit to data with encoder noise alone, and the check of its noise."""
+    return checked(arm, structure, motion, 0.0, 3e-4)
+
+
 def checked(arm, structure, motion, torque_noise, position_noise, seed=0):
     recording = recorded(arm, motion, seed, torque_noise, position_noise)
     result = identify(structure, [recording], SETTINGS, rng=np.random.default_rng(0))
@@ -55,17 +61,17 @@ def test_encoder_noise_that_matters_is_found_and_sized(arm, structure, motion):
     ],
 )
 def test_a_test_that_fires_without_a_bias_shows_a_lacking_effect(
-    arm, structure, motion, p_value, bias, lacking, fine
+    biased, p_value, bias, lacking, fine
 ):
-    _, check = checked(arm, structure, motion, 0.05, 0.0)
+    _, check = biased
     check = replace(check, p_value=p_value, bias=bias * check.std)
     findings = check.findings()
     assert ('model lacks' in findings[0][0]) == lacking
     assert tuple(right for _, right in findings) == fine
 
 
-def test_simulated_bias_is_the_error_of_a_fit_without_torque_noise(arm, structure, motion):
-    result, check = checked(arm, structure, motion, 0.0, 3e-4)
+def test_simulated_bias_is_the_error_of_a_fit_without_torque_noise(arm, biased):
+    result, check = biased
     error = result.estimate.values - result.base.values(arm.theta)
     large = np.abs(check.bias) > 5.0 * check.bias_std
     large &= np.abs(error) > 0.5 * result.estimate.std

@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Every estimator finds the arm; instrumental variables are not biased by encoder noise."""
 
-from armid_ros.arm import ArmModel
-from armid_ros.effects import make_effect
+from dataclasses import replace
+
 from armid_ros.errors import IdentificationError
 from armid_ros.identification import (
     IdentificationSettings,
@@ -12,28 +12,12 @@ from armid_ros.identification import (
     SignalSettings,
 )
 from armid_ros.identification.fitting.least_squares import ESTIMATORS
-from armid_ros.robots import load_robot
 import numpy as np
 import pytest
 
 from ..conftest import multisine, recorded
 
 SIGNALS = SignalSettings(20.0, 4)
-VALUES = {
-    'viscous_friction': 0.08,
-    'coulomb_friction': 0.05,
-    'torque_offset': 0.02,
-    'rotor_inertia': 0.02,
-}
-
-
-@pytest.fixture(scope='module')
-def arm():
-    """Return the humanoid arm with friction and rotors, which can always be simulated."""
-    model = ArmModel(load_robot('humanoid_arm'))
-    for name, value in VALUES.items():
-        model = model.with_effect(make_effect(name, model.robot), np.full(6, value))
-    return model
 
 
 @pytest.fixture(scope='module')
@@ -45,7 +29,7 @@ def torque_error(arm, motion, method, torque_noise, position_noise, signals=SIGN
     """Return the error of the torque along a motion that was not used, as a share of it."""
     recording = recorded(arm, motion, seed, torque_noise, position_noise)
     found = identify(
-        ArmModel(arm.robot, arm.effects),
+        replace(arm, values=()),
         [recording],
         IdentificationSettings(method, signals),
         rng=np.random.default_rng(0),
@@ -72,7 +56,7 @@ def test_intervals_hold_the_truth(arm, motion):
     for seed in range(3):
         recording = recorded(arm, motion, seed, 0.05, 3e-4)
         found = identify(
-            ArmModel(arm.robot, arm.effects),
+            replace(arm, values=()),
             [recording],
             IdentificationSettings('iv', SIGNALS),
             rng=np.random.default_rng(0),

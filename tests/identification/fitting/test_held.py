@@ -54,26 +54,17 @@ def test_a_model_of_jogs_predicts_joints_that_move_at_once(real, found):
     assert errors[:2].max() < 3.0
 
 
-def test_what_is_held_is_said_and_the_grade_is_that_of_the_rest(structure, recordings, found):
-    assert found.base.rank < found.theory.rank
-    held = [one for one in found.unidentified if one.reason == NOT_SHOWN]
-    assert held
-    assert all('coefficient' not in one.parameter.name for one in held)
-    assert grade(found, structure, recordings, {}).word != 'unusable'
-
-
-def test_no_value_is_less_sure_than_the_description(structure, found):
-    assert np.all(found.estimate.std <= base_spread(structure, found.base))
-
-
-def test_what_is_held_is_as_described(structure, found):
+def test_what_is_held_is_said_stays_as_described_and_condemns_no_grade(
+    structure, recordings, found
+):
+    """No value is less certain than the description."""
     theory = found.theory
-    held = [
-        k
-        for k, column in enumerate(theory.independent)
-        if not found.base.grouping[:, column].any()
-    ]
-    assert held
+    named = [one for one in found.unidentified if one.reason == NOT_SHOWN]
+    assert named and all('coefficient' not in one.parameter.name for one in named)
+    assert grade(found, structure, recordings, {}).word != 'unusable'
+    assert np.all(found.estimate.std <= base_spread(structure, found.base))
+    held = ~found.base.grouping[:, theory.independent].any(axis=0)
+    assert held.any()
     now, then = (theory.values(arm.theta) for arm in (found.arm, structure))
     np.testing.assert_allclose(now[held], then[held], atol=1e-9)
 

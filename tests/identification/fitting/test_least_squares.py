@@ -26,13 +26,6 @@ def problem(rng, n_samples=400, noise=None, colour=0.0):
     return Regression('bag', motion, np.ones((n_samples, 2), dtype=bool), columns)
 
 
-@pytest.mark.parametrize('method', ['ols', 'wls', 'irls'])
-def test_without_noise_every_method_is_exact(method):
-    rng = np.random.default_rng(0)
-    solution = solve([problem(rng, noise=np.zeros(2))], method)
-    np.testing.assert_allclose(solution.values, TRUTH, rtol=1e-9)
-
-
 def test_weights_find_the_noise_of_each_joint_and_pay():
     """With ten-fold different noise, weighting is worth about a factor in the deviation."""
     errors = {'ols': [], 'wls': []}
@@ -47,27 +40,27 @@ def test_weights_find_the_noise_of_each_joint_and_pay():
     )
 
 
-@pytest.mark.parametrize('colour', [0.0, 0.9])
-def test_stated_deviations_are_the_scatter_over_repeats(colour):
-    """The naive deviations of AR(1) noise with a = 0.9 are four times too small."""
-    solutions = [
-        solve([problem(np.random.default_rng(seed), 1500, colour=colour)]) for seed in range(150)
-    ]
-    scatter = np.std([s.values for s in solutions], axis=0, ddof=1)
-    stated = np.sqrt(np.mean([np.diag(s.covariance) for s in solutions], axis=0))
-    np.testing.assert_allclose(stated, scatter, rtol=0.25)
+@pytest.mark.parametrize(
+    ('colour', 'gap', 'tolerance'), [(0.0, 0, 0.25), (0.9, 0, 0.25), (0.8, 20, 0.2)]
+)
+def test_stated_deviations_are_the_scatter_over_repeats(colour, gap, tolerance):
+    """
+    The naive deviations of AR(1) noise with a = 0.9 are four times too small.
 
+    A third of the rows may have no information, and any torque. Counted as rows without noise,
+    they would make the deviations a third smaller.
 
-def test_stated_deviations_know_of_gaps():
-    """A third of the rows tells nothing; taken as silence, the noise would be a third less."""
-    told = np.tile(np.arange(60) >= 20, 25)[:, np.newaxis] & np.ones(2, dtype=bool)
+    """
+    told = np.tile(np.arange(60) >= gap, 25)[:, np.newaxis] & np.ones(2, dtype=bool)
     solutions = []
     for seed in range(150):
-        whole = problem(np.random.default_rng(seed), 1500, colour=0.8)
-        solutions.append(solve([replace(whole, informative=told)]))
-    scatter = np.std([s.values for s in solutions], axis=0, ddof=1)
+        whole = problem(np.random.default_rng(seed), 1500, colour=colour)
+        motion = whole.motion.with_torque(np.where(told, whole.tau, 7.0))
+        solutions.append(solve([replace(whole, motion=motion, informative=told)]))
+    values = [s.values for s in solutions]
     stated = np.sqrt(np.mean([np.diag(s.covariance) for s in solutions], axis=0))
-    np.testing.assert_allclose(stated, scatter, rtol=0.2)
+    np.testing.assert_allclose(np.mean(values, axis=0), TRUTH, atol=0.05)
+    np.testing.assert_allclose(stated, np.std(values, axis=0, ddof=1), rtol=tolerance)
 
 
 def test_no_gaps_make_deviations_that_are_out_of_all_proportion():
@@ -94,15 +87,6 @@ def test_outliers_do_not_pull():
     assert np.abs(robust.values - TRUTH).max() < 0.03
     assert np.abs(plain.values - TRUTH).max() > 0.1
     assert robust.outliers >= 2 * len(tau[::40])
-
-
-def test_rows_that_say_nothing_are_not_used():
-    data = problem(np.random.default_rng(2), noise=np.full(2, 0.01))
-    tau, used = data.tau.copy(), np.ones(data.tau.shape, dtype=bool)
-    tau[:100, 0] = 7.0
-    used[:100, 0] = False
-    partial = Regression('bag', data.motion.with_torque(tau), used, data.columns)
-    np.testing.assert_allclose(solve([partial]).values, TRUTH, atol=0.01)
 
 
 def test_bounds_hold_and_the_others_make_up_for_it():
