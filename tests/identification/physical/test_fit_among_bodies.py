@@ -44,29 +44,21 @@ def bodies(drawing, recording):
     return run(drawing, recording, PhysicalSettings())
 
 
-def eigenvalues(result):
-    return np.linalg.eigvalsh(pseudo_inertia(result.arm.robot.rigid_parameters.reshape(-1, 10)))
-
-
-def test_every_link_is_a_body_and_without_constraints_it_is_not(free, bodies):
-    assert eigenvalues(free).min() < 0.0
-    assert eigenvalues(bodies).min() > 0.0
-    assert bodies.physical.consistent
-    np.testing.assert_allclose(
-        [link.eigenvalues for link in bodies.physical.links], eigenvalues(bodies), rtol=1e-6
+def test_every_link_is_a_body_at_the_torque_error_of_the_free_fit(arm, free, bodies):
+    without, found = (
+        np.linalg.eigvalsh(pseudo_inertia(result.arm.robot.rigid_parameters.reshape(-1, 10)))
+        for result in (free, bodies)
     )
-
-
-def test_held_out_torque_error_is_that_of_the_unconstrained_fit(arm, free, bodies):
+    assert without.min() < 0.0 < found.min()
+    assert bodies.physical.consistent
+    eigenvalues = [link.eigenvalues for link in bodies.physical.links]
+    np.testing.assert_allclose(eigenvalues, found, rtol=1e-6)
+    values = bodies.base.values(bodies.arm.theta)
+    np.testing.assert_allclose(bodies.estimate.values, values, rtol=1e-12)
     other = recorded(arm, multisine(arm.robot.joints, 10.0, 250.0, seed=7), 3, 0.02, 1e-5)
     errors = [Score.of(r.predict([other])).relative_error_percent for r in (free, bodies)]
     assert errors[1] < 1.03 * errors[0]
     assert bodies.physical.held_out_ratio < 1.03
-
-
-def test_estimate_and_arm_say_the_same(bodies):
-    values = bodies.base.values(bodies.arm.theta)
-    np.testing.assert_allclose(bodies.estimate.values, values, rtol=1e-12)
 
 
 def test_without_noise_and_with_a_true_description_nothing_changes(arm):
@@ -76,28 +68,31 @@ def test_without_noise_and_with_a_true_description_nothing_changes(arm):
     np.testing.assert_allclose(result.estimate.values, truth, atol=2e-4 * np.abs(truth).max())
 
 
-def test_friction_is_not_negative(arm, recording):
+def test_friction_is_not_negative(arm, structure):
     """Data of an arm that friction drives on: the nearest that can be has none."""
     values = list(arm.values)
     values[0] = np.full(6, -0.05)
     smooth = ArmModel(arm.robot, arm.effects, tuple(values))
     motion = multisine(arm.robot.joints, 20.0, 250.0, seed=1)
-    recording = recorded(smooth, motion, 5, 0.5)
-    structure = ArmModel(arm.robot, arm.effects)
-    result = run(structure, recording, PhysicalSettings())
+    result = run(structure, recorded(smooth, motion, 5, 0.5), PhysicalSettings())
     assert result.arm.values[0].min() >= 0.0
     assert any(name.name == 'viscous_coefficient' for name in result.physical.at_bound)
     assert any('bounds' in note for note in result.notes)
 
 
-def test_total_mass_is_kept_and_improves_what_torques_do_not_say(arm, drawing, recording, bodies):
+@pytest.mark.parametrize('share', [1.0, 0.1])
+def test_total_mass_is_kept_and_a_wrong_one_costs(arm, drawing, recording, bodies, share):
+    """A right one improves what torques do not show."""
     true = arm.robot.rigid_parameters
-    total = float(true[::10].sum())
+    total = share * float(true[::10].sum())
     weighed = run(drawing, recording, PhysicalSettings(total_mass=total))
     found = weighed.arm.robot.rigid_parameters
     assert abs(found[::10].sum() - total) < 1e-6 * total
-    plain = bodies.arm.robot.rigid_parameters
-    assert np.linalg.norm(found - true) < np.linalg.norm(plain - true)
+    off = [np.linalg.norm(one.arm.robot.rigid_parameters - true) for one in (weighed, bodies)]
+    assert (off[0] < off[1]) == (share == 1.0)
+    assert (weighed.physical.held_out_ratio > 1.03) == (share < 1.0)
+    notes = (one.physical.constraint_notes for one in (weighed, bodies))
+    assert [any('held-out' in note for note in own) for own in notes] == [share < 1.0, False]
 
 
 def test_no_mass_is_beyond_its_range_and_held_out_torques_hardly_suffer(
@@ -114,15 +109,6 @@ def test_no_mass_is_beyond_its_range_and_held_out_torques_hardly_suffer(
     assert held.physical.consistent
     assert not bodies.physical.at_mass
     assert held.physical.held_out_ratio < 1.03
-
-
-def test_a_mass_that_is_not_the_arms_is_said_to_cost(drawing, recording, bodies):
-    """A tenth of what it weighs."""
-    assert not any('held-out' in line for line in bodies.physical.constraint_notes)
-    total = 0.1 * float(drawing.robot.rigid_parameters[::10].sum())
-    certificate = run(drawing, recording, PhysicalSettings(total_mass=total)).physical
-    assert certificate.held_out_ratio > 1.03
-    assert 'held-out' in certificate.constraint_notes[0]
 
 
 @pytest.mark.parametrize(
@@ -149,8 +135,17 @@ def test_a_link_stays_in_its_box_which_is_named_where_it_is_too_small(
         assert any('box' in line for line in result.physical.constraint_notes)
 
 
-def test_a_description_without_masses_gets_a_prior(arm, recording):
-    bare = ArmModel(arm.robot.with_inertias(0.0 * arm.robot.rigid_parameters), arm.effects)
+def test_a_description_without_masses_or_with_a_thin_inertia_gets_a_wide_prior(arm, recording):
+    """A vendor's file may have nearly singular principal moments."""
+    thin = arm.robot.rigid_parameters.copy()
+    thin[50:] = 0.63, 0.0, 0.0, 0.0, 5.6e-7, 0.0, 2.2e-4, 0.0, 0.0, 2.2e-4
+    bare, narrow = (
+        ArmModel(arm.robot.with_inertias(body), arm.effects) for body in (0.0 * thin, thin)
+    )
+    theta, notes = consistent_prior(narrow)
+    second = np.linalg.eigvalsh(pseudo_inertia(theta[50:60])[:3, :3])
+    assert second.min() == pytest.approx(0.63 * 0.03**2)
+    assert len(notes) == 1
     theta, notes = consistent_prior(bare)
     assert np.linalg.eigvalsh(pseudo_inertia(theta[:60].reshape(-1, 10))).min() > 0.0
     assert len(notes) == 6
@@ -159,46 +154,26 @@ def test_a_description_without_masses_gets_a_prior(arm, recording):
     assert Score.of(result.training).relative_error_percent < 1.0
 
 
-def test_a_nearly_singular_described_inertia_is_no_narrow_prior(arm):
-    body = arm.robot.rigid_parameters.copy()
-    body[50:54] = 0.63, 0.0, 0.0, 0.0  # principal moments of the last link of a vendor's file
-    body[54:] = 5.6e-7, 0.0, 2.2e-4, 0.0, 0.0, 2.2e-4
-    theta, notes = consistent_prior(ArmModel(arm.robot.with_inertias(body), arm.effects))
-    second = np.linalg.eigvalsh(pseudo_inertia(theta[50:60])[:3, :3])
-    assert second.min() == pytest.approx(0.63 * 0.03**2)
-    assert len(notes) == 1
-
-
 @pytest.mark.parametrize(
-    ('settings', 'said'),
+    ('settings', 'fact'),
     [
-        ({'total_mass': -1.0}, r'total mass .*-1.*positive'),
-        ({'boxes': {'elbow': ((0, 0, 0), (1, -1, 1))}}, r"joint 'elbow'.*below"),
+        ({'total_mass': -1.0}, r'total mass .*-1'),
+        ({'boxes': {'elbow': ((0, 0, 0), (1, -1, 1))}}, "joint 'elbow'"),
+        ({'boxes': {'elbow': ((0, 0, 0), (1, 1, 1))}}, 'elbow_pitch'),  # an unknown joint
         *(({'mass_range': factor}, 'factor above 1') for factor in (1.0, 0.5, np.inf, np.nan)),
     ],
 )
-def test_what_cannot_be_is_refused(settings, said):
-    with pytest.raises(IdentificationError, match=said):
-        PhysicalSettings(**settings)
+def test_what_cannot_be_is_refused(drawing, recording, settings, fact):
+    with pytest.raises((IdentificationError, RobotError), match=fact):
+        run(drawing, recording, PhysicalSettings(**settings))
 
 
-def test_a_box_of_an_unknown_joint_is_refused(drawing, recording):
-    settings = PhysicalSettings(boxes={'elbow': ((0, 0, 0), (1, 1, 1))})
-    with pytest.raises(RobotError, match='elbow_pitch'):
-        run(drawing, recording, settings)
-
-
-@pytest.fixture(scope='module')
-def geared(arm):
-    """Return a fit without the rotors of an arm whose rotors are most of its inertia."""
+def test_an_inertia_that_is_not_of_the_links_takes_no_mass_along(arm, structure):
+    """Of rotors that are most of the inertia; torques do not show the mass of the first link."""
     rotors = np.array([0.3, 0.3, 0.1, 0.1, 0.003, 0.003])
     truth = arm.with_effect(make_effect('rotor_inertia', arm.robot), rotors)
     recording = recorded(truth, multisine(arm.robot.joints, 20.0, 100.0, seed=1), 0, 0.02)
-    return run(ArmModel(arm.robot, arm.effects), recording, PhysicalSettings())
-
-
-def test_an_inertia_that_is_not_of_the_links_takes_no_mass_along(arm, geared):
-    """The torques do not show the mass of the first link at all."""
+    geared = run(structure, recording, PhysicalSettings())
     masses, described = (r.rigid_parameters[::10] for r in (geared.arm.robot, arm.robot))
     assert masses[0] == pytest.approx(described[0], rel=0.3)
     assert np.max(masses / described) < 5.0
@@ -209,6 +184,5 @@ def test_masses_far_beyond_the_described_are_said(arm, recording):
     light[5] *= 0.02
     structure = ArmModel(arm.robot.with_inertias(light.ravel()), arm.effects)
     result = run(structure, recording, PhysicalSettings())
-    (note,) = (n for n in result.notes if 'from the description' in n)
-    assert arm.robot.links[5] in note
-    assert arm.robot.links[0] not in note
+    assert any(arm.robot.links[5] in note for note in result.notes)
+    assert not any(arm.robot.links[0] in note for note in result.notes)
