@@ -24,10 +24,8 @@ SLIDER = """
 
 
 @pytest.mark.parametrize('joints', [None, ('turn',), ('slide', 'turn')])
-def test_points_are_where_pinocchio_has_them(joints, tmp_path):
-    (tmp_path / 'slider.urdf').write_text(SLIDER)
-    source = 'humanoid_arm' if joints is None else str(tmp_path / 'slider.urdf')
-    robot = load_robot(source, joints=joints)
+def test_points_are_where_pinocchio_has_them(joints):
+    robot = load_robot('humanoid_arm' if joints is None else SLIDER, joints=joints)
     rng = np.random.default_rng(0)
     q = rng.uniform(-1.0, 1.0, (5, robot.n_joints))
     offsets = rng.normal(size=(robot.n_joints, 3))
@@ -44,15 +42,6 @@ def test_points_are_where_pinocchio_has_them(joints, tmp_path):
             ).reshape(6, -1)
             at_point = frame.actionInverse @ moved
             np.testing.assert_allclose(jacobians[k, i], at_point[:3], atol=1e-12)
-
-
-@pytest.mark.filterwarnings('error')
-def test_what_turns_without_end_is_at_zero_in_the_middle(tmp_path):
-    (tmp_path / 'slider.urdf').write_text(SLIDER.replace('"revolute"', '"continuous"'))
-    robot = load_robot(str(tmp_path / 'slider.urdf'))
-    middle = LinkFrames.in_the_middle(robot).places('turn', np.array([0.1, 0.2, 0.3]))
-    there = LinkFrames.of(robot, np.zeros((1, 2))).places('turn', np.array([0.1, 0.2, 0.3]))
-    np.testing.assert_array_equal(middle, there)
 
 
 def test_forces_on_a_link_do_the_work_of_the_torques_that_they_take():

@@ -11,7 +11,6 @@ from armid_ros.model import (
     regressor,
 )
 from armid_ros.model.pseudo_inertia import Consistency
-from armid_ros.motion import Motion
 from armid_ros.robots import load_robot
 import numpy as np
 import pytest
@@ -67,27 +66,3 @@ def test_torque_is_linear_in_gravity(arm, motion):
     weightless = inverse_dynamics(arm.with_gravity(np.zeros(3)), motion)
     weight = gravity_sensitivity(arm, motion.q) @ arm.gravity
     np.testing.assert_allclose(weightless + weight, inverse_dynamics(arm, motion), atol=1e-12)
-
-
-def test_power_is_the_change_of_energy(arm):
-    """d/dt (kinetic + potential) = dq . tau for a rigid body without friction."""
-    import pinocchio as pin
-
-    model, data = arm.model, arm.model.createData()
-    t = np.linspace(0.0, 1.0, 2001)
-    phases = np.arange(arm.n_joints)
-    w = 2.0 * np.pi
-    q = 0.4 * np.sin(w * t[:, None] + phases)
-    dq = 0.4 * w * np.cos(w * t[:, None] + phases)
-    ddq = -0.4 * w * w * np.sin(w * t[:, None] + phases)
-    tau = inverse_dynamics(arm, Motion(arm.joints, t, q, dq, ddq))
-    energy = np.array(
-        [
-            pin.computeKineticEnergy(model, data, a, b)
-            + pin.computePotentialEnergy(model, data, a)
-            for a, b in zip(q, dq, strict=True)
-        ]
-    )
-    power = np.sum(tau * dq, axis=1)
-    work = np.concatenate([[0.0], np.cumsum((power[1:] + power[:-1]) / 2 * np.diff(t))])
-    np.testing.assert_allclose(energy - energy[0], work, atol=1e-5 * np.ptp(energy))
