@@ -31,13 +31,6 @@ def test_parameters_times_columns_is_torque_where_all_is_linear(robot, motion):
     np.testing.assert_allclose(arm.columns(motion) @ arm.theta, arm.torque(motion), atol=1e-10)
 
 
-def test_theta_goes_in_and_out(robot):
-    arm = arm_with(robot, viscous_friction=0.2, torque_gain=0.1)
-    theta = arm.theta + 0.01
-    np.testing.assert_allclose(arm.with_theta(theta).theta, theta, rtol=1e-14)
-    assert len(arm.parameters) == len(theta)
-
-
 def test_the_number_of_values_is_checked(robot):
     with pytest.raises(ModelError, match='viscous_friction'):
         ArmModel(robot).with_effect(make_effect('viscous_friction', robot), [1.0])
@@ -60,19 +53,16 @@ def test_weight_alone_is_felt_where_that_is_asked_for(robot, motion):
     np.testing.assert_allclose(slow.columns(motion) @ slow.theta, slow.torque(motion), atol=1e-10)
 
 
-def test_a_gain_of_all_joints_cannot_be_told_from_masses_but_gains_of_each_can(robot):
-    rng = np.random.default_rng(1)
-    rigid = ArmModel(robot).base_parameters(rng).rank
-    gains = arm_with(robot, torque_gain=0.0).base_parameters(rng).rank
-    assert gains == rigid + 5
-
-
-def test_asymmetric_coulomb_friction_is_an_offset_while_all_moves(robot):
-    rng = np.random.default_rng(1)
-    arm = arm_with(robot, torque_offset=0.0)
-    rank = arm.base_parameters(rng).rank
-    effect = make_effect('asymmetric_friction', robot)
-    assert arm.with_effect(effect).base_parameters(rng).rank == rank + 6
+@pytest.mark.parametrize(
+    ('name', 'known', 'more'),
+    [('torque_gain', (), 5), ('asymmetric_friction', ('torque_offset',), 6), ('payload', (), 0)],
+)
+def test_base_parameters_that_an_effect_adds(robot, name, known, more):
+    """A gain of all joints is a mass, asymmetric Coulomb friction an offset while all moves."""
+    arm = arm_with(robot, **dict.fromkeys(known, 0.0))
+    wider = arm.with_effect(make_effect(name, robot))
+    ranks = [one.base_parameters(np.random.default_rng(1)).rank for one in (arm, wider)]
+    assert ranks[1] == ranks[0] + more
 
 
 @pytest.mark.parametrize(

@@ -20,13 +20,17 @@ VALUES = {
 }
 
 
-@pytest.fixture
-def arm():
-    robot = load_robot('humanoid_arm')
+def arm_of(robot):
+    """Return an arm with friction, rotors and offsets."""
     arm = ArmModel(robot)
     for name, value in VALUES.items():
-        arm = arm.with_effect(make_effect(name, robot), np.full(6, value))
+        arm = arm.with_effect(make_effect(name, robot), np.full(robot.n_joints, value))
     return arm
+
+
+@pytest.fixture
+def arm(robot):
+    return arm_of(robot)
 
 
 def test_what_has_no_place_is_listed_and_said_in_the_file(arm):
@@ -36,7 +40,7 @@ def test_what_has_no_place_is_listed_and_said_in_the_file(arm):
     assert re.search(r'rotor_inertia of elbow_pitch = 0\.01', exported.text)
 
 
-def test_mujoco_has_a_place_for_rotor_inertia(arm):
+def test_mujoco_has_a_place_for_rotor_inertia_and_dry_friction_acts_in_slow_motion(arm):
     exported = arm_mjcf(arm)
     model = mujoco.MjModel.from_xml_string(exported.text)
     np.testing.assert_array_equal(model.dof_armature, 0.01)
@@ -44,10 +48,6 @@ def test_mujoco_has_a_place_for_rotor_inertia(arm):
     np.testing.assert_array_equal(model.dof_frictionloss, 0.2)
     np.testing.assert_array_equal(model.opt.gravity, arm.robot.gravity)
     assert {line.split(':')[0] for line in exported.without_place} == {'torque_offset'}
-
-
-def test_dry_friction_in_mujoco_acts_in_slow_motion(arm):
-    model = mujoco.MjModel.from_xml_string(arm_mjcf(arm).text)
     data = mujoco.MjData(model)
     data.qvel[:] = 0.5
     mujoco.mj_forward(model, data)
@@ -70,10 +70,7 @@ CONTROL = (
 @pytest.mark.parametrize('export', [arm_urdf, arm_mjcf])
 @pytest.mark.parametrize('joints', [None, ('shoulder_pitch', 'elbow_pitch')])
 def test_the_torque_in_mujoco_is_that_of_the_arm(export, joints):
-    robot = load_robot('humanoid_arm', joints=joints)
-    arm = ArmModel(robot)
-    for name, value in VALUES.items():
-        arm = arm.with_effect(make_effect(name, robot), np.full(robot.n_joints, value))
+    arm = arm_of(load_robot('humanoid_arm', joints=joints))
     exported = export(arm)
     check = torque_check(exported, arm)
     assert check['states'] == 50
