@@ -22,7 +22,7 @@ from dataclasses import dataclass, replace
 from typing import Any, ClassVar, Protocol, Self
 
 from armid_ros.effects.action import Action, Displacement
-from armid_ros.effects.quantities import joint_unit, places_among, Quantity, Shape
+from armid_ros.effects.quantities import joint_unit, Quantity, Shape
 from armid_ros.effects.traits import Traits
 from armid_ros.errors import meant, ModelError
 from armid_ros.estimate import ParameterName
@@ -340,8 +340,8 @@ class Effect(ABC):
         return True
 
     def indices(self, motion_joints: tuple[str, ...]) -> list[int]:
-        """Return the indices of the effect's joints among the given joints."""
-        return list(places_among(self.joints, motion_joints))
+        """Return the indices of the effect's joints among the joints of a motion or robot."""
+        return [motion_joints.index(joint) for joint in self.joints]
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,6 @@ from typing import ClassVar, NamedTuple
 
 from armid_ros.effects.action import Action, direction, DryFriction
 from armid_ros.effects.base import Arm, Effect
-from armid_ros.effects.quantities import places_among
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.robots import Robot
 import numpy as np
@@ -162,6 +161,6 @@ def _flat_places(
     joints: tuple[str, ...], among: tuple[str, ...], count: int
 ) -> tuple[npt.NDArray[np.intp], tuple[npt.NDArray[np.intp], ...]]:
     """Return indices of joints among other joints, and of their entries in a regressor row."""
-    own = np.array(places_among(joints, among), dtype=np.intp)
+    own = np.array([among.index(joint) for joint in joints], dtype=np.intp)
     size = count * len(own)
     return own, tuple(own * size + np.arange(first, size, count) for first in range(count))

@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
 
 from armid_ros.robots import Robot
 import numpy as np
@@ -169,9 +168,3 @@ def written_units(unit: str) -> tuple[str, ...]:
     return tuple(
         dict.fromkeys((unit, _PRISMATIC_UNITS.get(unit, unit), *_MIXED_UNITS.get(unit, ())))
     )
-
-
-@lru_cache(maxsize=1024)
-def places_among(joints: tuple[str, ...], among: tuple[str, ...]) -> tuple[int, ...]:
-    """Return the indices of joints among other joints; results are cached."""
-    return tuple(among.index(joint) for joint in joints)
