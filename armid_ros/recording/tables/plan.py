@@ -319,7 +319,7 @@ def _time_unit(table: Table, column: TableColumn, given: str | None) -> str:
 
 def converted(plan: TablePlan) -> Recording:
     """
-    Convert a table to a recording as a plan states.
+    Convert a table to a recording, with the columns and units of a plan.
 
     Raises
     ------
