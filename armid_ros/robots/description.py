@@ -117,7 +117,7 @@ class Description:
         return tuple(dict.fromkeys(joint for loop in self.loops for joint in loop.passive))
 
     def movable(self) -> tuple[Joint, ...]:
-        """Revolute, continuous and prismatic joints."""
+        """Return the revolute, continuous and prismatic joints."""
         return tuple(joint for joint in self.joints if joint.kind in MOVABLE)
 
     def inertia_doubts(self) -> tuple[str, ...]:

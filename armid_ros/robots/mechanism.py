@@ -138,7 +138,7 @@ class Mechanism:
 
     def _solved(self, u: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """
-        Solve the loop closure in one pose of the driven joints; return positions and J.
+        Solve the loop closure in one pose of the driven joints; return positions and Jacobian.
 
         The third result, (m, 3 L), is the change of the moving joints per metre between the ends.
 
