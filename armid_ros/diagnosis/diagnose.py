@@ -210,7 +210,7 @@ def _of_spans(
 def _with_unfitted_joints(
     arm: ArmModel, recordings: Sequence[Recording], used: Conditioning
 ) -> Iterator[tuple[Recording, npt.NDArray[np.bool_]]]:
-    """Yield recordings, each with a mask of joints that the model fits in the others only."""
+    """Yield recordings with a mask of the joints that the model fits in other recordings only."""
     unit = np.ones(arm.robot.n_joints)
     bad, sound = np.zeros((2, len(recordings), len(unit)), dtype=bool)
     for k, one in enumerate(recordings):

@@ -98,7 +98,7 @@ def prepare(
     misfit: bool = False,
 ) -> Prepared:
     """
-    Measure the torque noise of trajectories, and select the rows near velocity reversals.
+    Measure the torque noise of trajectories, and decide which rows near reversals are used.
 
     Rows next to reversals are used if their noise exceeds the error of dry friction. They are not
     used if the floor is a misfit: dry friction is then the largest error of a model, and it

@@ -49,7 +49,7 @@ class Rows:
         return cls(evidence.data, evidence.sigma, 0, amplitude).above_rounding()
 
     def above_rounding(self) -> Rows:
-        """Raise `sigma` and `amplitude` to at least the rounding error, 1e-4 of the rms torque."""
+        """Return the rows with `sigma` and `amplitude` at least 1e-4 of the rms torque."""
         least = 1e-4 * self.torque
         return replace(
             self,

@@ -197,7 +197,7 @@ def trajectories(
 
 def thinnable(used: Conditioning) -> Conditioning:
     """
-    Reduce the row decimation to a multiple of the decimation of regressor columns.
+    Lower the decimation of rows to a multiple of the decimation of regressor columns.
 
     Each row then spans a whole number of column samples; rows increase by at most an eighth.
 
@@ -275,7 +275,7 @@ def count_recordings(data: Sequence[Trajectory]) -> int:
 
 
 def unchecked_joints(data: Sequence[Trajectory], joints: Sequence[str]) -> tuple[str, ...]:
-    """Return the joints without usable data: at rest, or in reversal in each row."""
+    """Return the joints without usable data, because they rest or reverse in every row."""
     if not data:
         return ()
     shown = moving(part.motion for part in data)

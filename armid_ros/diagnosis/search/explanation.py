@@ -251,7 +251,7 @@ def survey(
     unset: Sequence[CauseResult] = (),
     named: Collection[Key] = (),
 ) -> tuple[tuple[CauseResult, ...], tuple[tuple[str, tuple[str, ...]], ...]]:
-    """Return test results of all visible causes, and the names and joints of invisible causes."""
+    """Return test results of all causes that the data can reveal, and names of other causes."""
     ranking, material = result.first, settings.material
     # The likeliest hyperparameters without the accepted causes may hide other causes.
     posterior = ranking.nuisance.posterior(result.posterior.hyperparameters)

@@ -206,7 +206,7 @@ class JointFit:
     def _weighted_residual(
         self, model: ArmModel, torque: Sequence[FloatArray]
     ) -> list[FloatArray]:
-        """Return weighted residuals; in diagnosed recordings, of `model` and plus `torque`."""
+        """Return weighted residuals; for diagnosed recordings, those of `model`, plus `torque`."""
         rows, residual = self.nuisance.rows, list(self.nuisance.residual)
         rest = [
             own + part.residual(model) if rows.diagnosed[part.fold] else own

@@ -93,7 +93,7 @@ class Nuisance:
         gravity: FloatArray | None = None,
     ) -> Nuisance:
         """
-        Compute the weighted regressor and residual of each recording.
+        Set up the regression: compute weighted regressor and residual of each recording.
 
         Parameters
         ----------
@@ -162,7 +162,7 @@ class Nuisance:
 
     @cached_property
     def count(self) -> npt.NDArray[np.intp]:
-        """Number of informative rows of each recording, summed over joints, shape (K,)."""
+        """Number of rows in which a joint moves, in each recording, summed over joints, (K,)."""
         folds = [part.fold for part in self.rows.data]
         return np.bincount(folds, [np.count_nonzero(w) for w in self.rows.weight]).astype(int)
 
@@ -178,7 +178,7 @@ class Nuisance:
 
     @cached_property
     def cross(self) -> FloatArray:
-        """Inner products of these columns with the residual, shape (K, q + a)."""
+        """Inner products of nuisance columns and accepted causes with the residual, (K, q + a)."""
         aims = [one.aim * self._acting(one)[:, :, 0] for one in self.accepted]
         return np.concatenate([self.column_products[1], *aims], axis=1)
 

@@ -352,7 +352,7 @@ class Diagnosis:
 
     @property
     def not_checked(self) -> tuple[str, ...]:
-        """Joints without usable data: at rest, or in reversal in each row."""
+        """Joints without usable data, because they rest or reverse in every row."""
         return unchecked_joints(self.data, self.arm.robot.joints)
 
     def __repr__(self) -> str:
