@@ -102,7 +102,7 @@ class IdentificationSettings:
 
     @property
     def least_squares(self) -> Method:
-        """Return the least-squares method, also that before instrumental variables."""
+        """Return the least-squares method; for instrumental variables, that of the first fit."""
         return 'wls' if self.method == 'iv' else self.method
 
     @property

@@ -83,7 +83,7 @@ WITHOUT_BODY = Hypothesis(
 
 def hypotheses(robot: Robot, motions: Sequence[Motion]) -> Iterator[Hypothesis]:
     """
-    Yield possible mistakes in recorded motions as hypotheses to test, but no torque delay.
+    Yield possible mistakes in recorded motions as hypotheses to test, except torque delays.
 
     Only values beyond 2 pi are tested for degrees: even small angles in degrees exceed this.
 
@@ -170,7 +170,7 @@ def in_unit(robot: Robot, joint: int, unit: str) -> Hypothesis:
 
 
 def delayed(seconds: float, half_width: float) -> Hypothesis:
-    """Return the hypothesis that torques lag by a delay with a given half-width [s]."""
+    """Return the hypothesis that torques lag by a time, with its 95 % half-width [s]."""
     side = 'later' if seconds > 0.0 else 'earlier'
     return Hypothesis(
         'delay',

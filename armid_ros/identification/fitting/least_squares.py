@@ -99,7 +99,7 @@ class NormalEquations:
         cls, problem: Sequence[Regression], weights: npt.NDArray[np.floating] | None = None
     ) -> NormalEquations:
         """
-        Compute the normal equations of one or more stretches.
+        Compute the normal equations of one or more gap-free sections of recordings.
 
         Parameters
         ----------
@@ -188,7 +188,7 @@ def solve(
     bounds: tuple[FloatArray, FloatArray] | None = None,
 ) -> Solution:
     """
-    Fit parameters to the torques of one or more stretches by least squares.
+    Fit parameters to the torques of gap-free sections of recordings by least squares.
 
     Parameters
     ----------

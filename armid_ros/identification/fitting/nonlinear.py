@@ -79,7 +79,7 @@ class FittedValues:
 
     @property
     def fits(self) -> tuple[Fit, ...]:
-        """Measured and predicted torques of the training data, per stretch."""
+        """Measured and predicted torques of the training data, for each gap-free section."""
         return tuple(
             Fit(part.source, part.motion, part.informative, torque)
             for part, torque in zip(self.problem, self.predicted, strict=True)

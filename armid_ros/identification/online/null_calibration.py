@@ -234,7 +234,7 @@ class ResidualScale:
 
     @property
     def value(self) -> FloatArray:
-        """Ratio of residual standard deviation to assumed noise of each joint, (m,); first 1."""
+        """Ratio of residual standard deviation to assumed noise, for m joints; at first 1."""
         return np.ones(1) if self._value is None else self._value
 
     def learn(self, residual: FloatArray, weights: FloatArray) -> None:

@@ -77,7 +77,7 @@ def without_damage(
 
 def impossible_excursions(t: FloatArray, x: FloatArray, floor: FloatArray) -> list[Excursion]:
     """
-    Return jumps of signals and back that no real motion or torque can make.
+    Return jumps of signals, with a return, that no real motion or torque can make.
 
     A `SpikeGate` finds them with the prediction errors and ranges of the whole recording. It
     processes only samples that differ too much from their prediction, and the samples after them.

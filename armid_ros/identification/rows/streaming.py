@@ -28,7 +28,7 @@ import numpy.typing as npt
 
 
 def _cuts(piece: Recording, used: Conditioning) -> tuple[int, int]:
-    """Return at which times [ns] the next piece begins, and its decimated samples begin."""
+    """Return when the next piece of a recording begins, and its decimated samples begin [ns]."""
     # after 16 periods, the start of a filter of order 4 has decayed to exp(-38)
     periods = (EDGE_PERIODS + 16.0) * used.rate_hz / used.cutoff_hz
     margin = int(np.ceil(periods)) + len(used.taps)

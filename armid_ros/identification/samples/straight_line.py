@@ -271,7 +271,7 @@ class NoiseLevel:
             self._use(period, size, share_of_noise(errors, np.maximum(size, self._least(period))))
 
     def learn(self, innovation: Innovation, move: FloatArray) -> None:
-        """Add the prediction error of an undamaged sample, and its change of signals (m,)."""
+        """Add the prediction error of an undamaged sample, and the change of its signals (m,)."""
         self._window.append((innovation, move))
 
     def settle(self, period: float, count: int = WINDOW) -> bool:
