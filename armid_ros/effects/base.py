@@ -331,7 +331,7 @@ class Effect(ABC):
 
     def plausible(self, values: FloatArray, std: FloatArray, arm: Arm) -> bool:
         """
-        Return whether fitted values are physically plausible, in addition to their bounds.
+        Return whether fitted values, already within bounds, are physically plausible together.
 
         ``std``, shape (P,), has standard deviations for white noise. The arm does not contain
         the effect.

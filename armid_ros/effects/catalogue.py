@@ -261,7 +261,7 @@ _Kind = TypeVar('_Kind', bound=type[Effect])
 
 def register(kind: _Kind) -> _Kind:
     """
-    Class decorator that adds a user-defined effect to the catalogue.
+    Add a user-defined effect class to the catalogue; to be used as class decorator.
 
     The effect can then be named like a shipped effect: in ``make_effect``, in model.yaml and in
     ``effects='...'``. The diagnosis searches for it. A new definition of a class, as in a

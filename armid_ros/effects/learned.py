@@ -243,7 +243,7 @@ class LearnedTorque(Effect):
 
 
 def scaled_inputs(inputs: FloatArray, knee: float) -> FloatArray:
-    """Scale velocities in inputs (position, velocity, load) to u of `TorqueMap`."""
+    """Scale the velocities in inputs (position, velocity, load) as a `TorqueMap` does."""
     velocity = knee * np.arcsinh(inputs[..., 1] / knee)
     return np.stack([inputs[..., 0], velocity, inputs[..., 2]], axis=-1)
 
