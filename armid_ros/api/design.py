@@ -185,7 +185,7 @@ def _searched(
         planner.free_start()  # raises an error before the search if no pose is free
     elif start.shape != (model.robot.n_joints,):
         raise TrajectoryError(
-            f'start has shape {start.shape}, but the arm needs shape ({model.robot.n_joints},)'
+            f'the start pose has shape {start.shape}; the arm needs ({model.robot.n_joints},)'
         )
     elif fault := planner.fault(start):
         hint = '; are these degrees?' if not planner.fault(np.radians(start)) else ''
