@@ -316,7 +316,6 @@ def _splits(series: ParameterHistory, spread: Spread) -> _Splits:
 def _by_parameter(
     series: Sequence[ParameterHistory],
 ) -> dict[tuple[str, str], list[ParameterHistory]]:
-    """Group the estimates of all arms by parameter name and joint."""
     groups: dict[tuple[str, str], list[ParameterHistory]] = {}
     for one in series:
         groups.setdefault(one.parameter, []).append(one)
