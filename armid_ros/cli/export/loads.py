@@ -81,7 +81,7 @@ def load_of(arm: ArmModel, joint: str | None = None, frame: str | None = None) -
     if joint is None and len(payloads) == 1:
         (joint,) = payloads
     if joint is None or joint not in payloads:
-        raise ModelError(f'payloads are only on {", ".join(payloads)}: choose one with --joint')
+        raise ModelError(f'name the joint of one payload with --joint: {", ".join(payloads)}')
     ten = payloads[joint]
     if not ten[0] > NO_MASS:
         raise ModelError(
