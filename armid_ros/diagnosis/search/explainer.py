@@ -188,7 +188,6 @@ class Explainer:
         return replace(found, floor=WRITTEN_MISFIT, misfit=misfit, untested=_NO_BASELINE)
 
     def _explain_since_baseline(self, baseline: Baseline) -> Explanation:
-        """Find the changes since the baseline was recorded."""
         prepared = self.prepared
         now, then = torque_rms(prepared.data), torque_rms(baseline.data)
         misfit = baseline.misfit * growth(now, then)
