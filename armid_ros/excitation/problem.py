@@ -103,7 +103,7 @@ class DesignSettings:
             if name not in known:
                 raise TrajectoryError(f"there is no {kind} '{name}'; choose {', '.join(known)}")
         if self.focus and self.criterion == 'T':
-            raise TrajectoryError("focus is not available with criterion 'T', which has a rival")
+            raise TrajectoryError("focus and criterion 'T' were both given; leave out one")
         self._require_numbers()
 
     def _require_numbers(self) -> None:
@@ -214,8 +214,8 @@ class DesignProblem:
         noise = torque_noise(arm, settings)
         if (settings.criterion == 'T') != (rival is not None):
             raise TrajectoryError(
-                "criterion 'T' needs a rival, and other criteria cannot have one: give both or "
-                'neither'
+                "criterion 'T' needs a rival model, and other criteria cannot use one: give both "
+                'or neither'
             )
         model = arm if rival is None else _joined(arm, rival)
         motion = random_motion(arm.robot, rng)
