@@ -99,7 +99,6 @@ def _print_shown(lines: Sequence[str], rest: str) -> None:
 
 
 def _print_json(name: str, **document: Any) -> None:
-    """Print the result of a command as a JSON document."""
     click.echo(json_text({'schema': f'armid/{name}/1', **document}, indent=1))
 
 

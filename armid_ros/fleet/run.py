@@ -280,7 +280,6 @@ class _Run:
                 self.outcomes.append(replace(outcome, refused=refused))
 
     def _count(self, bags: Sequence[BagFile]) -> None:
-        """Count finished bags and report the progress."""
         self._ended.update(bag.url for bag in bags)
         self._report(len(self._ended), self._bags)
 

@@ -312,7 +312,6 @@ def _table(store: Store, data_set: str) -> pa.Table:
 
 
 def _by_arm(table: pa.Table | None) -> dict[str, list[dict[str, Any]]]:
-    """Group the rows of a table by the name of the arm."""
     rows: dict[str, list[dict[str, Any]]] = {}
     for row in [] if table is None else table.to_pylist():
         rows.setdefault(str(row['arm']), []).append(row)
