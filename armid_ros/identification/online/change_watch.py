@@ -247,7 +247,6 @@ class ChangeWatch:
             self._work.begin(self._search_queue(), urgent=True)
 
     def _search_queue(self) -> Job:
-        """Search the queued blocks for changes."""
         try:
             while self._queued:
                 stretch = self._queued.popleft()

@@ -148,7 +148,7 @@ def stacked(problems: Sequence[InteractionProblem]) -> InteractionProblem:
 
     """
     if any(part.rigid != problems[0].rigid for part in problems):
-        raise IdentificationError('a stretch between gaps has too little motion for free inertias')
+        raise IdentificationError('a gap-free section has too little motion for free inertias')
     joined = {name: np.concatenate([getattr(part, name) for part in problems]) for name in STACKED}
     return replace(problems[0], **joined)  # type: ignore[arg-type]
 
