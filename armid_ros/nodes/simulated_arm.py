@@ -182,7 +182,7 @@ class SimulatedArmNode(ArmidNode):
         with reading("parameter 'start'", RobotError):
             start = numbers(self.value('start'))
             if start and len(start) != n:
-                raise RobotError(f'{len(start)} numbers for {n} joints; give one number per joint')
+                raise RobotError(f'the start pose has {len(start)} numbers, the arm {n} joints')
         return make_simulated_arm(
             with_effects(arm, self.value('effects')),
             rng=np.random.default_rng(self.value('seed')),
@@ -199,7 +199,6 @@ class SimulatedArmNode(ArmidNode):
         return whole_steps(1.0 / rate, self._arm.plant.dt, f'a rate of {rate:g} Hz')
 
     def _set_rates(self) -> None:
-        """Set the rates of joint states, /clock and simulation from the parameters."""
         rate = self.value('rate')
         self._stride = self._steps_at(rate)
         self._factor = 0.0 if self._follows else self.value('real_time_factor')
@@ -330,7 +329,6 @@ class SimulatedArmNode(ArmidNode):
         self._arm.sensors = replace(self._arm.sensors, **known)
 
     def _with_effects(self, texts: Sequence[str]) -> ArmModel:
-        """Return the arm model that the ROS parameters describe, with other effects."""
         if self._without_effects is None:
             raise ModelError(
                 "the parameter 'effects' cannot change an arm that was given to the node in Python"

@@ -230,7 +230,6 @@ class TrajectoryController:
 
     @property
     def _ready(self) -> bool:
-        """Whether a controller accepts goals of the action."""
         return self.client is not None and bool(self.client.server_is_ready())
 
     def _make_client(self) -> None:

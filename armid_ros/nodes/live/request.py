@@ -59,8 +59,8 @@ class LiveSettings:
         """Raise an IdentificationError if the window is shorter than a diagnosed motion."""
         if not 0.0 < self.shortest <= self.window:
             raise IdentificationError(
-                f'window, {self.window:g} s, is shorter than the shortest diagnosed motion: '
-                f'shortest, {self.shortest:g} s'
+                f'window is {self.window:g} s and shortest {self.shortest:g} s, but shortest has '
+                'to be positive and at most window'
             )
 
 

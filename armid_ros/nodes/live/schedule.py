@@ -226,7 +226,6 @@ class LiveDiagnosis:
         self._clear_proposal()
 
     def _clear_proposal(self) -> None:
-        """Clear the proposal, and the count of diagnoses that agree."""
         self._propose(None)
         self._agreed = []
         self._outdated = self._under_way
