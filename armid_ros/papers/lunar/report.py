@@ -168,7 +168,6 @@ def curves_section(repeated: Sequence[Repeated]) -> ContentSection:
 
 
 def _gravity_section(composites: Sequence[Composite], load: str) -> ContentSection:
-    """Return the section with the gravity parameters, without and with the load."""
     text = (
         'First moments times the gravity of the moon [N mm], from gravity torques alone, with '
         '95 % intervals. Nine parameters of the paper are legible; all have this form. '

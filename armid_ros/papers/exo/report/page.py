@@ -107,7 +107,6 @@ _ROLES: tuple[Role, ...] = ('residual', 'predicted', 'before', 'measured')
 def _stiffness_section(
     found: Sequence[Interaction], walked: SimulatedWalk | None
 ) -> ContentSection:
-    """Return the section with stiffness and 95 % interval of each strap."""
     heads = ['Strap', 'Stiffness [N/m]', '± 95 %', 'Bias of ordinary least squares']
     rows = [
         [
