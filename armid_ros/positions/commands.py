@@ -62,7 +62,7 @@ def read_commands(
     columns = columns or ColumnSettings()
     if is_table(path):
         if name is None:
-            raise RecordingError(f'{path}: give --commands, the columns of commanded positions')
+            raise RecordingError(f'{path}: name the commanded positions with --commands')
         columns = replace(columns, position=name, velocity='none', effort='none')
         topic = None
     else:
