@@ -141,7 +141,6 @@ def merged(
 
 
 def _concatenated(parts: Sequence[JointSamples]) -> JointSamples:
-    """Concatenate samples of the same joints along time."""
     if len(parts) == 1:
         return parts[0]
     values = tuple(_stacked([part.values[field] for part in parts], parts) for field in range(3))

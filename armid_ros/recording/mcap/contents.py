@@ -123,7 +123,7 @@ def _content(found: FileMap, chunk: Chunk, settings: ReadSettings) -> bytes | me
     stored = memoryview(found.data)[chunk.begin : chunk.end]
     if chunk.compression not in ('', 'zstd', 'lz4'):
         raise ValueError(
-            f"its compression '{chunk.compression}' is not supported; zstd and lz4 are supported"
+            f"the compression '{chunk.compression}' of the chunk is not supported; use zstd or lz4"
         )
     if not chunk.complete:
         most = min(chunk.size, settings.memory_limit)

@@ -311,7 +311,6 @@ def _records(records: Sequence[McapRecord]) -> bytes:
 
 
 def _record(record: McapRecord) -> bytes:
-    """Return an MCAP record as bytes."""
     builder: Any = RecordBuilder()
     record.write(builder)
     return bytes(builder.end())

@@ -111,7 +111,6 @@ def _has_numbers(line: str) -> bool:
 
 
 def _same_width(header: str, row: str) -> bool:
-    """Return whether a header and a row have the same number of cells."""
     separator = _separator([row])
     return bool(header) and len(_split(header, separator)) == len(_split(row, separator))
 
