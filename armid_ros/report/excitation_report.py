@@ -263,7 +263,6 @@ def _input_section(
 def _motion_section(
     limits: Limits, motion: Motion, shares: Mapping[str, FloatArray]
 ) -> ContentSection:
-    """Return the section with position, velocity, acceleration and torque, and their limits."""
     assert motion.tau is not None
     quantities = (
         ('position', motion.q, limits.lower, limits.upper),
@@ -332,7 +331,6 @@ def _clearance_section(
 
 
 def _accuracy_section(design: Design, links: Sequence[str] = ()) -> ContentSection:
-    """Return the section with the expected standard deviation of each parameter."""
     information, described = design.information, design.described
     size = information.std / information.scale
 

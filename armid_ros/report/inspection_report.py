@@ -250,7 +250,6 @@ def _contents_section(found: Inspection) -> ContentSection:
 
 
 def _curves_section(found: Inspection) -> ContentSection:
-    """Return the section with all recorded signals over time."""
     recording, robot = found.recording, found.robot
     blocks: list[Templated] = [
         Paragraph(

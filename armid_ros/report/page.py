@@ -130,7 +130,6 @@ def render(template: str, values: Mapping[str, Any], package: str = 'armid_ros.r
 
 @cache
 def _environment(package: str) -> Environment:
-    """Return the Jinja environment for the templates of a package."""
     environment = Environment(
         loader=PackageLoader(package),
         autoescape=True,
