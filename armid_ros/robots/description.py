@@ -139,7 +139,7 @@ def parse_xml(text: str) -> ElementTree.Element:
 
     """
     if len(text) > TEXT_LIMIT:
-        raise RobotError(f'a description of {len(text)} characters is above {TEXT_LIMIT}')
+        raise RobotError(f'the URDF has {len(text)} characters; at most {TEXT_LIMIT} are read')
     builder, parser = ElementTree.TreeBuilder(), expat.ParserCreate()
     parser.StartElementHandler, parser.EndElementHandler = builder.start, builder.end
     parser.CharacterDataHandler = builder.data
