@@ -392,7 +392,6 @@ def fit_summary(found: ZeroFit, document: dict[str, Any], step: str, noise: Floa
 
 
 def _cell(one: FittedQuantity) -> str:
-    """Format a quantity with its interval for a table."""
     if one.reason:
         return 'not det.'
     value, half = measured(one.value, one.half_width)
