@@ -2,9 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A plan keeps limits, floor and clearance at 1 kHz, by code of its own."""
 
-from importlib.metadata import files
-from pathlib import Path
-
 from armid_ros.arm import ArmModel
 from armid_ros.excitation import (
     ClearanceModel,
@@ -28,13 +25,6 @@ ARMS = (
 #: Height at which the floor itself is, without the clearance that plans keep [m]: that of the
 #: base, but for an arm that hangs from a torso.
 FLOORS = dict.fromkeys(ARMS, 0.0) | {'talos_left_arm': -1.1}
-
-
-def shipped(name):
-    paths = [p for p in files('example-robot-data') or () if p.name == f'{name}.urdf']
-    if not paths:
-        pytest.skip(f'{name}.urdf is not shipped')
-    return Path(paths[0].locate())
 
 
 def planned(path):
@@ -120,7 +110,7 @@ def violations(path, robot, run):
 
 @pytest.mark.long
 @pytest.mark.parametrize('name', ARMS)
-def test_a_plan_keeps_everything_at_a_kilohertz(name):
-    path = shipped(name)
+def test_a_plan_keeps_everything_at_a_kilohertz(name, example_robot):
+    path = example_robot(f'{name}.urdf')
     robot, run = planned(path)
     assert violations(path, robot, run) == []

@@ -70,11 +70,6 @@ def test_a_joint_is_named_by_the_frame_or_by_the_topic(tmp_path):
     np.testing.assert_allclose(back.temperature.at(T[:1]), [[20.0, 30.0]])
 
 
-def test_a_bag_without_temperatures_has_none(tmp_path):
-    path = bag_with(tmp_path / 'bag', [('/hall', '', 21.0)])
-    assert read_recording(path, joints=JOINTS).temperature is None
-
-
 @pytest.mark.parametrize(
     ('value', 'problem'), [(300.0, '300.*150 degC'), (np.nan, 'no temperature is a finite')]
 )

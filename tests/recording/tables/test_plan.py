@@ -169,15 +169,6 @@ def test_where_columns_are_that_were_not_asked_for_is_kept_in_the_unit_of_the_ot
     assert other.highest == pytest.approx(np.deg2rad(3.0))
 
 
-def test_joints_without_a_column_are_named_where_others_have_one():
-    found = plan(ramps('shoulder_pos', 'elbow_pos', 'shoulder_tau'), ColumnSettings(), JOINTS)
-    (effort,) = [line for line in found.lines() if line.split()[0] == 'effort']
-    assert '{}_tau' in effort and 'elbow' in effort
-    assert 'elbow' in converted(found).report.absent[1]
-    none = plan(ramps('shoulder_pos', 'elbow_pos'), ColumnSettings(), JOINTS)
-    assert converted(none).report.absent == ('velocity', 'effort')
-
-
 @pytest.mark.parametrize('said', [{}, {'time': 't'}])
 def test_a_time_that_runs_backwards_is_refused_with_what_to_do(said):
     """Sorted, the motion would run backwards too, and its velocities would not."""
