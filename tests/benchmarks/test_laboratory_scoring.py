@@ -5,7 +5,6 @@
 import pytest
 
 from benchmarks.hidden_effects import Judged, score
-from benchmarks.metrics import wilson
 from benchmarks.two_days import Answer, Named
 from tests.hidden.specification import CaseSpec, HIDDEN
 
@@ -69,9 +68,3 @@ def test_unknown_is_admitted_or_not():
         judged('removed', 'coulomb_friction', 'named', WRONG),
     ]
     assert metric(outcomes, 'unknown or partial').value == 0.6
-
-
-def test_intervals_are_those_of_wilson():
-    assert wilson(0, 120) == pytest.approx((0.0, 0.0310), abs=2e-4)
-    assert wilson(150, 156) == pytest.approx((0.9186, 0.9822), abs=2e-3)
-    assert wilson(0, 0) == (0.0, 1.0)

@@ -5,7 +5,6 @@
 from dataclasses import replace
 
 from armid_ros.arm import ArmModel
-from armid_ros.effects import CATALOGUE
 from armid_ros.motion import Motion
 import numpy as np
 import pytest
@@ -48,20 +47,6 @@ def said(*headline, verdict='named'):
 def metric(outcomes, name):
     """Return the value of one row."""
     return next(m.value for m in score(outcomes) if m.name.strip() == name)
-
-
-@pytest.mark.parametrize('word', sorted(CAUSES))
-def test_causes_have_the_names_units_and_parameters_of_the_catalogue(word):
-    robot = load_arm('ur5')
-    low, high, ones = -np.ones(6), np.ones(6), np.ones(6)
-    scene = Scene(Chain.of(robot), ones, ones, low, high, np.zeros(6), 10.0)
-    cause = CAUSES[word].draw(scene, np.random.default_rng(0))
-    assert cause.in_catalogue == (cause.name in CATALOGUE)
-    if cause.in_catalogue:
-        effect = CATALOGUE[cause.name].on(robot, cause.joints or None)
-        known = (*effect.parameters(robot), *effect.shape_parameters(robot))
-        names = {(p.name, p.joint or '', p.unit) for p in known}
-        assert {(p.name, p.joint, p.unit) for p in cause.parameters} <= names
 
 
 @pytest.mark.parametrize(

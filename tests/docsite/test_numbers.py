@@ -34,12 +34,3 @@ def test_a_number_without_a_comment_is_noticed(tmp_path):
     assert ['`_GOOD, _ALSO`', '(1.0, -2)', 'Why.', '`module.py`'] in rows(page)
     assert ['`_BAD`', '0.3', '', '`module.py`'] in rows(page)
     assert '_TEXT' not in page
-
-
-def test_a_number_of_another_package_is_on_the_page(tmp_path):
-    (tmp_path / 'whole' / 'diagnosis').mkdir(parents=True)
-    (tmp_path / 'whole' / 'other.py').write_text('#: Why.\nTAKEN = 1.5\n#: No.\nLEFT = 2.0\n')
-    (tmp_path / 'whole' / 'diagnosis' / 'own.py').write_text('from whole.other import TAKEN\n')
-    page = numbers_page(tmp_path / 'whole' / 'diagnosis')
-    assert ['`TAKEN`', '1.5', 'Why.', '`whole/other.py`'] in rows(page)
-    assert 'LEFT' not in page
