@@ -25,23 +25,47 @@ _FEWEST = 4
 
 
 def docstrings(package: Path) -> Iterator[tuple[str, str]]:
-    """Yield file and name of each function and class, and the first paragraph of its docstring."""
-    for place, node in _nodes(package):
-        if isinstance(node, ast.FunctionDef | ast.ClassDef):
+    """Yield file and signature of functions and classes, and the summary of their docstrings."""
+    for path in sorted(package.rglob('*.py')):
+        for name, node in _definitions(ast.parse(path.read_text('utf-8'))):
             text = (ast.get_docstring(node) or '').partition('\n\n')[0]
             if text:
-                yield f'{place}: {node.name}', ' '.join(text.split())
+                place = path.relative_to(package).as_posix()
+                yield f'{place}: {_signature(name, node)}', ' '.join(text.split())
+
+
+def _definitions(
+    parent: ast.AST, prefix: str = ''
+) -> Iterator[tuple[str, ast.FunctionDef | ast.ClassDef]]:
+    """Yield the functions and classes in a node, with their qualified names."""
+    for node in ast.iter_child_nodes(parent):
+        name = prefix
+        if isinstance(node, ast.FunctionDef | ast.ClassDef):
+            name = f'{prefix}{node.name}.'
+            yield name[:-1], node
+        yield from _definitions(node, name)
+
+
+def _signature(name: str, node: ast.FunctionDef | ast.ClassDef) -> str:
+    """Return a name with the signature that ``help()`` shows; a property has none."""
+    if isinstance(node, ast.ClassDef):
+        return f'class {name}'
+    if any('property' in ast.unparse(one) for one in node.decorator_list):
+        return name
+    returned = f' -> {ast.unparse(node.returns)}' if node.returns else ''
+    return f'{name}({ast.unparse(node.args)}){returned}'
 
 
 def messages(package: Path) -> Iterator[tuple[str, str]]:
     """Yield file and line of each raised error, and its message with values in braces."""
-    for place, node in _nodes(package):
-        if isinstance(node, ast.Raise) and isinstance(node.exc, ast.Call):
-            for given in node.exc.args:
-                if isinstance(given, ast.JoinedStr | ast.Constant):
-                    text = ast.unparse(given).lstrip('f').strip('\'"')
-                    if len(text.split()) >= _FEWEST:
-                        yield f'{place}:{node.lineno}', text
+    for path in sorted(package.rglob('*.py')):
+        for node in ast.walk(ast.parse(path.read_text('utf-8'))):
+            if isinstance(node, ast.Raise) and isinstance(node.exc, ast.Call):
+                for given in node.exc.args:
+                    if isinstance(given, ast.JoinedStr | ast.Constant):
+                        text = ast.unparse(given).lstrip('f').strip('\'"')
+                        if len(text.split()) >= _FEWEST:
+                            yield f'{path.relative_to(package).as_posix()}:{node.lineno}', text
 
 
 def sentences(pages: Path) -> Iterator[tuple[str, str]]:
@@ -53,13 +77,6 @@ def sentences(pages: Path) -> Iterator[tuple[str, str]]:
                 text = re.sub(r'^\d+\. ', '', ' '.join(paragraph.split()))
                 for one in _SENTENCE.split(text):
                     yield path.relative_to(pages).as_posix(), one
-
-
-def _nodes(package: Path) -> Iterator[tuple[str, ast.AST]]:
-    for path in sorted(package.rglob('*.py')):
-        place = path.relative_to(package).as_posix()
-        for node in ast.walk(ast.parse(path.read_text('utf-8'))):
-            yield place, node
 
 
 def drawn(seed: int, count: int) -> list[tuple[str, str]]:
