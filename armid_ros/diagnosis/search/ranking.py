@@ -123,7 +123,7 @@ class RankedCause:
         As torque laws are inexact, a difference of the explained squares is ignored below the
         share `inexact` of them, or below the share `same_fit` - 1 of the smaller residual. The
         number of values and the prior odds decide then. Each value has the mean penalty of the
-        values of both causes: how well data determine a value says nothing about inexact laws.
+        values of both causes: inexact laws do not depend on how well data determine a value.
 
         """
         pair = self, other
