@@ -103,7 +103,7 @@ class Evidence:
 
     def limits(self, residual: Sequence[FloatArray], settings: DiagnosisSettings) -> FloatArray:
         """
-        Return for each joint the largest `chi2_per_row` that noise and known misfit explain, (n,).
+        Return the largest `chi2_per_row` (n,) that noise and known residual of the model explain.
 
         Noise and residual have one degree of freedom per independent row each, so the ratio of
         their squares has an F distribution. A misfit, or estimated noise, may be larger by the
@@ -122,7 +122,7 @@ class Evidence:
         return np.where(misfit, self.misfit_limit(settings), noise) + self.material_loss(settings)
 
     def misfit_limit(self, settings: DiagnosisSettings) -> FloatArray:
-        """Return the largest `chi2_per_row` that the known misfit explains in a new motion."""
+        """Return the largest `chi2_per_row` that the model's known residual explains, (n,)."""
         varies = np.ones_like(self.count) if self.varies is None else self.varies
         return np.asarray(settings.thresholds.same_fit * np.maximum(varies, 1.0))
 

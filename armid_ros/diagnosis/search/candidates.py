@@ -76,7 +76,7 @@ class Causes:
     )
 
     def causes(self, nuisance: Nuisance, posterior: NuisancePosterior) -> list[Cause]:
-        """Return all candidate causes that are not accepted yet, at all start values of shapes."""
+        """Return the causes not accepted yet, at all start values of shape parameters."""
         arm, result, families = nuisance.arm, list[Cause](), list[Cause]()
         there = [one.effect for one in nuisance.accepted]
         taken = {(one.name, place) for one in there for place in (one.joints, *zip(one.joints))}
@@ -169,7 +169,7 @@ class Causes:
         return [part.columns(self.nuisance.arm, effect) for part in self._predicted]
 
     def reshaped(self, cause: Cause, shape: FloatArray) -> Cause | None:
-        """Return the cause with other shape values; None if impossible or without torque."""
+        """Return the cause with other shape parameters; None if impossible or without torque."""
         try:
             effect = cause.effect.with_shape(shape)
             columns = self._columns(effect)
@@ -335,7 +335,7 @@ def candidate_effects(
 def with_starting_shapes(
     effect: Effect, members: list[Effect], arm: ArmModel, unexplained: Unexplained
 ) -> Iterator[tuple[Effect, list[Effect]]]:
-    """Yield an effect and its single-joint copies for each start value of their shapes."""
+    """Yield an effect and its single-joint copies for each start value of shape parameters."""
     if not effect.shapes:
         yield effect, members
         return

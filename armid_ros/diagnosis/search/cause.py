@@ -17,7 +17,7 @@ import numpy.typing as npt
 @dataclass(frozen=True)
 class Cause:
     """
-    Candidate cause of a residual: an effect on given joints with given shapes, and its regressor.
+    Candidate cause of a residual: effect, joints and shape parameters, with the regressor.
 
     Attributes
     ----------
@@ -64,7 +64,7 @@ class Cause:
 
     @property
     def key(self) -> tuple[str, tuple[str, ...], tuple[int, ...]]:
-        """Name, joints and indices of fitted values, which identify the cause at any shape."""
+        """Name, joints and indices of fitted values, which identify the cause."""
         return self.effect.name, self.effect.joints, self.kept
 
     def acts(self, diagnosed: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:

@@ -251,7 +251,7 @@ class CauseComparison:
         return self._causes[id(nuisance)]
 
     def rank_all(self, nuisance: Nuisance) -> Ranking:
-        """Rank the causes that are not accepted yet, the best ones with optimised shapes."""
+        """Rank the causes not accepted yet; optimise shape parameters of the best causes."""
         settings, likeliest = self._all_posteriors(nuisance), self._likeliest(nuisance)
         # for each size of link errors, the likeliest posterior and the one with noise only
         tried: list[NuisancePosterior] = []
@@ -298,7 +298,7 @@ class CauseComparison:
     def _with_best_shape(
         self, cause: Cause, nuisance: Nuisance, posterior: NuisancePosterior
     ) -> Cause:
-        """Return a cause with the shape values that maximise the Bayes factor."""
+        """Return a cause with the shape parameters that maximise its Bayes factor."""
         best = [(fit_cause(cause, nuisance, posterior).factor, cause)]
 
         def gain(shape: FloatArray) -> float:

@@ -288,7 +288,7 @@ def _noise_within(
     misfit: FloatArray, prepared: Prepared, contained: FloatArray
 ) -> tuple[FloatArray, ...]:
     """
-    Return the torque noise (n,) of each trajectory, limited by the known misfit [N m].
+    Return the torque noise (n,) of each trajectory, at most the known residual [N m].
 
     An event in one of two periods increases their difference, but it belongs to the gap. The
     squared noise is at most the squared misfit plus the increase of row-to-row noise.

@@ -77,7 +77,7 @@ class Explanation:
 
     @property
     def measured(self) -> bool:
-        """Whether residuals are compared with noise or an estimated misfit, not a known misfit."""
+        """Whether residuals are compared with noise or an estimate, not with a known residual."""
         return self.floor in (NOISE, ESTIMATED)
 
     @property

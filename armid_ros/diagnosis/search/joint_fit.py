@@ -114,7 +114,7 @@ class JointFit:
 
     def fit(self, named: Sequence[NamedEffect] = ()) -> Fitted:
         """
-        Fit values and shapes of the named effects by Gauss-Newton with a line search.
+        Fit values and shape parameters of named effects by Gauss-Newton with a line search.
 
         Parameters
         ----------
@@ -206,7 +206,7 @@ class JointFit:
     def _weighted_residual(
         self, model: ArmModel, torque: Sequence[FloatArray]
     ) -> list[FloatArray]:
-        """Return weighted residuals; for diagnosed recordings, those of `model`, plus `torque`."""
+        """Return weighted residuals: of the arm in baseline data, of `model` in diagnosed data."""
         rows, residual = self.nuisance.rows, list(self.nuisance.residual)
         rest = [
             own + part.residual(model) if rows.diagnosed[part.fold] else own
@@ -300,7 +300,7 @@ def step_within_bounds(
 
 
 def parameter_ranges(named: Sequence[NamedEffect]) -> list[tuple[range, range]]:
-    """Return for each effect the index ranges of its values and shapes in the estimate."""
+    """Return for each effect the index ranges of its values and of its shape parameters."""
     found, start = [], 0
     for own in named:
         shapes = start + len(own.kept)
@@ -311,7 +311,7 @@ def parameter_ranges(named: Sequence[NamedEffect]) -> list[tuple[range, range]]:
 
 
 def _shape_bounds(effect: Effect) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return lower bound, upper bound and finite-difference step of each shape."""
+    """Return lower bound, upper bound and finite-difference step of each shape parameter."""
     owners = len(effect.owners)
     low = np.tile([s.lower for s in effect.shapes], owners)
     high = np.tile([s.upper for s in effect.shapes], owners)
@@ -322,7 +322,7 @@ def _shape_bounds(effect: Effect) -> tuple[FloatArray, FloatArray, FloatArray]:
 def patch_columns(
     arm: ArmModel, named: Sequence[NamedEffect], part: Trajectory
 ) -> list[FloatArray]:
-    """Return the Jacobian of the torque by values and shapes of each effect, (M, n, p)."""
+    """Return the torque's Jacobian by values and shape parameters of each effect, (M, n, p)."""
     model, blocks = memoized_arm(patched_arm(arm, named)), []
     for own in named:
         columns = [model.columns_of(own.effect, part.motion)[:, :, list(own.kept)]]
@@ -333,7 +333,7 @@ def patch_columns(
 
 
 def _shape_columns(model: ArmModel, effect: Effect, motion: Motion) -> FloatArray:
-    """Return the Jacobian of the torque by the shapes, by finite differences, (N, n, S)."""
+    """Return the torque's Jacobian by shape parameters, by finite differences, (N, n, S)."""
     place = len(model.effects) - 1 - model.effects[::-1].index(effect)
     low, high, step = _shape_bounds(effect)
     shape = np.array(effect.shape)

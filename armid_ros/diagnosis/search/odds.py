@@ -157,7 +157,7 @@ class CauseInformation:
         return replace(found, diagnosed=self.diagnosed[of_it])
 
     def among(self, values: npt.NDArray[np.intp]) -> CauseInformation:
-        """Return the information on some of the values, if all others are zero."""
+        """Return the information on a subset of the values; the others are fixed at zero."""
         return self._at(np.add.outer(self.size * np.arange(len(self.diagnosed)), values).ravel())
 
     def _at(self, kept: npt.NDArray[np.intp]) -> CauseInformation:

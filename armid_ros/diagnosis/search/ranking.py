@@ -71,7 +71,7 @@ class CauseResult:
 
     @property
     def key(self) -> Key:
-        """Name, joints and indices of fitted values, which identify the cause at any shape."""
+        """Name, joints and indices of fitted values, which identify the cause."""
         return self.effect.name, self.effect.joints, self.kept
 
     @property

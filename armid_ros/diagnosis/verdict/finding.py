@@ -118,12 +118,12 @@ class Finding:
 
     @property
     def other_causes(self) -> tuple[Rival, ...]:
-        """Rivals, without the same load described on another link."""
+        """Rivals, except those that are the same load described on another link."""
         return tuple(rival for rival in self.rivals if not rival.same_body)
 
     @property
     def ambiguous_with(self) -> tuple[str, ...]:
-        """Names of the rivals, without the same load described on another link."""
+        """Names of the rivals, except the same load described on another link."""
         return tuple(rival.name for rival in self.other_causes)
 
     @property
@@ -165,7 +165,7 @@ class Finding:
 @dataclass(frozen=True)
 class Overlay:
     """
-    Measured and predicted torque of one trajectory, filtered alike.
+    Measured and predicted torque of one trajectory, both with the same filter.
 
     Attributes
     ----------
@@ -220,7 +220,7 @@ class Gap:
     @classmethod
     def of(cls, explanation: Explanation, unseen: Evidence | None) -> Gap:
         """
-        Measure the residuals in held-out recordings, else in the fitted recordings.
+        Measure the residuals in held-out recordings if there are any, else in fitted ones.
 
         Parameters
         ----------

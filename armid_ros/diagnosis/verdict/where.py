@@ -76,7 +76,7 @@ class Where:
 @dataclass(frozen=True)
 class Excess:
     """
-    Squared residual of each joint, divided by the limit that noise and misfit explain.
+    Squared residual of each joint, divided by the limit that noise and known errors explain.
 
     Attributes
     ----------
