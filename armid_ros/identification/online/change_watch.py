@@ -340,7 +340,7 @@ class ChangeWatch:
         )
 
     def _apply(self, found: FoundChange) -> Job:
-        """Restore the state before a change, forget changed directions, repeat later samples."""
+        """Return to the estimate before a change, free changed directions, redo later samples."""
         change, before, after = found
         size, directions = change.size, change.changed_directions
         self._wider.restore(before.before)

@@ -369,7 +369,7 @@ class RowNoise:
 
 
 def sensor_noise(robot: Robot, given: tuple[float, ...] | None) -> FloatArray:
-    """Return the torque noise of each joint, (n,): given, or a share of the torque limit."""
+    """Return the torque noise of each joint (n,): as given, or a share of its torque limit."""
     if given is not None:
         noise = np.array(given, dtype=np.float64)
         if noise.shape != (robot.n_joints,):
