@@ -165,7 +165,7 @@ class InterfaceSlack(Attached):
     )
 
     def _default_shape(self, robot: Robot) -> FloatArray:
-        """Return shape parameters with each anchor at the strap's link point in mid-range pose."""
+        """Return default shape parameters: the anchor is the link point in the mid-range pose."""
         values = super()._default_shape(robot)
         middle = LinkFrames.in_the_middle(robot)
         for row, joint in zip(values, self.joints, strict=True):
