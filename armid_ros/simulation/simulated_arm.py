@@ -138,7 +138,7 @@ class SimulatedArm:
 
     @property
     def joints(self) -> tuple[str, ...]:
-        """Joint names in column order."""
+        """Names of the joints, in the order of array columns."""
         return self.plant.robot.joints
 
     @property
