@@ -99,7 +99,7 @@ class Consistency:
 
     @staticmethod
     def of(link: str, parameters: npt.ArrayLike) -> Consistency:
-        """Compute these quantities from the ten inertial parameters of a link."""
+        """Compute the quantities from the ten inertial parameters of a link."""
         matrix = pseudo_inertia(parameters)
         mass = float(matrix[3, 3])
         center = moments = np.full(3, np.nan)
