@@ -410,7 +410,7 @@ class ArmModel:
         return columns
 
     def with_load_friction(self, motion: Motion, columns: FloatArray) -> FloatArray:
-        """Add to derivatives of the load those of load-dependent friction, (N, n, P)."""
+        """Add derivatives of load-dependent friction to derivatives of the load, (N, n, P)."""
         friction = self._acting.dry_friction
         if friction is None or friction.load_share is None:
             return columns

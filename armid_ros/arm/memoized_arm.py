@@ -52,7 +52,7 @@ class _Memoized(ArmModel):
 
     @cached_property
     def known(self) -> dict[tuple[str, int], tuple[Motion, Any]]:
-        """Return the cached results, by name of the quantity and identity of the motion."""
+        """Cached results, by name of the quantity and identity of the motion."""
         return {}
 
     link_frames = _once(ArmModel.link_frames)
@@ -66,7 +66,7 @@ class _Memoized(ArmModel):
     _joint_torque = _once(ArmModel.joint_torque)
 
     def link_motion(self, motion: Motion) -> Motion:
-        """Return the true motion of the links, given the motion that sensors recorded."""
+        """Return the true motion of the links for a motion that sensors recorded."""
         return motion if self.action().displacement is None else self._moved(motion)
 
     def regressor(self, motion: Motion) -> _Regressor | None:
