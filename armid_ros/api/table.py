@@ -101,7 +101,7 @@ class Shown(ABC):
         """Return the terminal summary of the result."""
 
     def with_step(self, origin: ResultOrigin, robot: Robot | None = None) -> ResultOrigin:
-        """Return the origin, completed by the next step and by the name of a given robot."""
+        """Return the origin with the next command and, if a robot is given, its name."""
         shown, known = self.summary(), origin if robot is None else origin.of(source_of(robot))
         step = origin.step or ''.join(shown.steps[:1]) or f'armid {shown.then}'
         return replace(known, step=step)
