@@ -36,7 +36,7 @@ from trajectory_msgs.msg import JointTrajectory
 
 
 class _JumpGuard:
-    """Check that a recorded trajectory starts at the measured position of the arm."""
+    """Guard that passes a recorded trajectory only if it starts at the measured position."""
 
     def __init__(self, node: Node, tolerance: float, timeout: float) -> None:
         self.tolerance, self.timeout = tolerance, timeout

@@ -282,7 +282,7 @@ class LiveDiagnosisNode(ListeningNode):
         self._adopt(self._described(urdf))
 
     def _settings(self, values: Mapping[str, Any]) -> LiveSettings:
-        """Return settings from the ROS parameters, some of which have new values."""
+        """Return the settings in the ROS parameters, updated by new parameter values."""
         names = (*(entry.name for entry in LIVE_SETTINGS), 'learning')
         return LiveSettings(**{name: values.get(name, self.value(name)) for name in names})
 
@@ -365,7 +365,7 @@ class LiveDiagnosisNode(ListeningNode):
 
 
 def _residuals(answer: Answer) -> list[tuple[str, float, float, float]]:
-    """Return for each joint the residuals before and after correction, and its floor [N m]."""
+    """Return for each joint the residuals before and after correction, and the usual one [N m]."""
     gap = answer.gap
     if gap is None:
         return []

@@ -251,7 +251,7 @@ class OnlineIdentifierNode(ListeningNode):
             self.identifier.use(self._settings({}))
 
     def _settings(self, values: Mapping[str, Any]) -> OnlineSettings:
-        """Return the identifier's settings with new values of some parameters."""
+        """Return the identifier's settings, updated by new parameter values."""
         identifier = self._require()
         described = self._online_settings(identifier.arm, values)
         can_change = {name: getattr(described, name) for name in OnlineIdentifier.CHANGEABLE}
@@ -264,7 +264,7 @@ class OnlineIdentifierNode(ListeningNode):
         return OnlineIdentifier(arm, settings, rng=np.random.default_rng(0))
 
     def _online_settings(self, arm: ArmModel, values: Mapping[str, Any]) -> OnlineSettings:
-        """Return settings from the ROS parameters, some of which have new values."""
+        """Return the settings in the ROS parameters, updated by new parameter values."""
 
         def value(name: str) -> Any:
             return values.get(name, self.value(name))
@@ -292,7 +292,7 @@ class OnlineIdentifierNode(ListeningNode):
         self._begin(self._described(urdf))
 
     def _on_model(self, message: String) -> None:
-        """Restart with the effects of a received model, if they are new."""
+        """Restart the identification with the effects of a received model, if these are new."""
         # Effects from the parameters are kept, even if the model lacks them.
         before = self._require()
         arm = read_model(message.data, before.arm.robot, 'model')
