@@ -172,7 +172,7 @@ def _of_spans(
     notes: Sequence[str],
     doubt: str,
 ) -> Diagnosis | None:
-    """Diagnose only the seconds in which a cause acts; None if this does not explain them."""
+    """Diagnose only the seconds in which a cause acts; None if they remain unexplained."""
     settings, arm, prepared = explainer.settings, explainer.arm, explainer.prepared
     ranking = explanation.ranking
     spans = () if ranking is None else acting_spans(ranking, settings.thresholds)
@@ -210,7 +210,7 @@ def _of_spans(
 def _with_unfitted_joints(
     arm: ArmModel, recordings: Sequence[Recording], used: Conditioning
 ) -> Iterator[tuple[Recording, npt.NDArray[np.bool_]]]:
-    """Yield recordings with a mask of the joints that the model fits in other recordings only."""
+    """Yield recordings with a mask of joints that the model fits in other recordings, not here."""
     unit = np.ones(arm.robot.n_joints)
     bad, sound = np.zeros((2, len(recordings), len(unit)), dtype=bool)
     for k, one in enumerate(recordings):

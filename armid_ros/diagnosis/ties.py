@@ -235,7 +235,7 @@ def _with_springs(explanation: Explanation, found: Interaction) -> Fitted:
 def _as_one_cause(
     explainer: Explainer, evidence: Evidence, partner: Partner, fitted: Fitted
 ) -> tuple[tuple[CauseResult, ...], tuple[tuple[str, tuple[str, ...]], ...]]:
-    """Compare all ties, as a single cause, with other causes; return results like `survey`."""
+    """Test all springs to another machine as a single cause; return results as `survey` does."""
     settings, robot = explainer.settings, explainer.arm.robot
     free = [one for one in grid_without_baseline() if one.body]
     comparison = explainer.comparison(Rows.over_noise(evidence), free)
