@@ -44,7 +44,7 @@ class MotionGate:
     @classmethod
     def of(cls, run: Run, planner: TransferPlanner) -> MotionGate:
         """
-        Check all samples of a planned run; return the gate for later motions of the run.
+        Check a planned run; return the gate that checks each motion sent during this run.
 
         Parameters
         ----------
