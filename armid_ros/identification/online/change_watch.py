@@ -232,7 +232,7 @@ class ChangeWatch:
         self._estimator.update(*row.sample)
 
     def _with_nuisance(self, directions: FloatArray) -> FloatArray:
-        """Extend directions of parameters by zeros for the nuisance parameters."""
+        """Append zeros for the nuisance parameters to directions in parameter space."""
         more = len(self._wider.parameters) - self._count
         return np.vstack([directions, np.zeros((more, directions.shape[1]))])
 

@@ -305,7 +305,7 @@ class CausalFilter:
         return list(np.vander(inside, len(place)) @ factors)
 
     def _learn_period(self, dt: float) -> None:
-        """Add a time step between samples [s]; create the filter after 20 time steps."""
+        """Collect a time step [s]; after 20 of them, set the period and create the filter."""
         if dt > 0.0:
             self._intervals.append(dt)
         if len(self._intervals) < 20:  # too few for a median
@@ -364,7 +364,7 @@ class RowNoise:
         return cls(bandwidth, gain, gain / (period * row_pole * float(np.max(response))))
 
     def independent(self, step: float) -> float:
-        """Return the number of independent observations in a row, `step` s after the last row."""
+        """Return how many independent observations a row equals, `step` s after the last row."""
         return min(1.0, self.bandwidth * step)
 
 

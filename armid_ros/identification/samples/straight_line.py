@@ -291,7 +291,7 @@ class NoiseLevel:
         return True
 
     def _use(self, period: float, size: FloatArray, white: FloatArray) -> None:
-        """Set typical prediction errors from a window, but not below the resolution."""
+        """Set the typical prediction errors to those of a window, but at least the resolution."""
         allowed = quantile(period, len(size), self._false_alarm_time)
         self.model = ErrorModel(period, np.maximum(size, self._least(period)), white, allowed)
 

@@ -154,7 +154,7 @@ def stacked(problems: Sequence[InteractionProblem]) -> InteractionProblem:
 
 
 def _one_machine(recording: Recording) -> Recording:
-    """Return a recording with the joints of both machines; the other one's torques are zero."""
+    """Return a recording with the joints of both machines; torques of the second are zero."""
     assert recording.partner is not None and recording.tau is not None
     far = recording.partner.q
     return replace(
