@@ -44,7 +44,7 @@ _TONES = {'consistent': 'good', 'named': 'fair', 'ambiguous': 'fair', 'partial':
 
 
 def tone_of(diagnosis: Diagnosis) -> str:
-    """Return the colour of a verdict: 'good' only if all joints were checked without doubt."""
+    """Return the colour of a verdict: 'good' only if it is certain and all joints were checked."""
     tone = _TONES.get(diagnosis.verdict, 'bad')
     return 'fair' if tone == 'good' and (diagnosis.not_checked or diagnosis.doubt) else tone
 
