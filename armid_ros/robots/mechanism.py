@@ -92,7 +92,7 @@ class Mechanism:
 
     def at(self, u: FloatArray, du: FloatArray | None = None) -> Configuration:
         """
-        Return the moving joints' positions and velocities for those of the driven joints.
+        Return positions and velocities of the moving joints, given those of the driven joints.
 
         Parameters
         ----------

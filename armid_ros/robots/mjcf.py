@@ -338,7 +338,7 @@ class _Writer:
 
 
 def _names(kind: str, given: list[str]) -> list[str]:
-    """Return the names of bodies or joints; an unnamed one is called by kind and number."""
+    """Return the names of bodies or joints; one without a name is given its kind and number."""
     return [one or _unused(f'{kind}_{number}', given) for number, one in enumerate(given)]
 
 
