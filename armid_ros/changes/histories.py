@@ -283,7 +283,7 @@ def _p(score: float, freedom: float, tried: int) -> float:
 
 
 class _Splits(NamedTuple):
-    """Means before and after each possible step of a parameter, and its linear trend."""
+    """Mean estimates before and after each possible step, and a line fitted to all estimates."""
 
     low: FloatArray  # (K - 1,)
     high: FloatArray
