@@ -224,7 +224,7 @@ def _identified_from(model: Path, diagnosed: list[Path]) -> tuple[Path, ...]:
 
 
 def _model_of(path: Path, robot: Robot) -> ArmModel:
-    """Read a model.yaml; ArmidError if it is of a robot with other kinematics."""
+    """Read a model.yaml; ArmidError if its robot has other kinematics than the given robot."""
     from armid_ros.arm import load_model
     from armid_ros.cli import options
     from armid_ros.identification.output import kinematics_digest
