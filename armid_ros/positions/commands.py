@@ -105,7 +105,7 @@ def _topic(path: Path, recording: Recording, name: str | None, settings: ReadSet
 
 
 def _controller_state(path: Path, robot: Robot, topic: Topic, settings: ReadSettings) -> Recording:
-    """Read the reference positions that a joint_trajectory_controller publishes in its state."""
+    """Read the reference positions in the state messages of a joint_trajectory_controller."""
     source, rows = f'{path}: {topic.name}', []
     store = store_for(topic.message_type)
     with Bag(path, settings) as bag, reading(source, RecordingError):
