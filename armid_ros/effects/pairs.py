@@ -195,11 +195,11 @@ class TorqueCrosstalk(_Pairs, TorqueReading):
 
     @classmethod
     def places(cls, robot: Robot) -> tuple[tuple[str, ...], ...]:
-        """Return all ordered pairs of joints: the sensor's joint, then the joint it picks up."""
+        """Return all ordered pairs of joints: joint of the sensor, and joint that disturbs it."""
         return tuple(permutations(robot.joints, 2))
 
     def parameters(self, robot: Robot) -> tuple[ParameterName, ...]:
-        """Return parameter names with the sensor's joint and the joint it picks up."""
+        """Return parameter names with the joint of the sensor and the joint that disturbs it."""
         (quantity,) = self.quantities
         return tuple(
             ParameterName(
