@@ -182,7 +182,7 @@ class JointStateDecoder:
         return free[:count]
 
     def _plan_for(self, first: npt.NDArray[np.void]) -> _Plan | None:
-        """Return how to decode messages with the layout of the first; None if it is malformed."""
+        """Return how to decode messages with this message's layout; None if it is malformed."""
         length = first.dtype.itemsize
         known = self._plans.setdefault(length, [])
         for plan in known:
