@@ -57,7 +57,7 @@ def diagnosed_model(
     rng: Rng,
 ) -> tuple[RobotLike | IdentificationResult, ArmModel, Misfit | None, IdentificationResult | None]:
     """
-    Return the arm to diagnose, its model and misfit; identify a simulator given by `against`.
+    Return the arm to diagnose, its model and misfit, and the identification of any simulator.
 
     Without recordings of a simulator (`against`), the last result is None.
 
