@@ -214,7 +214,7 @@ def _worst_joint(errors: FloatArray, fits: Sequence[Fit], result: Identification
 
 
 def _resting(result: Identification, validation: Mapping[str, Sequence[Fit]]) -> Iterator[Fault]:
-    """Yield reasons of a grade: joints at rest, which are not identified or not validated."""
+    """Yield reasons of a grade: joints at rest, which cannot be identified or validated."""
     fitted = moving(fit.motion for fit in result.training)
     held_out = [fit.motion for part in validation.values() for fit in part]
     checked = moving(held_out) if held_out else fitted

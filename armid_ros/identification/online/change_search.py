@@ -288,7 +288,7 @@ class ChangeSearch:
         after: Sequence[Block],
         residual_scale: float,
     ) -> Pieces[Estimate]:
-        """Return the estimated size of a candidate change after a given block."""
+        """Return the estimated size of a candidate change between a block and later blocks."""
         window = yield from score_statistics(after, before, self.directions, residual_scale)
         yield
         number = self._candidates.index(candidate)
