@@ -340,7 +340,7 @@ class OnlineIdentifierNode(ListeningNode):
             publisher.publish(message)
 
     def _begin(self, identifier: OnlineIdentifier) -> None:
-        """Start an identifier; later models do not remove its effects."""
+        """Continue with this identifier; models that arrive later do not remove its effects."""
         self._own_effects = identifier.arm.effects
         self._adopt(identifier)
 
