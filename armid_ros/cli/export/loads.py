@@ -20,7 +20,7 @@ import pinocchio as pin
 @dataclass(frozen=True)
 class CarriedLoad:
     """
-    Payload on a link of the robot, in the frame that manufacturers use.
+    Payload fixed to a link of the robot: mass, centre of mass and inertia.
 
     Attributes
     ----------
