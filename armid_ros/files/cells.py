@@ -39,5 +39,5 @@ def parted(text: str, separator: str = ',') -> list[str]:
 
 
 def listed(text: str, separator: str = ',') -> tuple[str, ...]:
-    """Return the names of a separated list; double quotes may enclose a separator."""
+    """Split a separated list into names; a name in double quotes may contain the separator."""
     return tuple(part.replace('"', '') for part in parted(text, separator))
