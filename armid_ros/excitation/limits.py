@@ -89,7 +89,7 @@ class Limits:
         reserve: bool = True,
     ) -> Limits:
         """
-        Return the limits of a robot at a speed such as 'slow', by default with a reserve.
+        Return the limits of a robot for a speed such as 'slow', by default minus a safety reserve.
 
         Parameters
         ----------
