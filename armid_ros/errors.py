@@ -34,7 +34,7 @@ def visible(text: str) -> str:
 
 class ArmidError(Exception):
     """
-    Base class of errors by bad input: commands print the message and exit with code 2.
+    Base class of errors caused by bad input; commands print them and exit with code 2.
 
     Examples
     --------
