@@ -1,6 +1,8 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Friction, rotors, gravity and bodies, each against what it is in physics."""
+"""The law of each effect whose torque has a closed form, and which changes are possible."""
+
+from dataclasses import replace
 
 from armid_ros.arm import ArmModel
 from armid_ros.effects import CATALOGUE, make_effect
@@ -11,65 +13,97 @@ import pinocchio as pin
 import pytest
 
 
-def test_asymmetric_friction_gives_each_direction_its_own_law(robot, motion):
-    """Fc+ = 0.5, Fc- = 0.2, Fv+ = 0.3, Fv- = 0.1 as means and half differences."""
-    arm = (
-        ArmModel(robot)
-        .with_effect(make_effect('coulomb_friction', robot), np.full(6, 0.35))
-        .with_effect(make_effect('viscous_friction', robot), np.full(6, 0.2))
-        .with_effect(make_effect('asymmetric_friction', robot), np.tile([0.15, 0.1], 6))
-    )
-    dq = motion.dq
-    law = np.where(dq > 0.0, 0.5 + 0.3 * dq, -0.2 + 0.1 * dq)
-    np.testing.assert_allclose(arm.torque(motion) - inverse_dynamics(robot, motion), law)
+def body(robot, motion, gravity=None, offset=0.0):
+    """Return the rigid-body torque under another gravity, with encoders that are off."""
+    robot = robot if gravity is None else robot.with_gravity(gravity)
+    return inverse_dynamics(robot, replace(motion, q=motion.q + offset))
 
 
-def test_rotor_inertia_of_the_first_joint_is_its_link_inertia(robot, motion, with_values):
-    parameters = robot.rigid_parameters.copy()
-    parameters[9] += 0.07  # Izz1
-    np.testing.assert_allclose(
-        with_values('rotor_inertia', [0.07, 0, 0, 0, 0, 0]).torque(motion),
-        inverse_dynamics(robot.with_inertias(parameters), motion),
-        atol=1e-12,
-    )
+def only(columns, joints):
+    """Return the torques of some joints; zero for the others."""
+    torque = np.zeros((len(columns), 6))
+    torque[:, joints] = columns
+    return torque
 
 
-def test_coupled_friction_dissipates_along_the_shaft_only(robot, motion, with_values):
-    arm = with_values('coupled_joint_friction', [0.0, 0.0, 0.4])
-    friction = arm.torque(motion) - inverse_dynamics(robot, motion)
-    shaft = motion.dq[:, 4] + motion.dq[:, 5]
-    np.testing.assert_allclose(friction[:, 4], 0.4 * np.sign(shaft))
-    np.testing.assert_allclose(friction[:, 5], friction[:, 4])
-    assert not np.any(friction[:, :4])
+def bumpers(robot, motion, below, above):
+    """Return the torque of springs in the outer 15 % of the ranges."""
+    margin = 0.15 * (robot.upper - robot.lower)
+    low = np.minimum(motion.q - robot.lower - margin, 0.0)
+    return below * low + above * np.maximum(motion.q - robot.upper + margin, 0.0)
 
 
-def test_moon_is_earth_with_less_gravity(robot, motion, with_values):
-    moon = load_robot('humanoid_arm', gravity='moon')
-    tau = with_values('gravity_magnitude', [1.62 - 9.81]).torque(motion)
-    np.testing.assert_allclose(tau, inverse_dynamics(moon, motion), atol=1e-12)
+#: Values of each effect, its shape, and the torque that they add to the rigid body.
+LAWS = {
+    'viscous_friction': (0.2, None, lambda r, m: 0.2 * m.dq),
+    'coulomb_friction': (0.2, None, lambda r, m: 0.2 * np.sign(m.dq)),
+    'quadratic_friction': (0.2, None, lambda r, m: 0.2 * m.dq * np.abs(m.dq)),
+    # half the differences of Coulomb and viscous friction in both directions
+    'asymmetric_friction': ([0.15, 0.1], None, lambda r, m: 0.15 + 0.1 * np.abs(m.dq)),
+    'stribeck_friction': (
+        0.4,
+        [0.1, 2.0],
+        lambda r, m: 0.4 * np.exp(-((m.dq / 0.1) ** 2)) * np.sign(m.dq),
+    ),
+    'load_dependent_friction': (
+        0.1,
+        None,
+        lambda r, m: 0.1 * np.abs(body(r, m)) * np.sign(m.dq),
+    ),
+    'thermal_friction': (
+        -0.2,
+        [0.3],
+        lambda r, m: -0.2 * (1.0 - np.exp(-m.t / 0.3))[:, None] * m.dq,
+    ),
+    'coupled_joint_friction': (
+        [0.0, 0.0, 0.4],
+        None,
+        lambda r, m: only(0.4 * np.sign(m.dq[:, 4:].sum(axis=1, keepdims=True)), [4, 5]),
+    ),
+    'rotor_inertia': (0.07, None, lambda r, m: 0.07 * m.ddq),
+    'gravity_magnitude': (
+        1.62 - 9.81,
+        None,
+        lambda r, m: body(r, m, [0.0, 0.0, -1.62]) - body(r, m),
+    ),
+    'base_tilt': (
+        [0.05, 0.0],
+        None,
+        lambda r, m: body(r, m, [0.0, -9.81 * np.sin(0.05), -9.81 * np.cos(0.05)]) - body(r, m),
+    ),
+    'torque_offset': (0.3, None, lambda r, m: np.full(m.q.shape, 0.3)),
+    'torque_drift': (
+        0.3,
+        [0.2],
+        lambda r, m: np.tile(0.3 * (1.0 - np.exp(-m.t / 0.2))[:, None], 6),
+    ),
+    'torque_gain': (-0.1, None, lambda r, m: -0.1 * body(r, m)),
+    'torque_crosstalk@elbow_pitch+shoulder_pitch': (
+        0.02,
+        None,
+        lambda r, m: only(0.02 * body(r, m)[:, [0]], [3]),
+    ),
+    'encoder_offset': (0.02, None, lambda r, m: body(r, m, offset=0.02) - body(r, m)),
+    'joint_spring': ([4.0, -1.0], None, lambda r, m: 4.0 * m.q - 1.0),
+    'soft_limit': ([50.0, 80.0], None, lambda r, m: bumpers(r, m, 50.0, 80.0)),
+    'torque_ripple': (
+        [0.1, 0.05],
+        [12.0],
+        lambda r, m: 0.1 * np.sin(12.0 * m.q) + 0.05 * np.cos(12.0 * m.q),
+    ),
+    'joint_coupling@elbow_pitch+shoulder_pitch': (
+        2.0,
+        None,
+        lambda r, m: only(-2.0 * m.q[:, [3, 0]], [0, 3]),
+    ),
+}
 
 
-def test_base_tilt_is_gravity_seen_from_a_turned_base(robot, motion, with_values):
-    angle = 0.05
-    tilted = robot.with_gravity([0.0, -9.81 * np.sin(angle), -9.81 * np.cos(angle)])
-    tau = with_values('base_tilt', [angle, 0.0]).torque(motion)
-    np.testing.assert_allclose(tau, inverse_dynamics(tilted, motion), atol=1e-12)
-
-
-def test_payload_is_a_body_fixed_to_the_last_link(robot, motion, with_values):
-    """0.3 kg at the centroid of link 6 is the shipped arm with load, up to its point inertia."""
-    loaded = load_robot('humanoid_arm_loaded')
-    difference = loaded.rigid_parameters - robot.rigid_parameters
-    np.testing.assert_allclose(difference[:50], 0.0)
-    tau = with_values('payload', difference[50:]).torque(motion)
-    np.testing.assert_allclose(tau, inverse_dynamics(loaded, motion), atol=1e-12)
-
-
-def test_payload_is_swallowed_by_free_link_parameters(robot):
-    arm = ArmModel(robot)
-    rng = np.random.default_rng(0)
-    with_payload = arm.with_effect(make_effect('payload', robot))
-    assert with_payload.base_parameters(rng).rank == arm.base_parameters(rng).rank
+@pytest.mark.parametrize('name', LAWS)
+def test_the_torque_of_an_effect_is_its_law(robot, motion, added, name):
+    values, shape, law = LAWS[name]
+    torque = added(motion, name, values, shape)
+    np.testing.assert_allclose(torque, law(robot, motion), atol=1e-11)
 
 
 @pytest.mark.parametrize('seed', range(5))

@@ -7,7 +7,6 @@ from armid_ros.effects import Hysteresis, make_effect
 from armid_ros.model import inverse_dynamics
 from armid_ros.motion import Motion
 import numpy as np
-import pytest
 
 ELBOW = 3
 
@@ -21,53 +20,14 @@ def elbow_path(robot, q, t=None):
     return Motion(robot.joints, t, path, dq, np.zeros_like(path))
 
 
-def test_stribeck_friction_is_a_hump_with_a_falling_flank(robot, added):
-    dq = np.linspace(0.001, 1.0, 400)
-    still = np.zeros((400, 6))
-    motion = Motion(robot.joints, np.arange(400.0), still, np.tile(dq[:, None], 6), still)
-    hump = added(motion, 'stribeck_friction', 0.4, [0.1, 2.0])[:, ELBOW]
-    assert hump[0] == pytest.approx(0.4, rel=1e-3)
-    assert np.all(np.diff(hump[dq < 0.5]) < 0.0)
-    assert hump[np.searchsorted(dq, 0.1)] == pytest.approx(0.4 / np.e, rel=0.03)
-    assert np.all(hump[dq > 0.3] < 0.4 * np.exp(-8.9))
-
-
-@pytest.mark.parametrize(
-    'name',
-    ['viscous_friction', 'coulomb_friction', 'stribeck_friction', 'load_dependent_friction'],
-)
-def test_friction_always_takes_energy(motion, added, name):
-    power = added(motion, name, 0.3) * motion.dq
-    assert np.all(power >= 0.0)
-    assert power.max() > 0.01
-
-
-def test_friction_that_is_quadratic_is_odd(motion, added):
-    friction = added(motion, 'quadratic_friction', 0.2)
-    np.testing.assert_allclose(friction, 0.2 * motion.dq * np.abs(motion.dq), atol=1e-12)
-
-
-def test_friction_with_load_grows_with_the_load_and_only_with_it(robot, motion, added):
-    heavy = robot.with_inertias(2.0 * robot.rigid_parameters)
-    effect = make_effect('load_dependent_friction', robot)
-    columns = [ArmModel(r).columns_of(effect, motion) for r in (robot, heavy)]
-    np.testing.assert_allclose(columns[1], 2.0 * columns[0], atol=1e-12)
-    expected = 0.1 * np.abs(inverse_dynamics(robot, motion)) * np.sign(motion.dq)
-    friction = added(motion, 'load_dependent_friction', 0.1)
-    np.testing.assert_allclose(friction, expected, atol=1e-12)
-
-
 def test_a_payload_adds_to_the_friction_of_the_joints_that_carry_it(robot, motion):
-    rubbing = ArmModel(robot).with_effect(
-        make_effect('load_dependent_friction', robot), np.full(6, 0.1)
-    )
+    """Whichever of the two was added to the arm first."""
     body = np.array([0.5, 0.0, 0.0, 0.05, *[0.0] * 6])
-    for first in (True, False):
-        payload = make_effect('payload', robot)
-        arm = ArmModel(robot).with_effect(payload, body) if first else rubbing
-        arm = arm.with_effect(
-            *((rubbing.effects[0], rubbing.values[0]) if first else (payload, body))
-        )
+    both = [('load_dependent_friction', np.full(6, 0.1)), ('payload', body)]
+    for order in (both, both[::-1]):
+        arm = ArmModel(robot)
+        for name, values in order:
+            arm = arm.with_effect(make_effect(name, robot), values)
         load = inverse_dynamics(arm.body, motion)
         expected = load + 0.1 * np.abs(load) * np.sign(motion.dq)
         np.testing.assert_allclose(arm.torque(motion), expected, atol=1e-12)
@@ -123,11 +83,3 @@ def test_a_path_gives_the_same_states_at_once_and_step_by_step():
         np.testing.assert_allclose(states[k], state, atol=1e-12)
         if k < 199:
             state = friction.advance(state, q[k + 1] - q[k])
-
-
-def test_warm_joints_have_another_viscous_friction(sines, added):
-    motion = sines(20.0, 50.0)
-    friction = added(motion, 'thermal_friction', -0.2, [5.0])
-    cold, warm = motion.t < 0.1, motion.t > 19.0
-    assert np.abs(friction[cold]).max() < 0.05 * np.abs(friction[warm]).max()
-    np.testing.assert_allclose(friction[warm], -0.2 * motion.dq[warm], rtol=0.03)

@@ -11,17 +11,6 @@ import numpy as np
 import pytest
 
 
-def test_one_gain_for_all_joints_is_all_masses_and_friction_scaled(robot, motion):
-    def arm(robot, coulomb):
-        return ArmModel(robot).with_effect(make_effect('coulomb_friction', robot), coulomb)
-
-    gained = arm(robot, np.full(6, 0.2)).with_effect(
-        make_effect('torque_gain', robot), np.full(6, 0.07)
-    )
-    scaled = arm(robot.with_inertias(1.07 * robot.rigid_parameters), np.full(6, 1.07 * 0.2))
-    np.testing.assert_allclose(gained.torque(motion), scaled.torque(motion), atol=1e-12)
-
-
 def test_gain_scales_all_that_the_joint_takes(robot, motion):
     """Whatever the order in which the effects were named."""
     gain = (make_effect('torque_gain', robot), np.full(6, -0.1))
@@ -33,19 +22,6 @@ def test_gain_scales_all_that_the_joint_takes(robot, motion):
     expected = 0.9 * (inverse_dynamics(robot, motion) + 0.5)
     for arm in arms:
         np.testing.assert_allclose(arm.torque(motion), expected, atol=1e-12)
-
-
-def test_crosstalk_reads_the_torque_of_another_joint(robot, motion, with_values):
-    tau = inverse_dynamics(robot, motion)
-    read = with_values('torque_crosstalk@elbow_pitch+shoulder_pitch', 0.02).torque(motion)
-    np.testing.assert_allclose(read[:, 3], tau[:, 3] + 0.02 * tau[:, 0], atol=1e-12)
-    np.testing.assert_array_equal(np.delete(read, 3, axis=1), np.delete(tau, 3, axis=1))
-
-
-def test_drift_depends_on_time_alone(sines, added):
-    motion = sines(20.0, 50.0)
-    drift = added(motion, 'torque_drift', 0.3, [5.0])
-    np.testing.assert_allclose(drift, 0.3 * (1 - np.exp(-motion.t / 5.0))[:, None] * np.ones(6))
 
 
 def test_a_delay_shifts_the_torque_of_each_joint_by_its_own(robot, sines, with_values):
@@ -78,21 +54,13 @@ def test_delay_and_lag_are_the_same_to_first_order(robot, sines):
     delay = arm.columns_of(make_effect('time_delay', robot), fine)[:, :, 0]
     lag = arm.columns_of(make_effect('torque_lag', robot), fine).sum(axis=2)
     np.testing.assert_allclose(delay, lag, atol=1e-12)
-
-
-def test_lateness_needs_more_than_one_sample(robot, motion):
     with pytest.raises(ModelError, match='two samples'):
-        ArmModel(robot).columns_of(make_effect('time_delay', robot), motion.select(slice(0, 1)))
+        arm.columns_of(make_effect('time_delay', robot), fine.select(slice(0, 1)))
 
 
-def test_an_encoder_offset_is_what_has_to_be_added_to_the_reading(robot, motion, with_values):
-    offset = np.array([0.01, -0.02, 0.0, 0.03, 0.0, 0.01])
-    true = Motion(robot.joints, motion.t, motion.q + offset, motion.dq, motion.ddq)
-    read = with_values('encoder_offset', offset).torque(motion)
-    np.testing.assert_allclose(read, inverse_dynamics(robot, true), atol=1e-12)
-
-
-def test_a_hard_limit_shows_in_what_the_drives_report(robot, motion, with_values):
+def test_a_hard_limit_shows_in_what_the_drives_report_or_clips_the_report(
+    robot, motion, with_values
+):
     """Reported and given torque differ where the report is beyond the level."""
     arm = with_values('actuator_saturation', [1.0, 0.0], [2.0])
     given = np.clip(inverse_dynamics(robot, motion), -2.0, 2.0)
@@ -103,10 +71,5 @@ def test_a_hard_limit_shows_in_what_the_drives_report(robot, motion, with_values
     effect = arm.effects[0]
     read = effect.read(arm.values[0], motion.with_torque(reported), given)
     np.testing.assert_allclose(read, reported, atol=1e-12)
-
-
-def test_a_report_that_ends_is_clipped(robot, motion, with_values):
-    read = with_values('actuator_saturation', [0.0, 1.0], [2.0]).torque(motion)
-    tau = inverse_dynamics(robot, motion)
-    np.testing.assert_allclose(read, np.clip(tau, -2.0, 2.0), atol=1e-12)
-    assert np.abs(tau).max() > 3.0
+    clipped = with_values('actuator_saturation', [0.0, 1.0], [2.0]).torque(motion)
+    np.testing.assert_allclose(clipped, given, atol=1e-12)

@@ -46,51 +46,6 @@ def test_springs_give_back_what_they_take(robot, added, name, values):
     assert abs(power.sum()) < 1e-4 * np.abs(power).sum()
 
 
-def test_the_preload_is_the_torque_at_zero(robot, motion, added):
-    expected = 4.0 * (motion.q - 0.25)
-    np.testing.assert_allclose(added(motion, 'joint_spring', [4.0, -1.0]), expected, atol=1e-12)
-
-
-def test_a_coupling_is_symmetric(robot, motion, added):
-    torque = added(motion, 'joint_coupling@shoulder_pitch+elbow_pitch', 2.0)
-    expected = np.zeros_like(torque)
-    expected[:, 0], expected[:, 3] = -2.0 * motion.q[:, 3], -2.0 * motion.q[:, 0]
-    np.testing.assert_allclose(torque, expected, atol=1e-12)
-    swapped = added(motion, 'joint_coupling@elbow_pitch+shoulder_pitch', 2.0)
-    np.testing.assert_allclose(torque, swapped, atol=1e-12)
-
-
-def test_springs_on_both_joints_and_a_coupling_are_a_cable_between_them(robot, motion, added):
-    """Their energy is K (q_i - q_k)^2 / 2."""
-    pair = 'shoulder_pitch+elbow_pitch'
-    torque = added(motion, f'joint_spring@{pair}', [2.0, 0.0])
-    torque = torque + added(motion, f'joint_coupling@{pair}', 2.0)
-    difference = motion.q[:, 0] - motion.q[:, 3]
-    np.testing.assert_allclose(torque[:, 0], 2.0 * difference, atol=1e-12)
-    np.testing.assert_allclose(torque[:, 3], -2.0 * difference, atol=1e-12)
-
-
-def test_bumpers_do_nothing_inside_and_push_back_outside(robot, motion, added):
-    torque = added(motion, 'soft_limit', [50.0, 80.0])
-    margin = 0.15 * (robot.upper - robot.lower)
-    low, high = robot.lower + margin, robot.upper - margin
-    assert not np.any(torque[(motion.q >= low) & (motion.q <= high)])
-    above, below = motion.q > high, motion.q < low
-    assert above.any() and below.any()
-    np.testing.assert_allclose(torque[above], (80.0 * (motion.q - high))[above], atol=1e-9)
-    np.testing.assert_allclose(torque[below], (50.0 * (motion.q - low))[below], atol=1e-9)
-
-
-def test_ripple_repeats_at_its_order(robot, motion, added):
-    once = added(motion, 'torque_ripple', [0.1, 0.05], [12.0])
-    turned = Motion(robot.joints, motion.t, motion.q + 2.0 * np.pi / 12.0, motion.dq, motion.ddq)
-    np.testing.assert_allclose(
-        added(turned, 'torque_ripple', [0.1, 0.05], [12.0]), once, atol=1e-9
-    )
-    amplitude = np.hypot(0.1, 0.05)
-    assert np.abs(once).max() == pytest.approx(amplitude, rel=0.02)
-
-
 def pull(robot, joint, offset, motion, anchor, stiffness):
     """Return the torque against a spring, from its energy by differences."""
     torque = np.empty_like(motion.q)
