@@ -4,11 +4,9 @@
 
 from armid_ros.arm import ArmModel, load_model, save_model
 from armid_ros.arm.testing import CHECKS, EffectCase, sines
-from armid_ros.effects import CATALOGUE
 from armid_ros.effects.learned import holding_torque, LearnedTorque, TorqueMap
 from armid_ros.errors import ModelError
 from armid_ros.model import inverse_dynamics
-from armid_ros.motion import Motion
 import numpy as np
 import pytest
 import yaml
@@ -66,19 +64,9 @@ def test_with_maps_it_keeps_the_contract(robot, learned, check):
 
 def test_the_load_is_what_holds_the_arm_where_it_is(robot):
     motion = sines(robot)
-    still = np.zeros_like(motion.q)
-    held = inverse_dynamics(robot, Motion(motion.joints, motion.t, motion.q, still, still))
+    held = inverse_dynamics(robot, motion.at_rest())
     np.testing.assert_allclose(holding_torque(robot, motion.q), held, atol=1e-12)
     np.testing.assert_allclose(holding_torque(robot, motion.q[3]), held[3], atol=1e-12)
-
-
-def test_a_file_keeps_it_to_the_last_digit_that_matters(robot, learned, tmp_path):
-    arm = ArmModel(robot).with_effect(learned, [1.0, 1.0])
-    save_model(tmp_path / 'model.yaml', arm, 'humanoid_arm')
-    again = load_model(tmp_path / 'model.yaml')
-    motion = sines(robot)
-    np.testing.assert_allclose(again.torque(motion), arm.torque(motion), atol=1e-7)
-    assert again.effects[0].maps[1].lengths[2] == np.inf
 
 
 @pytest.mark.parametrize(
@@ -91,18 +79,16 @@ def test_a_file_keeps_it_to_the_last_digit_that_matters(robot, learned, tmp_path
         (lambda m: m.__setitem__('joint', 'wrist'), "map of joint 'shoulder_roll'"),
     ],
 )
-def test_a_damaged_file_is_refused_with_the_joint(robot, learned, tmp_path, change, said):
-    path = tmp_path / 'model.yaml'
-    save_model(path, ArmModel(robot).with_effect(learned, [1.0, 1.0]), 'humanoid_arm')
+def test_a_file_keeps_the_maps_and_a_damaged_one_is_refused_with_the_joint(
+    robot, learned, tmp_path, change, said
+):
+    path, arm = tmp_path / 'model.yaml', ArmModel(robot).with_effect(learned, [1.0, 1.0])
+    save_model(path, arm, 'humanoid_arm')
+    again, motion = load_model(path), sines(robot)
+    np.testing.assert_allclose(again.torque(motion), arm.torque(motion), atol=1e-7)
+    assert again.effects[0].maps[1].lengths[2] == np.inf
     document = yaml.safe_load(path.read_text())
     change(document['effects'][0]['maps'][0])
     path.write_text(yaml.safe_dump(document))
     with pytest.raises(ModelError, match=said):
         load_model(path)
-
-
-def test_no_diagnosis_names_it(robot):
-    from armid_ros.diagnosis import DiagnosisSettings
-
-    assert 'learned_torque' in CATALOGUE
-    assert 'learned_torque' not in DiagnosisSettings().library

@@ -47,41 +47,29 @@ def together(pair, motions) -> Motion:
     return seen
 
 
-def truth(pair: TiedPair, motion: Motion, motions: PairMotion) -> np.ndarray:
-    inside = np.searchsorted(motions.own.t, motion.t - 1e-6)
-    return pair_torques(pair, motion, motions.other.select(inside)).tau
-
-
-def test_springs_to_recorded_points_are_those_of_the_pair(pair, motions, together) -> None:
-    springs = Partner(pair.other, pair.ties).tied(pair.robot, slack=False)
-    values = np.column_stack([STIFFNESS, np.zeros(4)]).ravel()
-    arm = ArmModel(pair.robot).with_effect(springs, values)
-    np.testing.assert_allclose(
-        arm.torque(together), truth(pair, together, motions), rtol=1e-4, atol=2e-2
-    )
-
-
-def test_slack_straps_to_recorded_points_are_those_of_the_pair(pair, motions, together) -> None:
-    straps = Partner(pair.other, pair.ties).tied(pair.robot, slack=True)
-    straps = straps.with_shape(SLACK[:, np.newaxis])
-    arm = ArmModel(pair.robot).with_effect(straps, STIFFNESS)
-    expected = truth(pair.with_slack(SLACK), together, motions)
+@pytest.mark.parametrize('slack', [False, True])
+def test_ties_to_recorded_points_are_those_of_the_pair(pair, motions, together, slack) -> None:
+    ties, values = Partner(pair.other, pair.ties).tied(pair.robot, slack=slack), STIFFNESS
+    if slack:
+        pair, ties = pair.with_slack(SLACK), ties.with_shape(SLACK[:, np.newaxis])
+    else:
+        values = np.column_stack([STIFFNESS, np.zeros(4)]).ravel()
+    inside = np.searchsorted(motions.own.t, together.t - 1e-6)
+    expected = pair_torques(pair, together, motions.other.select(inside)).tau
+    arm = ArmModel(pair.robot).with_effect(ties, values)
     np.testing.assert_allclose(arm.torque(together), expected, rtol=1e-4, atol=2e-2)
 
 
-def test_a_motion_without_the_partner_is_refused_by_name(pair, motions) -> None:
-    effect = Partner(pair.other, pair.ties, 'human_legs').tied(pair.robot, slack=False)
-    arm = ArmModel(pair.robot).with_effect(effect)
+def test_what_cannot_be_tied_is_refused_by_name(pair, motions) -> None:
+    partner = Partner(pair.other, pair.ties, 'human_legs')
+    arm = ArmModel(pair.robot).with_effect(partner.tied(pair.robot, slack=False))
     with pytest.raises(ModelError, match=r'swing_shank.*human_legs.*--partner'):
-        arm.torque(motions.own)
-
-
-def test_two_ties_on_a_joint_and_joints_without_any_are_refused(pair) -> None:
+        arm.torque(motions.own)  # without the partner
     with pytest.raises(ModelError, match='exo_swing_knee'):
         twice = (pair.ties[0], replace(pair.ties[0], name='again'))
         Partner(pair.other, twice).tied(pair.robot, slack=False)
     with pytest.raises(ModelError, match="'exo_stance_hip'"):
-        Partner(pair.other, pair.ties).tied(pair.robot, ('exo_stance_hip',), slack=True)
+        partner.tied(pair.robot, ('exo_stance_hip',), slack=True)
 
 
 def test_a_model_file_keeps_ties_and_slack(pair, together, tmp_path) -> None:
