@@ -5,12 +5,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-import copy
 import time
 
 from armid_ros.identification.online import identifier as online_identifier
 from armid_ros.identification.online.background import Background
-from armid_ros.identification.online.identifier import OnlineIdentifier
 from armid_ros.nodes.running.process import steady
 import numpy as np
 import pytest
@@ -94,14 +92,3 @@ def test_no_update_takes_much_longer_than_others(samples):
     least = np.min(times, axis=0)
     longest, usual = np.percentile(least, (99.9, 50))
     assert longest < 10.0 * usual  # 30 where all is done at once
-
-
-@pytest.mark.long
-def test_a_copy_goes_on_from_where_the_original_was(samples):
-    half = len(samples) // 2
-    first = changes.watch(iter(samples[:half]))
-    second = copy.deepcopy(first)
-    for online in (first, second):
-        changes.watch(iter(samples[half:]), online=online)
-    np.testing.assert_array_equal(first.estimate().values, second.estimate().values)
-    assert isinstance(second, OnlineIdentifier) and second.changes

@@ -11,7 +11,6 @@ from armid_ros.identification.online.background import at_once
 from armid_ros.identification.online.change import Change, change_candidates, ChangeCandidate
 from armid_ros.identification.online.change_search import (
     Block,
-    ChangeSearch,
     score_statistics,
     ScoreStatistics,
 )
@@ -21,7 +20,6 @@ from armid_ros.identification.online.recursive import RecursiveLeastSquares, Wei
 from armid_ros.identification.online.settings import FALSE_ALARM_TIME
 from armid_ros.identification.rows.causal import CausalMotion
 from armid_ros.motion import Motion
-from armid_ros.robots import load_robot
 import numpy as np
 import pytest
 from scipy import stats
@@ -90,16 +88,6 @@ def test_the_size_of_a_change_is_that_of_least_squares_over_all_rows(noise):
     assert found[0] == pytest.approx(expected, rel=1e-6)
     variance = noise**2 * np.linalg.inv(both.T @ both)[-1, -1]
     assert covariance[0, 0] == pytest.approx(variance, rel=1e-6)
-
-
-def test_a_change_without_calibrated_statistics_has_the_deviation_of_its_data():
-    _, block, _, _ = learned_and_block(np.random.default_rng(0), 0.7, seen=5)
-    candidate = ChangeCandidate('payload', 'hand', NAMES[:1], CHANGED, CHANGED)
-    search = ChangeSearch([candidate], CHANGED, 1e-6, Foreground())
-    found = at_once(search.size(candidate, block, [block], 1.0))
-    expected, certain = statistics_of(block, CHANGED).size(slice(0, 1))
-    np.testing.assert_allclose(found.values, expected)
-    np.testing.assert_allclose(found.covariance, certain)
 
 
 def test_without_a_change_the_ratio_is_chi_square():
@@ -251,18 +239,6 @@ def test_what_shows_for_a_moment_before_an_arm_rests_is_no_change(rests):
     assert len(stepped(8, rests=rests)) == (0 if rests else 1)
 
 
-def test_by_how_much_is_not_said_where_it_is_not_known():
-    parameters = (
-        ParameterName('viscous_coefficient', 'elbow', 'N m s/rad'),
-        ParameterName('coulomb_torque', 'elbow', 'N m'),
-    )
-    size = Estimate(parameters, np.array([0.0, 0.2]), np.diag([np.inf, 1e-4]))
-    candidate = ChangeCandidate('friction', 'elbow', parameters, np.eye(2), np.eye(2))
-    unknown, known = str(Change(candidate, (), 1.0, size)).split(',')
-    assert 'elbow' in unknown and 'unknown' in unknown
-    assert '+0.2 N m' in known
-
-
 def test_what_a_window_does_not_show_has_an_infinite_deviation():
     """The first change is not seen at all; the last two are seen only in their sum."""
     rows = np.array([[0.0, 2.0, 0.0, 0.0], [0.0, 0.0, 1.0, 1.0]])
@@ -270,44 +246,28 @@ def test_what_a_window_does_not_show_has_an_infinite_deviation():
     values, covariance = score.size(slice(None))
     np.testing.assert_allclose(np.diag(covariance), [np.inf, 0.25, np.inf, np.inf])
     assert values[1] == pytest.approx(1.0)
+    candidate = ChangeCandidate('friction', 'elbow', NAMES[:2], np.eye(2), np.eye(2))
+    size = Estimate(NAMES[:2], values[:2], covariance[:2, :2])
+    unknown, known = str(Change(candidate, (), 1.0, size)).split(',')
+    assert 'unknown' in unknown and 'inf' not in unknown and '+1' in known
 
 
-def arm_with(*names: str) -> ArmModel:
-    arm = ArmModel(load_robot('humanoid_arm'))
-    for name in names:
-        arm = arm.with_effect(make_effect(name, arm.robot))
-    return arm
-
-
-def unfiltered_row(q, dq, ddq) -> Row:
-    """Return the first row of a stretch, which filters leave as it is."""
-    return Row(0.0, None, CausalMotion(0.0, q, dq, ddq, q), 0.005, 1.0, begins=True)
-
-
-def test_columns_are_those_of_the_effects_that_the_arm_lacks():
-    arm = arm_with()
-    stribeck = make_effect('stribeck_friction', arm.robot)
-    lacking = (
-        make_effect('viscous_friction', arm.robot),
-        make_effect('coulomb_friction', arm.robot),
-        *(stribeck.with_shape((velocity, 2.0)) for velocity in (0.03, 0.1, 0.3)),
-        make_effect('load_dependent_friction', arm.robot),
-    )
-    q, dq, ddq = np.random.default_rng(0).normal(size=(3, arm.robot.n_joints))
+def test_columns_of_nuisance_are_those_of_the_effects_that_the_arm_lacks(robot):
+    arm = ArmModel(robot)
+    stribeck = make_effect('stribeck_friction', robot)
+    names = ('viscous_friction', 'coulomb_friction', 'load_dependent_friction')
+    viscous, coulomb, loaded = (make_effect(name, robot) for name in names)
+    humps = [stribeck.with_shape((velocity, 2.0)) for velocity in (0.03, 0.1, 0.3)]
+    lacking = viscous, coulomb, *humps, loaded
+    q, dq, ddq = 0.2 * np.random.default_rng(0).normal(size=(3, robot.n_joints))
     nuisance = NuisanceRows(arm, 5.0)
-    one = Motion(arm.robot.joints, np.zeros(1), q[None], 0.2 * dq[None], ddq[None])
-    (rows,) = at_once(nuisance.columns([unfiltered_row(q, 0.2 * dq, ddq)]))
+    # the first row of a stretch, which filters leave as it is
+    row = Row(0.0, None, CausalMotion(0.0, q, dq, ddq, q), 0.005, 1.0, begins=True)
+    one = Motion(robot.joints, np.zeros(1), q[None], dq[None], ddq[None])
+    (rows,) = at_once(nuisance.columns([row]))
     expected = np.concatenate([effect.columns(one, arm)[0] for effect in lacking], axis=1)
     np.testing.assert_allclose(rows, expected, atol=1e-12)
-    assert [p.joint for p in nuisance.parameters] == list(arm.robot.joints) * len(lacking)
-
-
-def test_what_is_identified_is_not_nuisance():
-    everything = arm_with(
-        'viscous_friction', 'coulomb_friction', 'stribeck_friction', 'load_dependent_friction'
-    )
-    nuisance = NuisanceRows(everything, 5.0)
-    assert nuisance.parameters == ()
-    n = everything.robot.n_joints
-    rows = at_once(nuisance.columns([unfiltered_row(*np.ones((3, n)))]))
-    assert rows.shape == (1, n, 0)
+    assert [p.joint for p in nuisance.parameters] == list(robot.joints) * len(lacking)
+    whole = NuisanceRows(ArmModel(robot, (viscous, coulomb, stribeck, loaded)), 5.0)
+    assert whole.parameters == ()
+    assert at_once(whole.columns([row])).shape == (1, robot.n_joints, 0)

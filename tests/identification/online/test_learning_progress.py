@@ -15,13 +15,13 @@ import pytest
 from tests.identification.conftest import multisine
 
 
-@pytest.fixture(scope='module')
-def motion(arm):
-    return multisine(arm.robot.joints, 30.0, 250.0, seed=0)
-
-
-def learn(arm, motion, look_every=1.0):
-    """Identify online, look every second, and return what was said last."""
+def learn(arm, standing=None, look_every=1.0):
+    """Identify online while a joint may stand still, look every second, return the last answer."""
+    motion = multisine(arm.robot.joints, 30.0, 250.0, seed=0)
+    if standing is not None:
+        moves = np.array(arm.robot.joints) != standing
+        q = np.where(moves, motion.q, 0.4)
+        motion = replace(motion, q=q, dq=moves * motion.dq, ddq=moves * motion.ddq)
     rng = np.random.default_rng(0)
     tau = arm.torque(motion) + 0.02 * rng.normal(size=motion.q.shape)
     online = OnlineIdentifier(replace(arm, values=()), rng=np.random.default_rng(0))
@@ -35,28 +35,29 @@ def learn(arm, motion, look_every=1.0):
 
 
 @pytest.mark.long
-def test_a_joint_that_stands_still_is_named(arm, motion):
-    elbow = list(arm.robot.joints).index('elbow_pitch')
-    parts = [np.array(part) for part in (motion.q, motion.dq, motion.ddq)]
-    parts[0][:, elbow], parts[1][:, elbow], parts[2][:, elbow] = 0.4, 0.0, 0.0
-    still = replace(motion, q=parts[0], dq=parts[1], ddq=parts[2])
-    said = learn(arm, still)
-    assert said[0].joint == 'elbow_pitch' or 'elbow_pitch' in [part.joint for part in said]
+def test_a_joint_that_stands_still_is_named(arm):
+    said = learn(arm, standing='elbow_pitch')
     text = too_little_motion([part for part in said if part.joint == 'elbow_pitch'])
     assert 'elbow_pitch' in text and 'viscous friction' in text
 
 
 @pytest.mark.long
 @pytest.mark.slow
-def test_a_rich_motion_leaves_the_strong_joints_with_nothing_to_ask_for(arm, motion):
-    named = {part.joint for part in learn(arm, motion)}
+def test_a_rich_motion_leaves_the_strong_joints_with_nothing_to_ask_for(arm):
+    named = {part.joint for part in learn(arm)}
     assert not named & {'shoulder_pitch', 'shoulder_roll', 'upper_arm_yaw', 'elbow_pitch'}
 
 
-def test_while_the_estimate_gets_better_nothing_is_asked_for(arm):
+@pytest.fixture
+def started(arm):
+    """Return the progress of an identifier, and its first estimate."""
     online = OnlineIdentifier(arm, rng=np.random.default_rng(0))
     progress = LearningProgress(online.arm, online.base, np.random.default_rng(0))
-    start = online.estimate()
+    return progress, online.estimate()
+
+
+def test_while_the_estimate_gets_better_nothing_is_asked_for(started):
+    progress, start = started
     for second in range(30):
         better = Estimate(start.parameters, start.values, start.covariance * 0.8**second)
         assert not progress.unidentified(float(second), better)
@@ -65,11 +66,9 @@ def test_while_the_estimate_gets_better_nothing_is_asked_for(arm):
 
 
 @pytest.mark.parametrize(('friction', 'named'), [(0.2, False), (0.0, True)])
-def test_what_a_joint_takes_includes_its_friction(arm, friction, named):
+def test_what_a_joint_takes_includes_its_friction(started, friction, named):
     """The links beyond the wrist take 0.007 N m; 0.005 N m is much of that, little of 0.2 N m."""
-    online = OnlineIdentifier(arm, rng=np.random.default_rng(0))
-    progress = LearningProgress(online.arm, online.base, np.random.default_rng(0))
-    start = online.estimate()
+    progress, start = started
     values, std = 0.0 * start.values, np.full(len(start.values), 1e-9)
     wrist = start.index('coulomb_torque', 'wrist_pitch')
     values[wrist], std[wrist] = friction, 0.005
