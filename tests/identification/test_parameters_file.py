@@ -14,22 +14,11 @@ import pytest
 from tests.diagnosis.conftest import Bench
 
 
-@pytest.fixture(scope='module')
-def bench():
-    return Bench()
-
-
-@pytest.fixture(scope='module')
-def found(bench):
-    return identify(bench.arm, bench.recordings(), rng=np.random.default_rng(0))
-
-
-@pytest.fixture(scope='module')
-def read(found):
-    return parameters_of('identification.json', identification_document(found, 'bench', {}))
-
-
-def test_information_of_standard_parameters_is_the_inverse_covariance(bench, found, read):
+def test_information_of_standard_parameters_is_the_inverse_covariance():
+    """On parameters that were not identified there is none."""
+    bench = Bench()
+    found = identify(bench.arm, bench.recordings(), rng=np.random.default_rng(0))
+    read = parameters_of('identification.json', identification_document(found, 'bench', {}))
     told = read.information(bench.arm.parameters)
     lift = np.linalg.pinv(found.base.grouping)
     product = lift.T @ told @ lift @ found.estimate.covariance
@@ -37,15 +26,10 @@ def test_information_of_standard_parameters_is_the_inverse_covariance(bench, fou
     hidden = np.eye(len(told)) - lift @ found.base.grouping
     np.testing.assert_allclose(hidden @ told @ hidden, 0.0, atol=1e-9 * np.abs(told).max())
     assert replace(read, covariance=None).information(bench.arm.parameters) is None
-
-
-def test_no_information_on_parameters_that_were_not_identified(bench, read):
-    spring = CATALOGUE['joint_spring'].on(bench.robot, ('elbow',))
-    arm = bench.arm.with_effect(spring)
-    told = read.information(arm.parameters)
-    known = len(bench.arm.parameters)
-    assert not np.any(told[known:]) and not np.any(told[:, known:])
-    np.testing.assert_allclose(told[:known, :known], read.information(bench.arm.parameters))
+    arm = bench.arm.with_effect(CATALOGUE['joint_spring'].on(bench.robot, ('elbow',)))
+    more, known = read.information(arm.parameters), len(told)
+    assert not np.any(more[known:]) and not np.any(more[:, known:])
+    np.testing.assert_allclose(more[:known, :known], told)
 
 
 def score(rms, errors, **others):
@@ -64,15 +48,8 @@ def test_what_was_fitted_counts_as_what_was_held_out_may_be_of_a_changed_arm():
     assert (found.recordings, found.grade) == (3, 'good')
     assert found.misfit.rms == {'a': 0.1, 'b': 0.2}
     assert found.misfit.torque_rms == pytest.approx({'a': 10.0, 'b': 10.0})
-
-
-def test_a_grade_that_is_written_is_kept_with_its_reason():
-    document = {'grade': 'unusable', 'reasons': ['Because.', 'So.']}
-    found = known_fit(document | {'training': score([0.1, 0.1], [1.0, 1.0])})
-    assert found.unusable and found.reason == 'Because.'
-
-
-def test_a_file_without_a_score_says_nothing():
+    written = {'grade': 'unusable', 'reasons': ['Because.', 'So.'], 'training': training}
+    assert known_fit(written).unusable and known_fit(written).reason == 'Because.'
     assert known_fit({}) is None
 
 
