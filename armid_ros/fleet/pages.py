@@ -91,6 +91,8 @@ def _arm_page(found: Watch, arm: WatchedArm, diagnoses: Diagnoses) -> str:
     diagnosed = _diagnosed(arm, diagnosis)
     tone = 'good' if arm.health == 'healthy' and not diagnosed else 'fair'
     quiet = 'No parameter has changed by more than noise and the scatter between bags.'
+    if arm.health == 'too few bags':
+        quiet = f'Changes were not tested: {counted(len(arm.bags), "bag")} are too few.'
     if diagnosis is not None and diagnosed:
         quiet = pretty(diagnosis['summary'])
     sentences = [f'{text[0].upper()}{text[1:]}.' for text in texts[:1]] or [quiet]
@@ -150,8 +152,7 @@ def _arm_page(found: Watch, arm: WatchedArm, diagnoses: Diagnoses) -> str:
 def _step(arm: WatchedArm, is_diagnosed: bool, fault: str) -> str:
     """Return the advice for the user on the page of an arm."""
     if not (arm.named or fault):
-        first = 'Record more' if arm.health == 'too few bags' else 'After the next'
-        return f'{first} recordings, run armid fleet identify and armid fleet watch again.'
+        return 'After the next recordings, run armid fleet identify and armid fleet watch again.'
     if is_diagnosed:
         return 'Read the report of the diagnosis: it states what to inspect.'
     return f'armid fleet diagnose --arm {arm.arm} --out RESULTS'
@@ -162,7 +163,8 @@ def _verdict(found: Watch, diagnoses: Diagnoses) -> VerdictSection:
     counts = Counter(arm.health for arm in found.arms)
     blamed = [arm.arm for arm in found.arms if _diagnosed(arm, diagnoses.get(arm.arm))]
     ill = counts['changed'] + counts['wearing']
-    sentences = [f'No parameter of {counted(len(found.arms), "arm")} changed.']
+    tested = len(found.arms) - counts['too few bags']
+    sentences = [f'No parameter of {counted(tested, "tested arm")} changed.']
     longest = 60  # characters
     named = ', '.join(arm.arm for arm in found.arms if arm.health in ('changed', 'wearing'))
     if ill:
