@@ -120,7 +120,8 @@ class DataTable(Templated):
     words : collection of int
         Indices of the columns with text; all other columns have numbers.
     kind : str
-        'tight', 'both' or 'parameters': layout on a small screen.
+        'parameters', 'matrix' or 'fleet'. On a small screen, wide tables of no kind or of a fleet
+        become lists: each cell has the head of its column.
 
     """
 

@@ -63,7 +63,7 @@ def compare_report(comparison: Comparison, origin: ResultOrigin) -> str:
             step=next_step(comparison),
             command=origin.step,
         ),
-        *([ContentSection('What changed', [DataTable(HEADS, rows, kind='both')])] if rows else []),
+        *([ContentSection('What changed', [DataTable(HEADS, rows, (0, 3))])] if rows else []),
         changes_section(comparison),
         ContentSection('Input', [FactList(facts)]),
         Origin(origin.provenance),

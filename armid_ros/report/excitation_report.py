@@ -296,7 +296,7 @@ def _motion_section(
                 'measured from the middle of the range. Approach and return may use the full '
                 'range.'
             ),
-            DataTable(('Joint', *shares), rows, kind='tight'),
+            DataTable(('Joint', *shares), rows),
             Paragraph(f'Horizontal lines are the limits of the design. {ZOOM}', 'hint'),
             Panels(panels),
         ],

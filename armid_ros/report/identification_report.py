@@ -212,7 +212,7 @@ def _physical_section(
             (
                 link.link,
                 f'{link.mass:.4g}',
-                TableCell(', '.join(f'{value:.3g}' for value in link.moments), 'wraps'),
+                ', '.join(f'{value:.3g}' for value in link.moments),
                 f'{link.eigenvalues[0]:.3g}',
                 digits(float(share)),
                 TableCell('active', 'telling') if active else 'inactive',
@@ -244,7 +244,7 @@ def _physical_section(
                 f'cross-validation. Cross-validation chose {certificate.weight:g} as the weight '
                 'of the description.'
             ),
-            DataTable(heads, rows, (0, 5), 'tight'),
+            DataTable(heads, rows, (0, 2, 5)),
             BulletList(activity or [('No constraint is active.', 'fine')]),
             *homeless,
         ],

@@ -77,7 +77,7 @@ def inspection_report(found: Inspection, origin: ResultOrigin = DEFAULT_ORIGIN) 
         ContentSection(
             'Joints',
             [
-                DataTable(joint_heads(found), joint_rows(found), kind='tight'),
+                DataTable(joint_heads(found), joint_rows(found)),
                 Paragraph(
                     'Speed: 99th percentile, from the positions. Step: smallest change of a '
                     'position between samples. Velocity ratio: recorded velocity over the '
@@ -200,7 +200,7 @@ def description_check_report(
             'A dash: as described, or not identifiable from this motion. Explains: share of the '
             'torque error that this link explains if all other links are right.'
         )
-        table = DataTable(HEADS, link_rows(links), kind='tight')
+        table = DataTable(HEADS, link_rows(links), (0, 3, 4))
         sections.append(ContentSection('Links', [table, Paragraph(hint, 'hint')]))
     sections.append(Origin(origin.provenance))
     title = f'Check of {robot_label(origin.robot)}'
@@ -245,7 +245,7 @@ def _contents_section(found: Inspection) -> ContentSection:
             for topic in found.topics
         ]
         heads = ('Topic', 'Messages', 'Type', 'Joints')
-        blocks.insert(0, DataTable(heads, rows, (0, 2, 3), 'tight'))
+        blocks.insert(0, DataTable(heads, rows, (0, 2, 3)))
     return ContentSection('What is in it', blocks)
 
 

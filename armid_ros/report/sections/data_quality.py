@@ -68,7 +68,7 @@ def data_quality_section(
             )
         notes.append((f'{source}: {text}', 'fine' if clean and not faulty else 'warn'))
     heads = ('Recording', 'Used for', 'Duration', 'Rate', 'Jitter', 'Longest step', 'Clock')
-    blocks: list[Templated] = [DataTable(heads, rows, (0, 1, 6), 'tight'), BulletList(notes)]
+    blocks: list[Templated] = [DataTable(heads, rows, (0, 1, 6)), BulletList(notes)]
     if robot is not None:
         blocks += _repeatability(read, robot)
     return ContentSection('Data quality', blocks)

@@ -116,9 +116,7 @@ def named_rows(
 def named_section(findings: Sequence[Finding]) -> ContentSection:
     """Return the section with the parameters of the named effects."""
     heads = ('Effect', 'Parameter', 'Joint', 'Value, 95 %')
-    return ContentSection(
-        'Parameters', [DataTable(heads, named_rows(findings), (0, 1, 2), 'both')]
-    )
+    return ContentSection('Parameters', [DataTable(heads, named_rows(findings), (0, 1, 2, 3))])
 
 
 def evidence_section(diagnosis: Diagnosis) -> ContentSection:
@@ -178,7 +176,7 @@ def minor_section(diagnosis: Diagnosis, patched: bool) -> ContentSection:
                 'Statistically significant but negligible, or not confirmed by held-out data.'
                 f'{not_in_model} A value may stand for another effect with a similar torque.'
             ),
-            DataTable(('Effect', 'Joints', 'Value, 95 %', share, 'p value'), rows, (0, 1)),
+            DataTable(('Effect', 'Joints', 'Value, 95 %', share, 'p value'), rows, (0, 1, 2, 3)),
         ],
     )
 
@@ -236,7 +234,9 @@ def isolability_section(isolability: Isolability) -> ContentSection:
                 'Similarity of two effects, by number: the darker, the more similar. "=": the '
                 'effect of the column can reproduce that of the row.'
             ),
-            DataTable(('Effect', *(str(k + 1) for k in range(len(kinds)))), similar),
+            DataTable(
+                ('Effect', *(str(k + 1) for k in range(len(kinds)))), similar, kind='matrix'
+            ),
         ],
     )
 
