@@ -164,7 +164,7 @@ def _verdict(diagnosis: Diagnosis, worse: Sequence[str], step: str) -> VerdictSe
     first, stop, more = pretty(diagnosis.summary).partition('. ')
     badge = {'named': 'cause named'}.get(diagnosis.verdict, diagnosis.verdict.replace('_', ' '))
     bars = None
-    if diagnosis.gap is not None and diagnosis.verdict != 'bad_data':
+    if diagnosis.gap is not None and diagnosis.verdict not in ('bad_data', 'not_repeatable'):
         bars = share_bars(diagnosis) if diagnosis.findings else gap_bars(diagnosis, diagnosis.gap)
     sentences = [first + stop.rstrip(), *filter(None, [more])]
     return VerdictSection(badge, tone_of(diagnosis), sentences, notes, bars, step)
@@ -196,6 +196,8 @@ class Story(Section):
         data, robot = self.diagnosis.data, self.diagnosis.arm.robot
         causes = self.diagnosis.findings
         largest = [place.joint for place in self.diagnosis.where[:1]]
+        if self.diagnosis.gap is not None and self.diagnosis.verdict == 'not_repeatable':
+            largest = [robot.joints[_worst(self.diagnosis, self.diagnosis.gap)]]
         named = {joint for one in causes for joint in one.joints or robot.joints}
         joints = [joint for joint in robot.all_joints if joint in named] if causes else largest
         places = [
@@ -252,11 +254,13 @@ def overlay_section(diagnosis: Diagnosis, gap: Gap) -> ContentSection:
 
     """
     robot, patched = diagnosis.arm.robot, bool(diagnosis.findings)
-    j = int(np.argmax(gap.chi2_before))
-    shown = max(
-        gap.overlays,
-        key=lambda one: np.mean(np.square((one.measured - one.before)[:, j] / one.sigma[j])),
-    )
+    j = _worst(diagnosis, gap)
+
+    def size(overlay: Overlay) -> float:
+        residual = (overlay.measured - overlay.before)[:, j] / overlay.sigma[j]
+        return float(np.mean(residual**2))
+
+    shown = max(gap.overlays, key=size)
     t, measured, before, after = _of_recording(gap, shown, j)
     unit = robot.torque_units[j]
     acting = [one for one in diagnosis.spans if one.source == shown.source and not one.whole]
@@ -303,6 +307,15 @@ def overlay_section(diagnosis: Diagnosis, gap: Gap) -> ContentSection:
             ),
         ],
     )
+
+
+def _worst(diagnosis: Diagnosis, gap: Gap) -> int:
+    """Return the joint with the largest error in units of its floor, or else of its torque."""
+    if diagnosis.verdict != 'not_repeatable':
+        return int(np.argmax(gap.chi2_before))
+    # the floor contains the part of the torque that does not repeat: relative to the torque
+    torque = np.concatenate([one.measured for one in gap.overlays])
+    return int(np.argmax(gap.after / np.maximum(np.sqrt(np.mean(torque**2, axis=0)), 1e-12)))
 
 
 def _of_recording(gap: Gap, shown: Overlay, joint: int) -> tuple[FloatArray, ...]:
