@@ -3,7 +3,9 @@
 """Small arms, and recordings of them made without the simulator."""
 
 from armid_ros.arm import ArmModel
+from armid_ros.diagnosis import diagnose
 from armid_ros.effects import make_effect
+from armid_ros.identification import identify
 from armid_ros.model import inverse_dynamics
 from armid_ros.motion import Motion
 from armid_ros.recording import Recording
@@ -121,6 +123,27 @@ class Bench:
         """Return the torque of rigid body and known friction, computed without effects."""
         friction = self.friction[0] * motion.dq + self.friction[1] * np.sign(motion.dq)
         return inverse_dynamics(self.robot, motion) + friction
+
+
+def diagnosed(arm, recordings, **options):
+    """Diagnose recordings, always with the same random numbers."""
+    return diagnose(arm, recordings, rng=np.random.default_rng(0), **options)
+
+
+def changed_since(arm, before, after, new=()):
+    """Identify a model from recordings, and ask what has changed since."""
+    model = identify(arm, before, rng=np.random.default_rng(0)).arm
+    return diagnosed(model, after, validate=new, baseline=before)
+
+
+def on_elbow(torque):
+    """Return a torque (N,) of the elbow, the second of two joints, as one of all joints."""
+    return np.outer(torque, [0.0, 1.0])
+
+
+def drag(size):
+    """Return a torque of the elbow that grows with the square of its speed."""
+    return lambda motion, tau: on_elbow(size * motion.dq[:, 1] * np.abs(motion.dq[:, 1]))
 
 
 @pytest.fixture(scope='session')

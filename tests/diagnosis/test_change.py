@@ -16,7 +16,7 @@ from armid_ros.model import inverse_dynamics
 import numpy as np
 import pytest
 
-from tests.diagnosis.conftest import Bench, UPRIGHT_URDF
+from tests.diagnosis.conftest import Bench, changed_since, drag, UPRIGHT_URDF
 
 HOSE = np.array([1.5, 0.8])
 
@@ -26,28 +26,14 @@ def hose(motion, tau):
     return HOSE * np.sin(1.3 * motion.q + 0.4)
 
 
-def asked(bench, before, after, new):
-    """Ask what has changed since a model was identified from other recordings."""
-    rng = np.random.default_rng(0)
-    arm = identify(bench.arm, before, rng=rng).arm
-    return diagnose(arm, after, validate=new, baseline=before, rng=rng)
-
-
-def test_what_was_there_already_is_not_named(bench):
-    before = bench.recordings(hose, seed=1)
-    found = asked(bench, before, bench.recordings(hose, seed=2), bench.recordings(hose, seed=3))
-    assert found.verdict == 'consistent', found.summary
-    assert not found.findings
-
-
 @pytest.mark.long
 def test_a_slow_recording_that_hardly_shows_a_cause_denies_it_not(bench):
     def stirring(motion, tau):
-        return hose(motion, tau) + np.array([0.0, 0.5]) * motion.dq * np.abs(motion.dq)
+        return hose(motion, tau) + drag(0.5)(motion, tau)
 
     after = bench.recordings(stirring, seed=2)[1:]
     slow = bench.recordings(stirring, seed=3)[:1]
-    found = asked(bench, bench.recordings(hose, seed=1), after, slow)
+    found = changed_since(bench.arm, bench.recordings(hose, seed=1), after, slow)
     assert [one.name for one in found.findings] == ['quadratic_friction'], found.summary
 
 
@@ -105,7 +91,7 @@ def test_joints_that_warm_up_each_by_its_own_share_are_told_so(bench):
 
     before = bench.recordings(lambda motion, tau: 0.05 * hose(motion, tau), seed=1)
     after, new = (bench.recordings(warm, seed=seed) for seed in (2, 3))
-    found = asked(bench, before, after, new)
+    found = changed_since(bench.arm, before, after, new)
     assert {one.name for one in found.findings} == {'viscous_friction', 'coulomb_friction'}
     for one in found.findings:
         told, wide = (np.array(each) / one.added_to for each in (one.values, one.std))
@@ -128,17 +114,14 @@ def test_a_law_that_all_joints_have_since_is_one_cause(new):
     before, after, new_ones = (
         old.recordings(hidden, seed) for seed, hidden in enumerate((None, law, law))
     )
-    model = identify(arm, before, rng=np.random.default_rng(0)).arm
-    found = diagnose(
-        model, after, validate=new_ones, baseline=before, rng=np.random.default_rng(0)
-    )
+    found = changed_since(arm, before, after, new_ones)
     assert found.verdict == 'named', found.summary
     (one,) = found.findings
     assert (one.name, one.joints) == (new, old.robot.joints)
     np.testing.assert_allclose(one.values, more * (1.0 if coulomb else 0.3), atol=0.03)
 
 
-@pytest.mark.parametrize('of', ['velocity', 'position'])
+@pytest.mark.parametrize('of', ['velocity', pytest.param('position', marks=pytest.mark.long)])
 def test_a_new_law_that_the_catalogue_lacks_leaves_the_gap_open(bench, of):
     """A cubic drag resembles quadratic friction, and a bump resembles torque ripple."""
 
@@ -148,7 +131,9 @@ def test_a_new_law_that_the_catalogue_lacks_leaves_the_gap_open(bench, of):
         return 0.1 * hose(motion, tau) + np.array([0.0, 1.0]) * new
 
     before = bench.recordings(lambda motion, tau: 0.1 * hose(motion, tau), seed=1)
-    found = asked(bench, before, bench.recordings(law, seed=2), bench.recordings(law, seed=3))
+    found = changed_since(
+        bench.arm, before, bench.recordings(law, seed=2), bench.recordings(law, seed=3)
+    )
     assert found.verdict in {'partial', 'unknown'}, found.summary
     assert {one.joint for one in (*found.where, *found.left)} == {'elbow'}
 
@@ -157,11 +142,12 @@ def test_a_new_law_of_the_catalogue_closes_the_gap(bench):
     """Quadratic friction is named, and no unlisted law, where the gap is only a few misfits."""
 
     def law(motion, tau):
-        new = 0.05 * motion.dq * np.abs(motion.dq)
-        return 0.3 * hose(motion, tau) + np.array([0.0, 1.0]) * new
+        return 0.3 * hose(motion, tau) + drag(0.05)(motion, tau)
 
     before = bench.recordings(lambda motion, tau: 0.3 * hose(motion, tau), seed=1)
-    found = asked(bench, before, bench.recordings(law, seed=2), bench.recordings(law, seed=3))
+    found = changed_since(
+        bench.arm, before, bench.recordings(law, seed=2), bench.recordings(law, seed=3)
+    )
     assert found.verdict == 'named', found.summary
     assert [one.name for one in found.findings] == ['quadratic_friction']
 
@@ -171,9 +157,7 @@ def test_recordings_with_more_noise_than_the_baseline_have_a_floor_of_their_own(
     floors = []
     for noise in (0.0, 1.0):
         before = bench.recordings(seed=1, noise=noise)
-        arm = identify(bench.arm, before, rng=np.random.default_rng(0)).arm
-        after = bench.recordings(seed=2)
-        found = diagnose(arm, after, baseline=before, rng=np.random.default_rng(0))
+        found = changed_since(bench.arm, before, bench.recordings(seed=2))
         assert found.verdict == 'consistent', found.summary
         floors.append(found.gap.floor)
     np.testing.assert_allclose(floors[0], floors[1], rtol=0.5)
@@ -190,7 +174,7 @@ def test_what_slow_motion_does_not_tell_of_a_body_is_no_change(bench):
     """Inertias that are off show first in faster motion, which is no change of the arm."""
     slow = [bench.recordings(seed=seed)[0] for seed in (1, 2, 3)]
     fast = [bench.recordings(seed=seed)[2] for seed in (4, 5, 6)]
-    found = asked(bench, slow, fast[:2], fast[2:])
+    found = changed_since(bench.arm, slow, fast[:2], fast[2:])
     assert not found.findings, found.summary
 
 
@@ -222,7 +206,7 @@ def test_a_load_of_a_link_between_two_days_is_a_payload(upright):
         return inverse_dynamics(true, motion) - inverse_dynamics(upright.robot, motion)
 
     before, after, new = (upright.recordings(make, k) for k, make in enumerate((None, load, load)))
-    (found,) = asked(upright, before, after, new).findings
+    (found,) = changed_since(upright.arm, before, after, new).findings
     assert (found.name, found.joints) == ('payload', ('shoulder',))
     values = dict(zip([p.name for p in found.parameters], found.values, strict=True))
     assert values['payload_mz'] == pytest.approx(0.2, rel=0.05)
@@ -238,7 +222,7 @@ def test_one_recording_a_day_names_what_takes_most_of_the_gap_alone(bench):
 
     before = bench.recordings(hose, seed=1)[1:2]
     large, small = (
-        asked(bench, before, bench.recordings(with_drag(size), seed=2)[1:2], ())
+        changed_since(bench.arm, before, bench.recordings(with_drag(size), seed=2)[1:2], ())
         for size in (1.2, 0.7)
     )
     assert [one.name for one in large.findings] == ['coulomb_friction']

@@ -3,14 +3,13 @@
 """What differs between two days: by motion, by recording, by time, and by several causes."""
 
 from armid_ros.arm import Misfit
-from armid_ros.diagnosis import diagnose, DiagnosisSettings
+from armid_ros.diagnosis import DiagnosisSettings
 from armid_ros.effects import make_effect
-from armid_ros.identification import identify
 from armid_ros.model import inverse_dynamics
 import numpy as np
 import pytest
 
-from tests.diagnosis.conftest import Bench, UPRIGHT_URDF
+from tests.diagnosis.conftest import Bench, changed_since, diagnosed, on_elbow, UPRIGHT_URDF
 from tests.diagnosis.test_payload import held_by
 
 
@@ -38,19 +37,16 @@ def test_what_the_model_lacks_on_both_days_is_no_change(bench, curve, before, to
         for seed in (1, 2, 3, 4)
     ]
     first, second = [day[before] for day in days[:2]], [day[today] for day in days[2:]]
-    rng = np.random.default_rng(0)
-    arm = identify(bench.arm, first, rng=rng).arm
-    found = diagnose(arm, second, baseline=first, rng=rng)
+    found = changed_since(bench.arm, first, second)
     assert not found.findings, found.summary
 
 
 def with_offsets(bench, seed, offsets):
     """Return recordings of an elbow that has another offset in each [N m]."""
-
-    def on_elbow(offset):
-        return lambda motion, tau: np.column_stack([0.0 * motion.t, 0.0 * motion.t + offset])
-
-    return [bench.recordings(on_elbow(x), seed=seed)[k] for k, x in enumerate(offsets)]
+    return [
+        bench.recordings(lambda motion, tau, x=x: on_elbow(x + 0.0 * motion.t), seed=seed)[k]
+        for k, x in enumerate(offsets)
+    ]
 
 
 @pytest.mark.long
@@ -60,13 +56,11 @@ def with_offsets(bench, seed, offsets):
     ids=['one recording from before had it', 'none had it'],
 )
 def test_an_offset_that_differs_from_recording_to_recording(bench, before, named):
-    rng = np.random.default_rng(0)
     old = with_offsets(bench, 1, before)
     arm = bench.arm.with_effect(make_effect('torque_offset', bench.robot))
-    arm = identify(arm, old, rng=rng).arm
     after = 0.45, 0.55, 0.5
     new, unseen = with_offsets(bench, 2, after), with_offsets(bench, 3, after)[:1]
-    found = diagnose(arm, new, validate=unseen, baseline=old, rng=rng)
+    found = changed_since(arm, old, new, unseen)
     assert [one.name for one in found.findings] == ['torque_offset'] * named, found.summary
 
 
@@ -77,7 +71,7 @@ def test_a_joint_that_starts_cold_is_one_cause_of_two_names(bench):
         return extra * [0.0, 1.0]
 
     before, after = bench.recordings(seed=1), bench.recordings(cold, seed=2)
-    found = diagnose(bench.arm, after, baseline=before, rng=np.random.default_rng(0))
+    found = diagnosed(bench.arm, after, baseline=before)
     named = {one.name: one for one in found.findings}
     assert list(named) == ['thermal_friction', 'viscous_friction'], found.summary
     assert all(one.joints == ('elbow',) for one in found.findings)
@@ -87,7 +81,7 @@ def test_a_joint_that_starts_cold_is_one_cause_of_two_names(bench):
     assert named['viscous_friction'].values[0] == pytest.approx(0.8, rel=0.1)
 
 
-def hidden(size):
+def drag_and_spring(size):
     """Return drag of the shoulder, and a spring at the elbow that is so much weaker."""
     return lambda m, tau: np.array([6.0, 0.0]) * m.dq * np.abs(m.dq) + np.array([0.0, size]) * m.q
 
@@ -96,16 +90,14 @@ def test_a_small_cause_is_named_beside_one_that_takes_everything(bench):
     size = 0.05
     settings = DiagnosisSettings(material=0.0)
     misfit = Misfit('held-out', {'shoulder': 0.01, 'elbow': 0.01}, 0.2)
-    found = diagnose(
-        bench.arm,
-        bench.recordings(hidden(size)),
-        misfit=misfit,
-        settings=settings,
-        rng=np.random.default_rng(0),
-    )
-    drag, spring = found.findings
+    hidden = bench.recordings(drag_and_spring(size))
+    found = diagnosed(bench.arm, hidden, misfit=misfit, settings=settings)
+    large, spring = found.findings
     assert found.verdict == 'named'
-    assert (drag.name, drag.joints) == ('quadratic_friction', ('shoulder',)) and drag.share > 0.99
+    assert (large.name, large.joints) == (
+        'quadratic_friction',
+        ('shoulder',),
+    ) and large.share > 0.99
     assert (spring.name, spring.joints) == ('joint_spring', ('elbow',)) and spring.share < 0.01
     assert spring.values[0] == pytest.approx(size, rel=0.2)
 
@@ -119,6 +111,5 @@ def test_a_cause_that_resembles_two_others_is_exchanged_for_them():
         return held(motion, tau) + np.array([0.0, 0.0, 2.0]) * motion.q
 
     before, after = bench.recordings(seed=1)[:2], bench.recordings(both, seed=2)[:2]
-    arm = identify(bench.arm, before, rng=np.random.default_rng(0)).arm
-    found = diagnose(arm, after, baseline=before, rng=np.random.default_rng(0))
+    found = changed_since(bench.arm, before, after)
     assert {one.name for one in found.findings} == {'payload', 'joint_spring'}

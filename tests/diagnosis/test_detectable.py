@@ -2,24 +2,21 @@
 # SPDX-License-Identifier: Apache-2.0
 """What silence is worth: the smallest size of each effect that the data would show."""
 
-from armid_ros.diagnosis import diagnose, diagnosis_document, DiagnosisSettings
+from armid_ros.diagnosis import diagnosis_document, DiagnosisSettings
 from armid_ros.effects import CATALOGUE
 import numpy as np
 import pytest
+
+from tests.diagnosis.conftest import diagnosed, on_elbow
 
 #: Whatever is told from noise matters.
 EVERYTHING = DiagnosisSettings(material=0.0)
 
 
-def asked(bench, recordings):
-    """Diagnose recordings in which all that is told from noise matters."""
-    return diagnose(bench.arm, recordings, settings=EVERYTHING, rng=np.random.default_rng(0))
-
-
 @pytest.fixture(scope='module')
 def sizes(bench):
     """Return the smallest sizes that show in recordings in which nothing is hidden."""
-    found = asked(bench, bench.recordings())
+    found = diagnosed(bench.arm, bench.recordings(), settings=EVERYTHING)
     assert found.verdict == 'consistent'
     rows = diagnosis_document(found)['detectable']
     return {(row['name'], tuple(row['joints'])): row for row in rows}
@@ -28,24 +25,24 @@ def sizes(bench):
 @pytest.fixture(scope='module')
 def rows(bench):
     """Return rows of the document of an arm that is as its model, by the usual settings."""
-    found = diagnose(bench.arm, bench.recordings(), rng=np.random.default_rng(0))
+    found = diagnosed(bench.arm, bench.recordings())
     document = diagnosis_document(found)
     assert 'torque_offset' not in document['not_visible']
     return {(row['name'], *row['joints']): row for row in document['detectable']}
 
 
 def elbow(shape):
-    """Return a torque of the elbow of unit size, from a motion and the torque of the arm."""
-    return lambda size: lambda m, tau: np.outer(size * shape(m, tau[:, 1]), [0.0, 1.0])
+    """Return a torque of the elbow of some size, from a motion."""
+    return lambda size: lambda m, tau: on_elbow(size * shape(m))
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ('name', 'hide'),
     [
-        ('torque_offset', elbow(lambda m, tau: np.ones(len(m)))),
+        ('torque_offset', elbow(lambda m: np.ones(len(m)))),
         pytest.param(
-            'torque_ripple', elbow(lambda m, tau: np.sin(9.0 * m.q[:, 1])), marks=pytest.mark.long
+            'torque_ripple', elbow(lambda m: np.sin(9.0 * m.q[:, 1])), marks=pytest.mark.long
         ),
     ],
 )
@@ -53,7 +50,7 @@ def test_the_size_that_shows_is_right_within_a_factor_of_four(bench, sizes, name
     size = sizes[name, ('elbow',)]['min_detectable']
     for factor, there in ((0.25, False), (4.0, True)):
         hidden = bench.recordings(hide(factor * size), seed=5)
-        found = asked(bench, hidden)
+        found = diagnosed(bench.arm, hidden, settings=EVERYTHING)
         names = {n for f in found.findings for n in (f.name, *f.ambiguous_with)}
         assert (name in names) is there, f'{factor} times {size:.3g}: {found.summary}'
 

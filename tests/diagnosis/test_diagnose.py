@@ -5,36 +5,21 @@
 from dataclasses import replace
 
 from armid_ros.arm import ArmModel
-from armid_ros.diagnosis import diagnose, diagnosis_document
+from armid_ros.diagnosis import diagnosis_document
 from armid_ros.model import inverse_dynamics
 from armid_ros.model.pseudo_inertia import pseudo_inertia
 import numpy as np
 import pytest
 
-from tests.diagnosis.conftest import TORQUE_NOISE
+from tests.diagnosis.conftest import diagnosed, drag, on_elbow, TORQUE_NOISE
 from tests.diagnosis.test_floor import cut
-
-
-def look(bench, recordings, arm=None, **options):
-    return diagnose(arm or bench.arm, recordings, rng=np.random.default_rng(0), **options)
-
-
-def on_elbow(torque):
-    """Return a torque of the elbow alone."""
-    return np.column_stack([np.zeros(len(torque)), torque])
-
-
-def test_nothing_is_named_where_nothing_is_hidden(bench):
-    found = look(bench, bench.recordings(seed=1, noise=2.0))
-    assert found.verdict == 'consistent'
-    assert not found.findings
 
 
 def test_values_that_are_off_are_no_effect(bench):
     robot = bench.robot
     off = robot.rigid_parameters * np.tile([1.06, 1.04] + [0.95] * 8, robot.n_joints)
     arm = bench.arm.with_theta(np.concatenate([off, [0.32, 0.19], [0.47, 0.32]]))
-    found = look(bench, bench.recordings(), arm)
+    found = diagnosed(arm, bench.recordings())
     assert found.verdict == 'consistent'
 
 
@@ -42,8 +27,7 @@ def test_links_of_a_patched_arm_are_bodies(bench):
     robot = bench.robot
     off = robot.rigid_parameters * np.tile([0.9] + [1.1] * 9, robot.n_joints)
     arm = bench.arm.with_theta(np.concatenate([off, [0.32, 0.19], [0.47, 0.32]]))
-    drag = bench.recordings(lambda m, tau: on_elbow(0.08 * m.dq[:, 1] * np.abs(m.dq[:, 1])))
-    found = look(bench, drag, arm)
+    found = diagnosed(arm, bench.recordings(drag(0.08)))
     assert found.refitted
     links = found.arm.robot.rigid_parameters.reshape(-1, 10)
     assert all(np.linalg.eigvalsh(pseudo_inertia(link))[0] > 0.0 for link in links)
@@ -57,7 +41,7 @@ def test_a_link_that_is_too_heavy_is_named_instead_of_all_values(bench):
     heavy[1, [4, 6]] += 0.5 * 0.12**2
     true = robot.with_inertias(heavy.ravel())
     weight = bench.recordings(lambda m, _: inverse_dynamics(true, m) - inverse_dynamics(robot, m))
-    found = look(bench, weight)
+    found = diagnosed(bench.arm, weight)
     names = {n for f in found.findings for n in (f.name, *f.ambiguous_with)}
     assert not found.refitted
     assert names & {'payload', 'link_inertia'}
@@ -71,7 +55,7 @@ def test_a_link_that_is_too_heavy_is_named_instead_of_all_values(bench):
 def test_parameters_of_a_name_are_in_the_order_of_the_joints(bench):
     """The elbow lacks more and is found first."""
     hidden = bench.recordings(lambda m, tau: [0.02, 0.1] * m.dq * np.abs(m.dq))
-    found = look(bench, hidden)
+    found = diagnosed(bench.arm, hidden)
     (finding,) = found.findings
     assert finding.name == 'quadratic_friction'
     assert finding.joints == tuple(p.joint for p in finding.parameters) == ('shoulder', 'elbow')
@@ -83,7 +67,7 @@ def test_parameters_of_a_name_are_in_the_order_of_the_joints(bench):
 def test_all_friction_is_named_of_an_arm_of_which_only_bodies_are_known(bench):
     """Drag that is a thousandth of the gap of all friction brings a joint to its noise, too."""
     hidden = bench.recordings(lambda m, tau: [15.0, 0.0] * np.sign(m.dq))
-    found = look(bench, hidden, ArmModel(bench.robot))
+    found = diagnosed(ArmModel(bench.robot), hidden)
     assert found.verdict in ('named', 'ambiguous')
     values = {
         (p.name, p.joint): v
@@ -104,7 +88,7 @@ def test_a_name_that_does_not_hold_where_the_motion_is_new_is_provisional(bench)
         return lambda m, tau: on_elbow(size * m.dq[:, 1] * np.abs(m.dq[:, 1]))
 
     other = bench.recordings(drag(0.2), seed=5)[-1:]
-    found = look(bench, bench.recordings(drag(0.08)), validate=other)
+    found = diagnosed(bench.arm, bench.recordings(drag(0.08)), validate=other)
     assert found.verdict == 'partial'
     assert 'elbow' in found.summary
 
@@ -115,7 +99,7 @@ def test_what_happens_in_one_period_only_is_not_repeatable(bench):
         slow = np.sin(2 * np.pi * (0.3 + 0.05 * t) * t) * np.exp(-(((t - 3.0) / 1.5) ** 2))
         return on_elbow(1.5 * slow)
 
-    found = look(bench, bench.recordings(bumps))
+    found = diagnosed(bench.arm, bench.recordings(bumps))
     assert found.verdict == 'not_repeatable'
     assert 'elbow' in found.summary
 
@@ -131,7 +115,7 @@ def test_what_happens_in_one_period_only_is_not_repeatable(bench):
 )
 def test_faults_of_the_data_are_named_before_physics(bench, fault, word):
     spoilt = [replace(r, tau=fault(r.tau)) for r in bench.recordings()]
-    found = look(bench, spoilt)
+    found = diagnosed(bench.arm, spoilt)
     assert found.verdict == 'bad_data'
     assert word in found.summary
     assert not found.findings
@@ -144,11 +128,8 @@ def test_friction_that_has_grown_is_named_beside_a_body_that_is_off(upright):
     inertias[1:] *= np.array([1.15, 0.9])[:, np.newaxis]
     described = replace(upright.arm, robot=upright.robot.with_inertias(inertias.ravel()))
     grown = np.array([0.0, 0.0, 0.35])
-    found = diagnose(
-        described,
-        upright.recordings(lambda motion, tau: grown * np.sign(motion.dq)),
-        rng=np.random.default_rng(0),
-    )
+    hidden = upright.recordings(lambda motion, tau: grown * np.sign(motion.dq))
+    found = diagnosed(described, hidden)
     friction = [one for one in found.findings if one.name == 'coulomb_friction']
     assert [one.joints for one in friction] == [('elbow',)], found.summary
     assert friction[0].values[0] == pytest.approx(0.35, abs=4.0 * friction[0].std[0])
@@ -173,7 +154,7 @@ def left(arm, data):
 def test_a_substitute_of_cubic_drag_makes_no_joint_worse(bench, speed):
     recordings = bench.recordings(cubic_drag)
     new = [bench.recordings(cubic_drag, seed=50)[speed]]
-    found = diagnose(bench.arm, recordings, validate=new, rng=np.random.default_rng(0))
+    found = diagnosed(bench.arm, recordings, validate=new)
     assert found.verdict != 'consistent'
     for seen in (recordings, new):
         data = cut(seen)

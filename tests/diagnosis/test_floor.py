@@ -4,29 +4,18 @@
 
 from dataclasses import replace
 
-from armid_ros.diagnosis.data.evidence import _in_informative_rows, noise_floor
+from armid_ros.diagnosis.data.evidence import noise_floor
 from armid_ros.diagnosis.data.trajectory import trajectories
 from armid_ros.diagnosis.settings import Thresholds
 from armid_ros.identification.rows.signals import conditioning, SignalSettings
 import numpy as np
-import pytest
 from scipy.signal import lfilter
-
-from tests.diagnosis.conftest import PERIODS
 
 ONE_PERIOD = Thresholds().one_period
 
 
 def cut(recordings):
     return trajectories(recordings, conditioning(recordings, SignalSettings()))
-
-
-def test_the_period_is_found_in_the_positions(bench):
-    data = cut(bench.recordings())
-    for part, period in zip(data, PERIODS, strict=True):
-        lag, _ = part.period
-        step = float(part.motion.t[1] - part.motion.t[0])
-        assert lag * step == pytest.approx(period, abs=2 * step)
 
 
 def test_noise_of_the_encoders_is_inside(bench):
@@ -44,11 +33,6 @@ def test_what_depends_on_the_motion_alone_cancels(bench):
     plain = [noise_floor(part, bench.arm).sigma for part in cut(bench.recordings())]
     with_effect = [noise_floor(part, bench.arm).sigma for part in cut(hidden)]
     np.testing.assert_allclose(np.array(with_effect), np.array(plain), rtol=0.3)
-
-
-def test_a_floor_without_repetition_is_assumed(bench):
-    recordings = [r.select(slice(0, 700)) for r in bench.recordings()]
-    assert all(noise_floor(part, bench.arm).period is None for part in cut(recordings))
 
 
 def test_the_assumed_floor_is_that_of_the_periods_or_a_little_more(bench):
@@ -116,12 +100,3 @@ def test_coloured_noise_repeats_and_a_machine_nearby_does_not(bench):
     assert min(floor.structure[1] for floor in swept) > 4.0
     assert swept[0].structure[1] >= ONE_PERIOD
     assert all(floor.structure[0] < ONE_PERIOD for floor in swept)
-
-
-def test_a_sample_is_as_informative_as_the_row_nearest_to_it(bench):
-    part = cut(bench.recordings())[1]
-    samples = np.arange(part.rows[0], part.rows[-1])
-    nearest = np.argmin(np.abs(samples[:, np.newaxis] - part.rows), axis=1)
-    found = _in_informative_rows(part, samples, 0)
-    assert not found.all()
-    np.testing.assert_array_equal(found, part.informative[nearest, 0])

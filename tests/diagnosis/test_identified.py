@@ -4,7 +4,7 @@
 
 from dataclasses import replace
 
-from armid_ros.diagnosis import diagnose, known_misfit
+from armid_ros.diagnosis import known_misfit
 from armid_ros.diagnosis.data.baseline import described_precision
 from armid_ros.diagnosis.data.evidence import Evidence
 from armid_ros.diagnosis.data.trajectory import trajectories
@@ -17,6 +17,8 @@ from armid_ros.identification.parameters_file import parameters_of
 from armid_ros.identification.rows.signals import conditioning
 import numpy as np
 import pytest
+
+from tests.diagnosis.conftest import diagnosed
 
 
 @pytest.fixture
@@ -71,7 +73,5 @@ def test_what_a_model_was_identified_wrong_is_no_change(upright):
     short = [known.select(slice(0, len(known.t) // 4))]
     model = identify(upright.arm, short, rng=np.random.default_rng(0))
     misfit = replace(known_misfit(model.arm, short, model.used), information=told_of(model))
-    found = diagnose(
-        model.arm, upright.recordings(seed=5), misfit=misfit, rng=np.random.default_rng(0)
-    )
+    found = diagnosed(model.arm, upright.recordings(seed=5), misfit=misfit)
     assert (found.verdict, found.findings) == ('consistent', ())

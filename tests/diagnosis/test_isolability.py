@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a planned motion shows of the effects of the catalogue."""
 
-from dataclasses import replace
-
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.next_run.isolability import isolability
 from armid_ros.effects import make_effect
@@ -55,15 +53,6 @@ def test_sizes_are_five_deviations_of_a_least_squares_fit(arm, motion, shown):
     found = shown.effects[index(shown, 'joint_spring', ('elbow_pitch',))]
     assert found.parameter.name == 'spring_stiffness'
     assert found.size == pytest.approx(5.0 * std[0])
-
-
-def test_sizes_fall_with_the_root_of_the_samples_and_with_speed(arm, motion, shown):
-    longer = isolability(arm, motion, NOISE, 4.0 * SAMPLES)
-    faster = replace(motion, t=motion.t / 2.0, dq=2.0 * motion.dq, ddq=4.0 * motion.ddq)
-    fast = isolability(arm, faster, NOISE, SAMPLES)
-    k = index(shown, 'rotor_inertia', ('forearm_yaw',))
-    assert longer.effects[k].size == pytest.approx(shown.effects[k].size / 2.0)
-    assert fast.effects[k].size == pytest.approx(shown.effects[k].size / 4.0)
 
 
 def test_effects_of_equal_or_nested_columns_are_not_distinguishable(shown):

@@ -6,7 +6,7 @@ from dataclasses import replace
 from types import SimpleNamespace
 
 from armid_ros.arm import ArmModel
-from armid_ros.diagnosis import diagnose, next_run
+from armid_ros.diagnosis import next_run
 from armid_ros.diagnosis.data.evidence import Evidence, noise_floor
 from armid_ros.diagnosis.next_run.separation import Load, separation
 from armid_ros.diagnosis.search.cause import NamedEffect
@@ -28,7 +28,7 @@ import numpy as np
 import pytest
 
 from tests.clearance import path_clearance
-from tests.diagnosis.conftest import LINK, POSITION_NOISE, TORQUE_NOISE
+from tests.diagnosis.conftest import diagnosed, LINK, POSITION_NOISE, TORQUE_NOISE
 from tests.diagnosis.test_floor import cut
 
 OFFSET = 0.05
@@ -49,7 +49,7 @@ def heavier(robot):
 @pytest.fixture(scope='module')
 def named(bench):
     """Return the diagnosis of an offset of the elbow."""
-    found = diagnose(bench.arm, bench.recordings(offset), rng=np.random.default_rng(0))
+    found = diagnosed(bench.arm, bench.recordings(offset))
     assert [f.name for f in found.findings] == ['torque_offset']
     return found
 
@@ -86,7 +86,7 @@ def test_a_run_that_tells_nothing_is_none(bench):
             inverse_dynamics(heavier(bench.robot), motion) - inverse_dynamics(bench.robot, motion)
         )
     )
-    found = diagnose(bench.arm, hidden, rng=np.random.default_rng(0))
+    found = diagnosed(bench.arm, hidden)
     (one,) = found.findings
     assert {one.name, *one.ambiguous_with} == {'payload', 'link_inertia'}
     with pytest.raises(TrajectoryError, match='planned motions'):

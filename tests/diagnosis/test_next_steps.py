@@ -80,12 +80,6 @@ def test_the_centre_of_a_load_is_said_where_it_is_determined():
     assert 'centred' not in next_steps(found)[0]
 
 
-def test_what_may_stand_in_its_place_is_looked_at_as_well():
-    steps = next_steps(diagnosis('payload', ('wrist',), LINK, 'ambiguous'))
-    assert 'No motion' in steps[0] and 'Weigh' in steps[0]
-    assert 'link inertia' in steps[2] and 'wrist' in steps[2]
-
-
 def test_a_run_that_tells_the_names_is_the_only_recording_that_is_asked_for():
     doubt = diagnosis('payload', ('wrist',), LINK, 'ambiguous')
     told = next_steps(doubt, planned('link_inertia', True))

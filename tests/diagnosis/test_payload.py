@@ -5,17 +5,15 @@
 from types import SimpleNamespace
 
 from armid_ros.arm import ArmModel
-from armid_ros.diagnosis import diagnose
 from armid_ros.diagnosis.search.explanation import Explanation
 from armid_ros.diagnosis.search.ranking import CauseResult
 from armid_ros.diagnosis.verdict.bodies import is_same_body, on_outer_link
 from armid_ros.effects.load import PayloadChange
-from armid_ros.identification import identify
 from armid_ros.model import inverse_dynamics
 import numpy as np
 import pytest
 
-from .conftest import JOINT, LINK, URDF
+from .conftest import changed_since, diagnosed, JOINT, LINK, URDF
 
 MASS, HEIGHT = 0.6, 0.3
 
@@ -38,7 +36,7 @@ def test_a_payload_is_named_with_its_mass(request, arm, friction):
     arm = request.getfixturevalue(arm)
     hidden = arm.recordings(held_by(arm.robot))
     model = arm.arm if friction == 'known' else arm.named_friction()
-    found = diagnose(model, hidden, rng=np.random.default_rng(0))
+    found = diagnosed(model, hidden)
     assert found.verdict in ('named', 'ambiguous'), found.summary
     payload = next(finding for finding in found.findings if finding.name == 'payload')
     assert payload.joints == ('elbow',)
@@ -83,8 +81,7 @@ def test_a_load_on_the_axis_of_a_joint_is_assumed_on_the_outer_link(
 @pytest.mark.slow
 def test_a_payload_that_was_put_down_is_less_than_nothing(bench):
     loaded, now = bench.recordings(held_by(bench.robot)), bench.recordings(seed=7)
-    model = identify(bench.arm, loaded, rng=np.random.default_rng(0)).arm
-    found = diagnose(model, now, baseline=loaded, rng=np.random.default_rng(0))
+    found = changed_since(bench.arm, loaded, now)
     assert found.verdict in ('named', 'ambiguous'), found.summary
     (payload,) = found.findings
     assert (payload.name, payload.joints) == ('payload', ('elbow',))

@@ -2,11 +2,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """Causes that act for a part of the time: what, and in which seconds."""
 
-from armid_ros.diagnosis import diagnose, diagnosis_document
+from armid_ros.diagnosis import diagnosis_document
 from armid_ros.identification import identify
 import numpy as np
 import pytest
 
+from tests.diagnosis.conftest import diagnosed
 from tests.diagnosis.test_payload import held_by, MASS
 
 #: Seconds in which the payload is held, and by how much they may be wrong.
@@ -29,7 +30,7 @@ def two_days(upright):
 @pytest.mark.slow
 def test_a_payload_that_is_picked_up_and_put_down_is_named_with_its_seconds(two_days):
     model, _, after, new = two_days
-    found = diagnose(model, after, validate=new, rng=np.random.default_rng(0))
+    found = diagnosed(model, after, validate=new)
     assert any('held-out' in note for note in found.notes)
     assert [one.name for one in found.findings] == ['payload'], found.summary
     assert found.findings[0].values[0] == pytest.approx(MASS, rel=0.1)
@@ -44,5 +45,5 @@ def test_a_payload_that_is_picked_up_and_put_down_is_named_with_its_seconds(two_
 def test_a_cause_that_acts_throughout_has_no_seconds(two_days, upright):
     model, before, *_ = two_days
     after = upright.recordings(held_by(upright.robot), seed=3)
-    found = diagnose(model, after, baseline=before, rng=np.random.default_rng(0))
+    found = diagnosed(model, after, baseline=before)
     assert found.findings[0].name == 'payload' and not found.spans

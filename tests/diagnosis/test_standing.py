@@ -5,7 +5,6 @@
 from dataclasses import replace
 from types import SimpleNamespace
 
-from armid_ros.diagnosis import diagnose
 from armid_ros.diagnosis.data.evidence import Evidence
 from armid_ros.diagnosis.next_run.steps import next_steps
 from armid_ros.diagnosis.verdict.remaining_misfit import blocking_excess
@@ -14,6 +13,8 @@ from armid_ros.recording import Recording
 from armid_ros.report.diagnosis_report import tone_of
 import numpy as np
 import pytest
+
+from tests.diagnosis.conftest import diagnosed
 
 RATE, MOVING, END = 200.0, 8.0, 12.0
 
@@ -45,12 +46,7 @@ def coming_to_rest(bench, held, seed=0):
 )
 def test_what_friction_holds_is_no_gap(bench, held, baseline):
     before = coming_to_rest(bench, 0.0, seed=1) if baseline else []
-    found = diagnose(
-        bench.arm,
-        coming_to_rest(bench, held),
-        baseline=before,
-        rng=np.random.default_rng(0),
-    )
+    found = diagnosed(bench.arm, coming_to_rest(bench, held), baseline=before)
     assert found.verdict == 'consistent', found.summary
 
 
@@ -67,13 +63,8 @@ def test_more_than_friction_holds_is_said(bench, baseline, part):
     """An arm that leans on a table stands still, and no row of it tells a model anything."""
     before = coming_to_rest(bench, 0.0, seed=1) if baseline else []
     free, held = coming_to_rest(bench, 0.0), coming_to_rest(bench, 9.0, seed=2)
-    found = diagnose(
-        bench.arm,
-        held if part == 'recordings' else free,
-        validate=held if part == 'validate' else [],
-        baseline=before,
-        rng=np.random.default_rng(0),
-    )
+    after, new = (held, []) if part == 'recordings' else (free, held)
+    found = diagnosed(bench.arm, after, validate=new, baseline=before)
     assert found.verdict == 'unknown', found.summary
     assert 'elbow' in found.summary and 'a brake' in found.summary
     assert found.where[0].joint == 'elbow'
@@ -115,7 +106,7 @@ def test_a_joint_that_never_moves_is_said_not_to_be_checked(bench, baseline):
             yield replace(part, q=q, tau=bench.torque(motion) + 0.03 * rng.normal(size=q.shape))
 
     before = coming_to_rest(bench, 0.0, seed=1) if baseline else []
-    found = diagnose(bench.arm, list(without_elbow(0)), baseline=before, rng=rng)
+    found = diagnosed(bench.arm, list(without_elbow(0)), baseline=before)
     assert found.verdict == 'consistent', found.summary
     assert found.not_checked == ('elbow',)
     *_, unchecked = found.summary.split('. ')

@@ -6,13 +6,13 @@ from dataclasses import replace
 import re
 
 from armid_ros.arm import ArmModel
-from armid_ros.diagnosis import diagnose
 from armid_ros.errors import IdentificationError
 from armid_ros.identification import identify
 from armid_ros.identification.rows.temperature import friction_per_kelvin
 import numpy as np
 import pytest
 
+from tests.diagnosis.conftest import changed_since, diagnosed
 from tests.hidden.warm_arm import JOINTS, ROBOT, WarmArm
 
 USUAL = 'viscous_friction,coulomb_friction,torque_offset'
@@ -29,8 +29,7 @@ def model_of(recordings, effects):
 
 def since(baseline, today, effects=USUAL):
     """Return the diagnosis of a day with a model of the baseline."""
-    arm = model_of(baseline, effects).arm
-    return diagnose(arm, today, baseline=baseline, rng=np.random.default_rng(0))
+    return changed_since(ArmModel.of(ROBOT, effects=effects), baseline, today)
 
 
 def names(found):
@@ -81,12 +80,8 @@ def test_a_model_without_the_law_is_not_blamed_for_the_temperature(arm):
     blind = [replace(one, temperature=None) for one in cold]
     found = since(warm, blind)
     assert LAW not in names(found) and 'degC' not in found.summary
-    found = diagnose(
-        model_of(arm.record(rng, RANGE, 'day'), f'{USUAL},{LAW}').arm,
-        blind,
-        baseline=warm,
-        rng=rng,
-    )
+    model = model_of(arm.record(rng, RANGE, 'day'), f'{USUAL},{LAW}').arm
+    found = diagnosed(model, blind, baseline=warm)
     assert 'The temperature was not recorded' in found.summary
 
 

@@ -3,13 +3,13 @@
 """A diagnosis of an arm with another machine names the ties between them."""
 
 from armid_ros.arm import ArmModel
-from armid_ros.diagnosis import diagnose, DiagnosisSettings
+from armid_ros.diagnosis import DiagnosisSettings
 from armid_ros.effects.tied import Partner
 from armid_ros.papers.exo.plant.leg_pair import leg_pair
 from armid_ros.recording import recorded_together, Recording
-import numpy as np
 import pytest
 
+from tests.diagnosis.conftest import diagnosed
 from tests.hidden.leg_pair import Straps, walks
 
 #: Steps that fit twice into a recording [s].
@@ -40,10 +40,6 @@ def together(arm, partner) -> list[Recording]:
 
 
 def test_springs_are_named_where_all_effects_are_asked_for(arm, partner, together) -> None:
-    found = diagnose(
-        arm,
-        together,
-        settings=DiagnosisSettings(everything=True, partner=partner),
-        rng=np.random.default_rng(0),
-    )
+    settings = DiagnosisSettings(everything=True, partner=partner)
+    found = diagnosed(arm, together, settings=settings)
     assert {tie.name for finding in found.findings for tie in finding.ties} == set(TIED)

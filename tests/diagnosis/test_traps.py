@@ -9,7 +9,7 @@ The data and the library are the same for both; what differs is the one step tha
 
 from dataclasses import dataclass, replace
 
-from armid_ros.diagnosis import diagnose, DiagnosisSettings
+from armid_ros.diagnosis import DiagnosisSettings
 from armid_ros.diagnosis.data.evidence import Evidence, noise_floor
 from armid_ros.diagnosis.data.rows import Rows
 from armid_ros.diagnosis.search.candidates import Causes
@@ -22,19 +22,10 @@ import pytest
 from scipy import stats
 
 from benchmarks.bic_selection import bic_selection
-from tests.diagnosis.conftest import TORQUE_NOISE
+from tests.diagnosis.conftest import diagnosed, drag, TORQUE_NOISE
 from tests.diagnosis.test_floor import cut
 
 SETTINGS = DiagnosisSettings()
-
-
-def look(bench, recordings, **options):
-    return diagnose(bench.arm, recordings, rng=np.random.default_rng(0), **options)
-
-
-def on_elbow(torque):
-    """Return a torque of the elbow alone."""
-    return np.column_stack([np.zeros(len(torque)), torque])
 
 
 def shaken(recordings, size, seed):
@@ -90,22 +81,19 @@ def test_noise_of_the_torque_sensor_alone_makes_a_false_stribeck_friction(bench)
 @pytest.mark.slow
 def test_information_criteria_over_pooled_rows_invent_effects(bench):
     invented, named = [], []
-    for seed in range(1, 5):
+    for seed in range(1, 3):
         recordings = shaken(bench.recordings(seed=seed), 2e-4, seed)
         rng = np.random.default_rng(0)
         invented.append(len(bic_selection(bench.arm, recordings, SETTINGS, rng)))
-        named.append(len(look(bench, recordings).findings))
+        named.append(len(diagnosed(bench.arm, recordings).findings))
     assert np.mean(np.array(invented) > 0) >= 0.5
     assert named == [0] * len(invented)
 
 
 def test_what_most_recordings_cannot_show_is_found_in_the_two_that_can(bench):
-    def little(motion, tau):
-        return 0.03 * drag(motion, tau)
-
-    slow = [bench.recordings(little, seed=seed)[0] for seed in range(4)]
-    fast = [bench.recordings(little, seed=seed)[2] for seed in range(2)]
-    found = look(bench, [*slow, *fast], settings=DiagnosisSettings(material=0.0))
+    slow = [bench.recordings(drag(0.003), seed=seed)[0] for seed in range(4)]
+    fast = [bench.recordings(drag(0.003), seed=seed)[2] for seed in range(2)]
+    found = diagnosed(bench.arm, [*slow, *fast], settings=DiagnosisSettings(material=0.0))
     (finding,) = found.findings
     assert (finding.name, finding.joints) == ('quadratic_friction', ('elbow',))
 
@@ -113,20 +101,17 @@ def test_what_most_recordings_cannot_show_is_found_in_the_two_that_can(bench):
 def test_what_is_in_one_recording_only_is_no_offset(bench):
     recordings = bench.recordings()
     recordings[1] = replace(recordings[1], tau=np.add(recordings[1].tau, [0.0, 0.3]))
-    assert 'torque_offset' not in {f.name for f in look(bench, recordings).findings}
-
-
-def drag(motion, tau):
-    """Return a torque of the elbow that grows with the square of its speed."""
-    return on_elbow(0.1 * motion.dq[:, 1] * np.abs(motion.dq[:, 1]))
+    assert 'torque_offset' not in {f.name for f in diagnosed(bench.arm, recordings).findings}
 
 
 @pytest.mark.slow
 def test_a_surrogate_for_a_name_that_is_not_in_the_library_is_provisional(bench):
     library = tuple(name for name in CATALOGUE if name != 'quadratic_friction')
-    found = look(bench, bench.recordings(drag), settings=DiagnosisSettings(library=library))
+    found = diagnosed(
+        bench.arm, bench.recordings(drag(0.1)), settings=DiagnosisSettings(library=library)
+    )
     assert found.verdict in ('unknown', 'partial')
-    whole = look(bench, bench.recordings(drag))
+    whole = diagnosed(bench.arm, bench.recordings(drag(0.1)))
     assert (whole.verdict, whole.findings[0].name) == ('named', 'quadratic_friction')
 
 
@@ -151,7 +136,9 @@ class MeasuredTorque(Effect):
         return Action()
 
 
-@pytest.mark.parametrize('hide', [None, drag])
+@pytest.mark.parametrize('hide', [None, drag(0.1)])
 def test_columns_made_of_the_measured_torque_explain_nothing(bench, hide):
-    found = look(bench, bench.recordings(hide), settings=DiagnosisSettings(own=(MeasuredTorque,)))
+    found = diagnosed(
+        bench.arm, bench.recordings(hide), settings=DiagnosisSettings(own=(MeasuredTorque,))
+    )
     assert 'measured_torque' not in {f.name for f in found.findings}

@@ -10,9 +10,7 @@ from armid_ros.diagnosis.verdict.finding import Finding, Rival
 from armid_ros.diagnosis.verdict.where import Excess
 from armid_ros.diagnosis.verdict.words import (
     decide,
-    percent,
     sentence,
-    share_interval_in_words,
 )
 from armid_ros.effects import CATALOGUE
 from armid_ros.report.sections.diagnosed import named_section
@@ -65,38 +63,6 @@ def test_what_is_not_explained_has_the_cause_that_explains_most_of_it(bench):
     assert all(fact in text for fact in ('elbow', '0.100', '0.020 rad', '5.7 degrees', '30 %'))
 
 
-def test_a_share_has_two_digits_and_its_interval(bench):
-    assert all(fact in share_interval_in_words(finding(bench)) for fact in ('20 %', '40 %'))
-    assert [percent(x) for x in (0.957, 0.004, 0.0, -1e-5)] == ['96 %', '0.4 %', '0 %', '0 %']
-
-
-@pytest.mark.parametrize(
-    ('name', 'values', 'std', 'shown'),
-    [
-        ('encoder_offset', (-1e-6,), (0.0007,), '0.0000 ± 0.0014 rad'),
-        ('base_tilt', (0.03517, 0.0006), (0.00017, 0.00015), '0.034 degrees'),
-    ],
-)
-def test_no_value_is_lost_by_rounding(bench, name, values, std, shown):
-    joints = ('elbow',) if name == 'encoder_offset' else ()
-    found = finding(bench, name=name, values=values, joints=joints)
-    assert shown in sentence(replace(found, std=std))
-
-
-def test_names_that_are_one_cause_have_one_share(bench):
-    tilt, size, delay = (
-        finding(bench, share, name, (0.3,), (), together=together)
-        for name, share, together in (
-            ('base_tilt', 0.9, ('gravity_magnitude',)),
-            ('gravity_magnitude', 0.9, ('base_tilt',)),
-            ('time_delay', 0.001, ()),
-        )
-    )
-    text = verdict(bench, tilt, size, delay).summary
-    assert text.count('90 %') == text.count('0.1 %') == 1
-    assert all(fact in text for fact in ('17.2 degrees', '0.020 m/s^2', '0.020 s', FLOOR))
-
-
 @pytest.mark.parametrize(
     ('rivals', 'stated'),
     [
@@ -133,16 +99,6 @@ def test_the_same_body_on_another_link_is_no_ambiguity(bench):
     assert found.word == 'named' and not load.experiment and not load.ambiguous_with
     assert found.summary.startswith('Payload of 0.700 ± 0.020 kg on elbow')
     assert 'link of shoulder may carry it instead' in found.summary
-
-
-@pytest.mark.parametrize(('ratio', 'word'), [(0.5, 'ambiguous'), (4.0, 'partial')])
-def test_rivals_of_every_name_are_stated_whatever_is_left(bench, ratio, word):
-    first = finding(bench, 0.6, rivals=(Rival('payload', ('shoulder',)),))
-    second = replace(first, name='torque_offset', rivals=(Rival('torque_gain', ('elbow',)),))
-    found = verdict(bench, first, second, left=ratio)
-    assert found.word == word
-    assert 'payload' in found.summary and 'torque gain' in found.summary
-    assert ('2.0 times' in found.summary) == (word == 'partial')
 
 
 def test_what_does_not_repeat_has_to_matter(bench):
