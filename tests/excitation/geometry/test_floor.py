@@ -18,6 +18,7 @@ import numpy as np
 import pytest
 
 from ..conftest import urdf
+from .test_clearance import TETRAHEDRON
 
 Z = np.array([0.0, 0.0, 1.0])
 ABOVE = ('shoulder', 'revolute', 'base', 'upper', '0 0 0.3', '0 1 0', -2.5, 2.5, 60)
@@ -25,6 +26,9 @@ LOW = ('shoulder', 'revolute', 'base', 'upper', '0 0 0.15', '0 1 0', -2.5, 2.5, 
 BELOW = ('shoulder', 'revolute', 'base', 'upper', '0 0 -0.2', '0 1 0', -2.5, 2.5, 60)
 TURRET = ('turn', 'revolute', 'base', 'upper', '0 0 0.0', '0 0 1', -3, 3, 60)
 ON_TURRET = ('lift', 'revolute', 'upper', 'lower', '0 0 0.3', '0 1 0', -2.5, 2.5, 30)
+
+#: Shape of the links of `urdf`.
+CYLINDER = '<cylinder radius="0.04" length="0.3"/>'
 
 
 def bodies(*joints, **options):
@@ -56,11 +60,12 @@ def test_a_mount_below_a_world_is_no_floor(mount):
     assert find_floor(collision, '0').height == 0.0
 
 
-@pytest.mark.parametrize(
-    'shape', ['<cylinder radius="0.04" length="0.3"/>', '<box size="1 1 1"/>']
-)
-def test_an_arm_that_reaches_further_below_its_base_than_above_is_asked_for(shape):
-    text = urdf(BELOW).replace('<cylinder radius="0.04" length="0.3"/>', shape)
+@pytest.mark.parametrize('pedestal', ['', '<box size="0.2 0.2 0.1"/>'])
+def test_an_arm_that_reaches_further_below_its_base_than_above_is_asked_for(pedestal):
+    text = urdf(BELOW)
+    if pedestal:
+        body = f'<link name="base"><collision><geometry>{pedestal}</geometry></collision></link>'
+        text = text.replace('<link name="base"/>', body)
     collision = collision_model(robot_from_urdf(text))
     with pytest.raises(TrajectoryError, match=r'0\.\d+ m.*upper.*--floor.*none'):
         find_floor(collision)
@@ -82,11 +87,22 @@ def test_what_is_given_counts_most_and_an_environment_more_than_a_guess():
         find_floor(collision, 'low')
 
 
-@pytest.mark.parametrize('seed', range(4))
-def test_the_floor_is_where_its_height_and_normal_say(seed):
+@pytest.mark.parametrize('seed', range(2))
+@pytest.mark.parametrize(
+    'shape',
+    [
+        CYLINDER,
+        '<box size="0.1 0.2 0.3"/>',
+        '<sphere radius="0.1"/>',
+        '<mesh filename="{}" scale="0.2 0.2 0.2"/>',
+    ],
+)
+def test_the_floor_is_where_its_height_and_normal_say(seed, shape, tmp_path):
     """The clearance of every link is its height above the floor, whatever way is up."""
+    (tmp_path / 'rock.obj').write_text(TETRAHEDRON)
     rng = np.random.default_rng(seed)
-    collision, up = bodies(ABOVE, ON_TURRET), rng.normal(size=3)
+    text = urdf(ABOVE, ON_TURRET).replace(CYLINDER, shape.format(tmp_path / 'rock.obj'))
+    collision, up = collision_model(robot_from_urdf(text)), rng.normal(size=3)
     up /= np.linalg.norm(up)
     floor = Floor(-3.0, up, 'given')
     model = ClearanceModel.of(
