@@ -185,11 +185,7 @@ def provenance(
 
 
 def origin(
-    robot: str,
-    paths: Iterable[Path],
-    seed: int | None = None,
-    *,
-    source: str = '',
+    robot: str, paths: Iterable[Path], seed: int | None = None, source: str = ''
 ) -> ResultOrigin:
     """Return the origin of a result: --robot, the robot's name for model.yaml, provenance."""
     return ResultOrigin(robot, source, provenance(paths, seed=seed))
