@@ -106,6 +106,10 @@ class SpikeGate:
         # without noise and an arm at rest have less noise. Limits from that noise would reject
         # valid data.
         finest = {'q': 1e-6, 'v': 1e-5, 't': 1e-5}
+        # A position that never changed may have an encoder of 12 bits. Limits from a better one
+        # would reject the first steps of a motion.
+        coarsest = np.tile(np.where(turning, 1.5e-3, 1e-4), len(signals))
+        self._coarsest = np.where(self._continuous, coarsest, 0.0)
         # second derivative of each signal when an arm at rest begins to move, in these units per
         # second squared: 2 rad/s^2, a jerk of 50 rad/s^3, and a torque at its limit at 1 Hz
         onset = {'q': 2.0, 'v': 50.0, 't': 50.0}
@@ -124,7 +128,8 @@ class SpikeGate:
         self._last: FloatArray | None = None  # last good sample, also of an earlier stretch
         count = len(self._turn)
         self.lowest, self.highest = np.full(count, np.inf), np.full(count, -np.inf)
-        self._level = NoiseLevel(self._finest, self._onset, self._false_alarm_time)
+        resolution = self._finest, self._coarsest
+        self._level = NoiseLevel(*resolution, self._onset, self._false_alarm_time)
         self._restart([])
 
     def take(self, t: float, x: FloatArray, floor: FloatArray | float = 0.0) -> list[StreamSample]:

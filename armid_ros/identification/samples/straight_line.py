@@ -219,8 +219,8 @@ class NoiseLevel:
 
     Parameters
     ----------
-    finest : ndarray, shape (m,)
-        Best resolution of the signals.
+    finest, coarsest : ndarray, shape (m,)
+        Best resolution of the signals, and worst resolution of signals that never changed.
     onset : ndarray, shape (m,)
         Assumed second derivative before the first motion, per second squared.
     false_alarm_time : float
@@ -233,8 +233,15 @@ class NoiseLevel:
 
     """
 
-    def __init__(self, finest: FloatArray, onset: FloatArray, false_alarm_time: float) -> None:
-        self._finest, self._onset, self._false_alarm_time = finest, onset, false_alarm_time
+    def __init__(
+        self,
+        finest: FloatArray,
+        coarsest: FloatArray,
+        onset: FloatArray,
+        false_alarm_time: float,
+    ) -> None:
+        self._finest, self._coarsest = finest, coarsest
+        self._onset, self._false_alarm_time = onset, false_alarm_time
         count = len(self._finest)
         self.model = ErrorModel(np.inf, np.zeros(count), np.zeros(count), 0.0)
         # a step that occurs three times is the resolution of a signal
@@ -310,8 +317,10 @@ class NoiseLevel:
     def _least(self, period: float) -> FloatArray:
         """Return each signal's smallest relevant error: resolution, or change as motion begins."""
         # A fast signal has no small steps, but its resolution causes prediction errors.
-        step = np.where(np.isfinite(self._min_steps[-1]), self._min_steps[-1], 0.0)
+        known = np.isfinite(self._min_steps[-1])
+        step = np.where(known, self._min_steps[-1], 0.0)
         least = np.maximum(self._finest, self._onset * period**2)
+        least = np.where(known, least, np.maximum(least, self._coarsest))
         return np.maximum(np.minimum(self._max_error, step), least)
 
 

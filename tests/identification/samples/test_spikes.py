@@ -126,14 +126,16 @@ def test_a_damaged_angle_turns_nothing_after_it(where, angle):
     assert len(good) >= COUNT - 3
 
 
-def test_an_arm_that_rested_may_begin_to_move():
-    """Steps of a coarse encoder that were not seen before cost a tenth of a second at most."""
+@pytest.mark.parametrize('resolution', [1e-4, 1.5e-3])
+def test_an_arm_that_rested_may_begin_to_move(resolution):
+    """The first steps of a coarse encoder are no damage."""
     rng = np.random.default_rng(6)
     t, x = stream(rng)
     x[:DAMAGED] = np.stack([np.zeros(DAMAGED), NOISE * rng.normal(size=DAMAGED)], axis=1)
-    x[DAMAGED:, 0] = np.round(0.5 * (t[DAMAGED:] - t[DAMAGED]) ** 2 / 1e-4) * 1e-4
-    _, _, good = passed(t, x)
-    assert len(good) >= COUNT - 0.1 * RATE
+    x[DAMAGED:, 0] = np.round((t[DAMAGED:] - t[DAMAGED]) ** 2 / resolution) * resolution
+    gate, good, _ = passed(t, x)
+    assert len(good) == COUNT and not gate.rejected
+    assert not any(one.begins for one in good)
 
 
 def test_a_stamp_from_elsewhere_costs_one_sample_and_a_new_clock_none():
