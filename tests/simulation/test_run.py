@@ -20,6 +20,8 @@ from armid_ros.simulation import (
     SimulatedRun,
 )
 from armid_ros.simulation.controller import Controller
+from armid_ros.simulation.elastic import make_simulated_arm, shipped_arm
+from armid_ros.simulation.run import record
 import numpy as np
 import pytest
 
@@ -185,3 +187,17 @@ def test_what_needs_springs_or_has_none_is_told_so():
         SimulatedArm(plant, rng=np.random.default_rng(0)).become(ArmModel(robot))
     with pytest.raises(ModelError, match='ComputedTorque'):
         MotorControl.of(Plant(arm))
+
+
+def test_true_accelerations_of_motors_on_springs_are_those_of_their_samples() -> None:
+    robot = load_robot('two_link_elastic')
+    arm, drives = shipped_arm(robot)
+    t = np.arange(0.0, 1.0, 0.01)
+    q = np.column_stack([0.05 * np.sin(12.0 * t), 0.05 * np.sin(15.0 * t)])
+    rng = np.random.default_rng(0)
+    simulated = make_simulated_arm(arm, rng=rng, warn=print, drives=drives, start=q[0])
+    truth = record(simulated, Reference(robot.joints, t, q)).truth
+    n, central = len(truth.t), (truth.dq[2:] - truth.dq[:-2]) / (truth.t[2] - truth.t[0])
+    # of the sample itself, of the one before and of the one after
+    error = [np.abs(truth.ddq[1 + k : n - 1 + k] - central).mean() for k in (0, -1, 1)]
+    assert np.argmin(error) == 0
