@@ -7,6 +7,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 from functools import partial
 import json
+import math
 from pathlib import Path
 import subprocess
 import sys
@@ -19,6 +20,7 @@ from armid_ros.errors import ArmidError, RecordingError, TrajectoryError
 from armid_ros.files.output import refuse_foreign
 from armid_ros.identification.output import SCHEMA as IDENTIFICATION
 from armid_ros.nodes.base import ArmidNode
+from armid_ros.nodes.listening import ROBOT_PARAMETERS
 from armid_ros.nodes.parameters.table import NodeParameter
 from armid_ros.nodes.running.process import run
 from diagnostic_msgs.msg import DiagnosticArray
@@ -30,6 +32,8 @@ _RESULTS = {
     'identify': ('identification', IDENTIFICATION, ('grade',)),
     'diagnose': ('diagnosis', DIAGNOSIS, ('verdict', 'summary')),
 }
+#: Time without the services of another node after which it has ended [s].
+_GONE = 5.0
 #: An armid command with its arguments.
 Program = tuple[str, ...]
 #: Name of a step, and a function that returns whether the next step may begin.
@@ -55,10 +59,7 @@ class IdentificationRunNode(ArmidNode):
 
     table = (
         NodeParameter('robot', 'humanoid_arm', 'A shipped robot, or the path of a URDF or xacro.'),
-        NodeParameter('gravity', 'earth', 'earth, moon, or x,y,z in the base frame [m/s^2].'),
-        NodeParameter(
-            'joints', [''], 'Driven joints; if empty, all joints except those of grippers.'
-        ),
+        *ROBOT_PARAMETERS[1:],
         NodeParameter(
             'effects', [''], 'Effects added to the rigid body; empty: the default of armid.'
         ),
@@ -107,7 +108,7 @@ class IdentificationRunNode(ArmidNode):
         self._begun: list[str] = []
         self._stops: list[Future] = []
         self._program: Any = None
-        self._done, self._step = False, 'begins'
+        self._done, self._step, self._complete = False, 'begins', math.inf
         self._failure = self._refused = ''
         self._results: list[str] = []
         self._state: dict[str, str] = {}
@@ -137,7 +138,12 @@ class IdentificationRunNode(ArmidNode):
         """Start the next step once the present one is complete."""
         if self._done:
             return
+        now = time.monotonic()
+        if self._program is not None or not self._missing():
+            self._complete = now
         try:
+            if now - self._complete > _GONE:
+                raise ArmidError(f'{self._step}, but {" and ".join(self._missing())} ended')
             while self._wait[1]():
                 self._wait = next(self._script)
                 if self._wait[0] != self._step:

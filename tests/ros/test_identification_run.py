@@ -7,6 +7,7 @@ import json
 from pathlib import Path
 
 from armid_ros.errors import ArmidError
+from armid_ros.nodes import identification_run
 from armid_ros.nodes.identification_run import IdentificationRunNode
 from armid_ros.nodes.recorder import RecorderNode
 from armid_ros.recording import read_recording
@@ -124,6 +125,17 @@ def test_a_run_that_is_stopped_ends_it_with_the_reason(bench, arm, excitation, t
     carry_on(bench, arm, node, run, fault=stick)
     assert '1 of' in run.failure and 'elbow_pitch' in run.failure
     assert not programs.called
+    bench.settle()
+    assert len(read_recording(tmp_path / 'run', joints=ROBOT.joints)) > 10
+
+
+def test_a_publisher_that_is_gone_ends_it_and_the_recording(
+    bench, arm, excitation, tmp_path, monkeypatch
+):
+    monkeypatch.setattr(identification_run, '_GONE', 0.0)
+    node, run = everything(bench, arm, excitation, tmp_path, Programs())
+    carry_on(bench, arm, node, run, fault=lambda: setattr(run, '_missing', lambda: ['/it']))
+    assert 'run 1' in run.failure and '/it' in run.failure
     bench.settle()
     assert len(read_recording(tmp_path / 'run', joints=ROBOT.joints)) > 10
 
