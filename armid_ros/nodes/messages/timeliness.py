@@ -67,7 +67,7 @@ class StampDifference:
         return min(self._recent, key=abs, default=0.0)
 
     def take(self, stamp_ns: int, now_ns: int | None = None) -> None:
-        """Add a message's time stamp and time of reception [ns]; stamp 0 is ignored."""
+        """Add a message's time stamp and time of reception [ns]; stamp 0 counts as no delay."""
         now = self._clock.now().nanoseconds if now_ns is None else now_ns
         self._late = (now - stamp_ns) * 1e-9 if stamp_ns and now else 0.0
         self._recent.append(self._late)
