@@ -309,7 +309,7 @@ def _fit_links(
 
 
 def _walls_reached(parameters: FloatArray, box: Box) -> list[str]:
-    """Return the sides of its box that the mass of a link reaches, as text."""
+    """Return the limits of its box that a link with given inertial parameters reaches."""
     width = box[1] - box[0]
     largest = np.concatenate([width, width, 0.25 * width**2]) * parameters[0]
     near = box_conditions(box) @ parameters < _ACTIVE_SHARE * largest
