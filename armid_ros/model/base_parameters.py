@@ -204,7 +204,7 @@ def _named(
 
 def levelled(robot: Robot) -> Robot:
     """
-    Set gravity components to zero that are only rounding errors of the base orientation.
+    Return the robot with gravity components that are only rounding errors set to zero.
 
     Components of gravity below 0.2 %, across the axes of the first joint, become zero. A hanging
     base with a rounded angle of 3.1416 excites first moments by 7e-6 of their weight, far below
