@@ -265,7 +265,7 @@ class Gap:
 @dataclass(frozen=True)
 class Diagnosis:
     """
-    Result of a diagnosis: verdict, named effects, remaining residual and advice.
+    Result of a diagnosis: verdict, named effects, remaining residual and notes.
 
     Attributes
     ----------

@@ -126,7 +126,7 @@ class RemainingMisfit:
 
     @property
     def _parts(self) -> list[Evidence]:
-        """Return fitted and held-out data, weighted for the comparison with the limit."""
+        """Return fitted and held-out data, weighted by noise if the misfit is only estimated."""
         if self.explanation.floor != ESTIMATED:
             return list(self.data)
         return [replace(part, sigma=part.noise) for part in self.data]
