@@ -175,7 +175,7 @@ def parameter_table(
 
 
 def measured(value: float, reach: float) -> tuple[str, str]:
-    """Return a value and its interval's half-width as texts with equally many digits."""
+    """Return a value and its interval's half-width as texts, rounded to the same decimal."""
     if not (math.isfinite(reach) and reach > 0.0):
         return f'{value:.4g}', '0'
     decimals = max(0, 1 - math.floor(math.log10(reach)))
