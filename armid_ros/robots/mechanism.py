@@ -27,7 +27,7 @@ from scipy.linalg.lapack import dposv
 
 class Configuration(NamedTuple):
     """
-    Positions, velocities and Jacobian of the moving joints, in one or in N states.
+    Positions, Jacobian and drift acceleration of the moving joints, in one or in N states.
 
     Attributes
     ----------
@@ -92,7 +92,7 @@ class Mechanism:
 
     def at(self, u: FloatArray, du: FloatArray | None = None) -> Configuration:
         """
-        Return positions and velocities of the moving joints, given those of the driven joints.
+        Return positions and Jacobian of the moving joints, given the driven joints in one state.
 
         Parameters
         ----------
@@ -112,7 +112,7 @@ class Mechanism:
         return Configuration(solution[0], solution[1], drift)
 
     def states(self, u: FloatArray, du: FloatArray | None = None) -> Configuration:
-        """Return the moving joints' states for N states (N, n) of the driven joints."""
+        """Return positions and Jacobians of the moving joints for N states of driven joints."""
         m, n = self.driven.shape
         if self.constant:
             q = u @ self.driven.T + self.offset

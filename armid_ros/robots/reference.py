@@ -250,7 +250,7 @@ class Reference:
 
 
 def limit_slack(robot: Robot) -> FloatArray:
-    """Return by how much a position may exceed its limit, by rounding, (n,) [rad or m]."""
+    """Return the tolerance by which a position may exceed its limit, shape (n,) [rad or m]."""
     span = robot.upper - robot.lower
     return np.asarray(LIMIT_TOLERANCE * np.where(np.isfinite(span), span, 1.0))
 
