@@ -33,7 +33,7 @@ from scipy.stats import t as student
 @dataclass(frozen=True)
 class DriveGains:
     """
-    Gain of each drive: ratio of measured effort to joint torque.
+    Gain of each drive: ratio of measured effort to the torque of the drive.
 
     Attributes
     ----------
