@@ -290,7 +290,7 @@ class SimulatedArmNode(ArmidNode):
             self._skipped = 0.0
 
     def reset(self) -> str:
-        """Move the arm to its initial position; simulated time goes on."""
+        """Set the arm to its initial position; the simulated time continues."""
         self._arm.reset(self._arm.steps)
         self._pending = None
         return f'{self.hardware} is at its initial position'
