@@ -152,7 +152,7 @@ class _Tree:
 
 
 def _shortened(path: list[FloatArray], free: _Free, rng: np.random.Generator) -> list[FloatArray]:
-    """Shorten a path at random, and skip poses that a free straight line makes needless."""
+    """Shorten a path at random; skip poses that a collision-free straight line replaces."""
     path = _skipped(path, free)
     # attempts to shorten the path
     for _ in range(60 if len(path) > 2 else 0):
