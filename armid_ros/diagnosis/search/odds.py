@@ -48,7 +48,7 @@ class CauseFit:
         Log Bayes factor.
     explained : float
         Half of the squared weighted residual that the values explain, a part of `factor`. The
-        other part is the penalty for the number of values.
+        other parts are `in_bounds` and the penalty for the number of values.
     size : float
         Prior standard deviation of the values, over their unit.
     values, std : ndarray, shape (p,)
@@ -56,6 +56,9 @@ class CauseFit:
     resolution : ndarray, shape (p,)
         One where the data determine a value, zero where only the prior does (Menke, Geophysical
         Data Analysis, 1989).
+    in_bounds : float
+        Log ratio of posterior to prior probability that the values are possible, a part of
+        `factor`.
 
     """
 
@@ -65,6 +68,7 @@ class CauseFit:
     values: FloatArray
     std: FloatArray
     resolution: FloatArray
+    in_bounds: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -275,9 +279,12 @@ def fit_causes(
     numbers = zip(factor.tolist(), explained.tolist(), size.tolist(), strict=True)
     arrays = zip(numbers, values, std, resolution, strict=True)
     fits = [CauseFit(*three, *rest) for three, *rest in arrays]
+    possible = [
+        log_probability_in_bounds(*one, nuisance) for one in zip(causes, fits, strict=True)
+    ]
     return [
-        replace(fit, factor=fit.factor + log_probability_in_bounds(cause, fit, nuisance))
-        for cause, fit in zip(causes, fits, strict=True)
+        replace(fit, factor=fit.factor + own, in_bounds=own)
+        for fit, own in zip(fits, possible, strict=True)
     ]
 
 

@@ -122,8 +122,9 @@ class RankedCause:
 
         As torque laws are inexact, a difference of the explained squares is ignored below the
         share `inexact` of them, or below the share `same_fit` - 1 of the smaller residual. The
-        number of values and the prior odds decide then. Each value has the mean penalty of the
-        values of both causes: inexact laws do not depend on how well data determine a value.
+        prior odds, the bounds of the values and their number decide then. Each value has the mean
+        penalty of the values of both causes: inexact laws do not depend on how well data determine
+        a value.
 
         """
         pair = self, other
@@ -133,10 +134,10 @@ class RankedCause:
             (levels.same_fit - 1.0) * max(min(one.remaining_loss for one in pair), 0.0),
         )
         seen = float(np.sign(lead)) * max(abs(lead) - slack, 0.0)
-        penalty = sum(one.fit.explained - one.log_bayes_factor for one in pair)
+        penalty = sum(one.fit.explained + one.fit.in_bounds - one.log_bayes_factor for one in pair)
         own, theirs = (len(one.fit.values) for one in pair)
-        seen -= penalty * (own - theirs) / (own + theirs)
-        return seen + self.cause.prior - other.cause.prior
+        prior, other_prior = (one.cause.prior + one.fit.in_bounds for one in pair)
+        return seen + prior - other_prior - penalty * (own - theirs) / (own + theirs)
 
 
 @dataclass(frozen=True)
