@@ -53,7 +53,7 @@ class Prepared:
 
     @property
     def allowed(self) -> FloatArray:
-        """Largest allowed share of uncertain velocity signs in a row, (n,); see `Trajectory`."""
+        """Largest share of uncertain velocity signs in a regression row that is used, (n,)."""
         return self.data[0].allowed
 
     @property

@@ -228,7 +228,7 @@ class ActuatorSaturation(TorqueReading):
         return joint_columns(self, motion, asked, -beyond)
 
     def _spread(self, values: FloatArray, motion: Motion) -> tuple[FloatArray, ...]:
-        """Return lost share, clipped share and saturation level of all joints, (n,) each."""
+        """Return lost and clipped torque share, and saturation level, of each joint, (n,) each."""
         spread = np.zeros((3, motion.n_joints))
         spread[2] = np.inf
         columns = self.indices(motion.joints)

@@ -231,9 +231,10 @@ def _refuse_other_results(path: Path, schema: str, robot: str) -> None:
         except OutputError:
             kind, other = f'{name}, which cannot be read', ''
         fits = kind.startswith('armid/model/') if name == _MODEL else kind == schema
-        hint = 'give another folder, or overwrite the results with --force'
+        hint = 'give another folder, or --force to overwrite'
         if not fits:
-            raise OutputError(f'{path}: has {_in_words(kind)}, not {_in_words(schema)}; {hint}')
+            own, new = _in_words(kind), _in_words(schema)
+            raise OutputError(f'{path} contains {own}, not {new}; {hint}')
         # '-' is the description in the bag, which may be any robot
         same = '-' in (robot, other) or Path(robot).absolute() == Path(other).absolute()
         if robot and other and not same:

@@ -214,7 +214,7 @@ class LiveDiagnosisNode(ListeningNode):
         return True
 
     def condition(self) -> tuple[str, Mapping[str, object]]:
-        """Return the present problem, and numbers of samples and diagnoses."""
+        """Return a fault if any, and numbers of samples and diagnoses."""
         live = self.live
         if live is None:
             return self.awaited, {'received': self.received}

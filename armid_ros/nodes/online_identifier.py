@@ -173,7 +173,7 @@ class OnlineIdentifierNode(ListeningNode):
         self._publish(self._estimates, identifier.estimate(), self._last_sample)
 
     def condition(self) -> tuple[str, Mapping[str, object]]:
-        """Return the present problem, and numbers of samples and rejected joint states."""
+        """Return a fault if any, and numbers of samples and rejected joint states."""
         identifier = self.identifier
         if identifier is None:
             return self.awaited, {'received': self.received}

@@ -156,7 +156,7 @@ class Reference:
             if joint not in self.joints:
                 raise TrajectoryError(
                     f"trajectory: joint '{joint}' is missing; {robot.name} needs {listed}; to "
-                    f'keep the others at rest, give --joints {",".join(self.joints)}'
+                    f'keep missing joints at rest, give --joints {",".join(self.joints)}'
                 )
         return self if self.joints == robot.joints else self.of_joints(robot.joints)
 

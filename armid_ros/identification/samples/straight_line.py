@@ -303,7 +303,7 @@ class NoiseLevel:
         self.model = ErrorModel(period, np.maximum(size, self._least(period)), white, allowed)
 
     def _remember(self, size: FloatArray, white: FloatArray) -> None:
-        """Store the typical prediction errors of a window instead of the oldest window's."""
+        """Store the typical prediction errors of a window; overwrite those of the oldest one."""
         place = self._seen % len(self._sizes)
         self._sizes[place], self._shares[place] = size, white
         self._seen += 1
