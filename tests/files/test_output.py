@@ -16,13 +16,6 @@ import pytest
 SCHEMA = 'armid/identification/1'
 
 
-def test_a_file_is_written_and_replaced(tmp_path):
-    write_file(tmp_path / 'a.json', 'old')
-    write_file(tmp_path / 'a.json', 'new \N{GREEK SMALL LETTER TAU}')
-    assert (tmp_path / 'a.json').read_text() == 'new \N{GREEK SMALL LETTER TAU}'
-    assert [path.name for path in tmp_path.iterdir()] == ['a.json']
-
-
 def test_a_link_is_replaced_and_not_followed(tmp_path):
     (tmp_path / 'out').mkdir()
     (tmp_path / 'precious').write_text('kept')
