@@ -64,13 +64,6 @@ def test_alarms_are_the_changes_as_lines_of_json(lived):
     )
 
 
-def test_wear_of_every_joint_has_an_interval(lived):
-    store, found, _ = lived
-    rows = store.read_table('watch/wear.parquet').to_pylist()
-    assert len(rows) == 9 * len(found.arms)
-    assert all(row['lower'] < row['per_month'] < row['upper'] for row in rows)
-
-
 def test_pages_lead_from_the_fleet_to_the_arm_to_the_bag(lived):
     store, found, _ = lived
     write_pages(store, found)
