@@ -5,13 +5,10 @@
 from dataclasses import replace
 import json
 
-from armid_ros.errors import RecordingError, RobotError
-from armid_ros.papers.elastic.command import elastic
 from armid_ros.papers.elastic.identification.files import read_runs
 from armid_ros.recording.elastic import write_runs
 from armid_ros.robots import load_robot
 from armid_ros.simulation.sensors import LinkAccelerometers
-from click.testing import CliRunner
 import numpy as np
 import pytest
 
@@ -19,13 +16,6 @@ from docsite.schemas import faults
 from tests.cli.conftest import armid
 
 pytestmark = pytest.mark.slow
-
-
-def run(*arguments):
-    """Run the command."""
-    result = CliRunner().invoke(elastic, [str(each) for each in arguments], catch_exceptions=False)
-    assert result.exit_code == 0
-    return result.stdout
 
 
 def read(folder):
@@ -40,7 +30,7 @@ def test_experiments_without_steps_leave_out_the_tuning(runs, truth, tmp_path) -
     sensors = LinkAccelerometers(robot, np.outer([0.4, 0.4], [1.0, 0.0, 0.0]))
     runs = [replace(run, felt=sensors.readings(run.link)) for run in runs[:4]]
     write_runs(tmp_path / 'resonances', runs, robot)
-    said = run(tmp_path / 'resonances', '--out', tmp_path / 'out')
+    said = armid('elastic', tmp_path / 'resonances', '--out', tmp_path / 'out').stdout
     assert 'antiresonance' in said
     document, stiffness = read(tmp_path / 'out')
     assert 'tuning' not in document
@@ -48,20 +38,18 @@ def test_experiments_without_steps_leave_out_the_tuning(runs, truth, tmp_path) -
 
 
 @pytest.mark.parametrize(
-    'arguments, error, message',
+    'arguments, message',
     [
-        ([], RecordingError, 'no bag'),
-        (['missing'], RecordingError, 'no bag or file'),
-        (['x', '--robot', 'humanoid_arm'], RecordingError, 'no bag or file'),
-        (['--demo', '--robot', 'humanoid_arm'], RobotError, 'each joint of this arm'),
-        (['x', '--model', 'model.yaml'], RobotError, '--model'),
-        (['x', '--gear', '50'], RobotError, '--gear'),
+        ([], 'no bag'),
+        (['missing'], 'no bag or file'),
+        (['x', '--robot', 'humanoid_arm'], 'no bag or file'),
+        (['--demo', '--robot', 'humanoid_arm'], 'each joint of this arm'),
+        (['x', '--model', 'model.yaml'], '--model'),
+        (['x', '--gear', '50'], '--gear'),
     ],
 )
-def test_bad_input_is_said(arguments, error, message, tmp_path) -> None:
-    result = CliRunner().invoke(elastic, [*arguments, '--out', str(tmp_path / 'out')])
-    assert isinstance(result.exception, error)
-    assert message in str(result.exception)
+def test_bad_input_is_said(arguments, message, tmp_path) -> None:
+    assert message in armid('elastic', *arguments, '--out', tmp_path / 'out', code=2).stderr
 
 
 @pytest.mark.parametrize(('kind', 'experiments'), [('multisine', 1), ('steps', 2)])

@@ -5,15 +5,13 @@
 from dataclasses import replace
 
 from armid_ros.errors import ModelError
-from armid_ros.model import inverse_dynamics, random_motion
-from armid_ros.papers.exo.plant.gait import read_gait
+from armid_ros.model import random_motion
 from armid_ros.papers.exo.plant.leg_pair import (
     exercise,
     EXERCISES,
     leg_pair,
     pair_torques,
     PairMotion,
-    stepping,
     TiedPair,
 )
 import numpy as np
@@ -48,18 +46,6 @@ def test_action_equals_reaction(pair, motions) -> None:
     np.testing.assert_allclose(without.other_tau - both.other_tau, other, atol=1e-9)
 
 
-def test_springs_are_the_gradient_of_their_energy(pair, motions) -> None:
-    step = 1e-6 * np.random.default_rng(1).normal(size=motions.own.q.shape)
-
-    def energy(q: np.ndarray) -> np.ndarray:
-        way = pair.geometry(replace(motions.own, q=q), motions.other).way
-        return np.asarray(np.sum(STIFFNESS * np.sum(way**2, axis=2), axis=1) / 2.0)
-
-    work = energy(motions.own.q + step) - energy(motions.own.q - step)
-    torque = pair_torques(pair, *motions).tau - inverse_dynamics(pair.robot, motions.own)
-    np.testing.assert_allclose(work, 2.0 * np.sum(torque * step, axis=1), rtol=1e-5, atol=1e-9)
-
-
 def test_same_posture_no_interaction(pair, motions) -> None:
     """The exoskeleton fits its wearer: springs are relaxed where all angles agree."""
     same = replace(motions.own, q=motions.other.q)
@@ -71,11 +57,6 @@ def test_a_slack_spring_pulls_where_it_is_drawn_out_further() -> None:
     loose = leg_pair([1e4, 1e4], ('swing_shank', 'swing_thigh')).with_slack(0.005)
     force = loose.forces(way)
     np.testing.assert_allclose(force[0], [[0.0, 0.0, 0.0], [0.0, 0.0, -150.0]], atol=1e-9)
-
-
-def test_stepping_is_periodic(pair) -> None:
-    for motion in stepping(pair, read_gait(), np.array([0.0, 1.8])):
-        np.testing.assert_allclose(motion.q[0], motion.q[1], atol=1e-9)
 
 
 def test_a_segment_that_is_none_is_refused() -> None:

@@ -9,7 +9,6 @@ from armid_ros.nodes.qos import LATCHED
 from armid_ros.papers.exo.nodes.interaction_identifier import InteractionIdentifierNode
 from armid_ros.papers.exo.nodes.simulated_pair import SimulatedPairNode
 import pytest
-from sensor_msgs.msg import JointState
 
 from tests.ros.conftest import busy
 
@@ -19,23 +18,6 @@ START_NS = 1_000 * 10**9
 def pair_node(bench, **parameters):
     options = {'real_time_factor': 0.0, 'rate': 250.0, 'seed': 1, **parameters}
     return bench.add(lambda **kw: SimulatedPairNode(start_ns=START_NS, **kw), **options)
-
-
-def test_both_machines_have_joint_states_with_one_stamp(bench):
-    exo = bench.listen(JointState, 'exo/joint_states')
-    human = bench.listen(JointState, 'human/joint_states')
-    node = pair_node(bench)
-    bench.spin_until(lambda: node._exo.get_subscription_count())
-    bench.spin_until(lambda: node._human.get_subscription_count())
-    for count in range(1, 6):
-        node.step()
-        bench.spin_until(lambda count=count: len(exo) == len(human) == count, 'joint states')
-    assert exo[-1].header.stamp == human[-1].header.stamp
-    assert exo[-1].header.stamp.sec == 1000
-    assert exo[-1].header.stamp.nanosec == 20_000_000
-    assert len(exo[-1].effort) == 6 and not human[-1].effort
-    assert all(name.startswith('exo_') for name in exo[-1].name)
-    assert all(name.startswith('human_') for name in human[-1].name)
 
 
 def test_springs_are_found_from_the_topics(bench):
@@ -70,7 +52,5 @@ def test_a_pair_that_falls_behind_real_time_says_so(bench, monkeypatch):
     before = node.stamp_ns
     busy(node.real_time, monkeypatch)
     node.catch_up()
-    said, values = node.condition()
-    assert re.match(r'\d+\.\d s', said)
-    assert values['skipped_real_time'] > 9.0
+    assert re.match(r'\d+\.\d s', node.condition()[0])
     assert node.stamp_ns - before > 9 * 10**9

@@ -9,7 +9,6 @@ from armid_ros.effects import make_effect, parse_effect
 from armid_ros.errors import IdentificationError
 from armid_ros.identification import Conditioning
 from armid_ros.motion import Motion
-from armid_ros.papers.elastic.command import elastic
 from armid_ros.papers.elastic.identification.files import read_sides
 from armid_ros.papers.elastic.identification.joints import fit_springs, fit_transmission
 from armid_ros.recording.elastic import write_runs
@@ -18,11 +17,11 @@ from armid_ros.robots.two_link import planar_pair
 from armid_ros.simulation import Reference, Sensors
 from armid_ros.simulation.elastic import make_simulated_arm
 from armid_ros.simulation.run import record
-from click.testing import CliRunner
 import numpy as np
 import pytest
 
 from docsite.schemas import faults
+from tests.cli.conftest import armid
 
 ROBOT = load_robot('humanoid_arm')
 STIFFNESS = np.array([2000.0, 3000.0, 1500.0, 1000.0, 500.0, 500.0])
@@ -88,10 +87,8 @@ def test_rotor_and_friction_are_what_the_motor_keeps_for_itself(found):
 
 
 def test_armid_elastic_takes_any_arm(bag, tmp_path):
-    arguments = [str(bag), '--robot', 'humanoid_arm', '--out', str(tmp_path / 'out')]
-    result = CliRunner().invoke(elastic, arguments, catch_exceptions=False)
-    assert result.exit_code == 0
-    assert 'N m/rad' in result.stdout
+    asked = ('elastic', bag, '--robot', 'humanoid_arm', '--out', tmp_path / 'out')
+    assert 'N m/rad' in armid(*asked).stdout
     assert faults('springs', json.loads((tmp_path / 'out' / 'elastic.json').read_text())) == []
     assert (tmp_path / 'out' / 'report.html').is_file()
 
@@ -131,21 +128,6 @@ def stretch(rng, *, play=BACKLASH, weight=0.0, delay=0.0):
 def holds(interval, value, slack=0.0):
     """Return whether an interval, widened by a share of the value, holds it."""
     return interval[1] - slack * value <= value <= interval[2] + slack * value
-
-
-def test_spring_and_free_play_are_found_and_told_apart() -> None:
-    rng = np.random.default_rng(0)
-    fit = fit_transmission([stretch(rng) for _ in range(3)], USED, 0)
-    assert holds(fit.stiffness, SPRING, slack=0.1)
-    assert holds(fit.backlash, BACKLASH, slack=0.15)
-    assert fit.backlash_seen
-
-
-def test_without_free_play_none_is_seen() -> None:
-    rng = np.random.default_rng(1)
-    fit = fit_transmission([stretch(rng, play=0.0) for _ in range(3)], USED, 0)
-    assert holds(fit.stiffness, SPRING, slack=0.05)
-    assert fit.backlash[0] < 0.05 * BACKLASH
 
 
 def test_free_play_under_a_weight_is_an_offset() -> None:

@@ -38,15 +38,14 @@ def two_links(**options):
     return made(arm, drives=drives, **options)
 
 
-def humanoid(*more, **options):
-    """Return the humanoid arm under gravity with a spring in every joint."""
+def humanoid(joints=HUMANOID.joints, **options):
+    """Return the humanoid arm under gravity with springs in some joints."""
     arm = ArmModel(HUMANOID)
     for text in (
         'rotor_inertia:rotor_inertia=0.02',
         'viscous_friction:viscous_coefficient=0.1',
         'coulomb_friction:coulomb_torque=0.2',
-        'joint_elasticity:compliance=0.0005',
-        *more,
+        f'joint_elasticity@{"+".join(joints)}:compliance=0.0005',
     ):
         arm = arm.with_effect(*parse_effect(text, HUMANOID))
     return made(arm, **options)
@@ -68,13 +67,15 @@ def test_torque_of_a_trajectory_comes_on_top_of_the_loop():
     assert sample.dq[0] > 0.1
 
 
-def test_it_holds_its_links_where_they_were_and_its_springs_carry_their_weight():
-    arm = humanoid()
+@pytest.mark.parametrize('joints', [HUMANOID.joints, HUMANOID.joints[1:4:2]])
+def test_it_holds_its_links_where_they_were_and_its_springs_carry_their_weight(joints):
+    arm = humanoid(joints)
     home = arm.state.q.copy()
     for _ in range(500):
         sample = arm.advance()
     np.testing.assert_allclose(sample.link.q, home, atol=1e-9)
-    np.testing.assert_allclose(sample.q - sample.link.q, 0.0005 * sample.tau, atol=1e-9)
+    compliance = 0.0005 * np.isin(HUMANOID.joints, joints)
+    np.testing.assert_allclose(sample.q - sample.link.q, compliance * sample.tau, atol=1e-9)
 
 
 def test_links_of_any_arm_follow_a_trajectory():

@@ -7,7 +7,6 @@ from dataclasses import replace
 from armid_ros.arm import ArmModel
 from armid_ros.effects import make_effect
 from armid_ros.errors import ModelError
-from armid_ros.motion import Motion
 from armid_ros.papers.elastic.experiments import run_experiment, step_of_velocity
 from armid_ros.robots import load_robot
 from armid_ros.robots.two_link import two_link_set
@@ -37,13 +36,6 @@ def lossless():
         spring_damping=zero,
         coulomb=zero,
     )
-
-
-def energy(plant, state):
-    """Return kinetic and spring energy of the two-link arm [J]."""
-    p, d, m, v = SHIPPED.parameters, state.rotors.twist, state.rotors.dq, state.dq
-    mass = p.mass_matrix(state.q[1])
-    return (v @ mass @ v + m @ (p.rotor * m) + d @ (p.stiffness * d)) / 2
 
 
 @pytest.mark.parametrize('pose, wanted', FREE.items())
@@ -80,16 +72,6 @@ def test_vibration_has_the_frequency_of_the_linear_system_at_1_khz() -> None:
     assert np.abs(np.array(twist) - wanted).max() < 0.03 * np.abs(wanted).max()
 
 
-def test_energy_stays_without_friction() -> None:
-    plant = two_link_plant(lossless())
-    state = plant.state([0.0, 0.5], [1.0, -2.0])
-    state.rotors.twist[:] = [1e-3, -5e-4]
-    before = energy(plant, state)
-    for _ in range(2000):
-        state = step(plant, state, np.zeros(2))
-    assert energy(plant, state) == pytest.approx(before, rel=2e-3)
-
-
 @pytest.mark.parametrize('stiffness', [1e6, 1e9])
 def test_no_spring_is_too_stiff_for_1_khz(stiffness) -> None:
     """A spring far beyond what a step resolves makes the arm rigid, not unstable."""
@@ -105,29 +87,6 @@ def test_no_spring_is_too_stiff_for_1_khz(stiffness) -> None:
         soft, hard = step(elastic, soft, torque), step(rigid, hard, torque)
     np.testing.assert_allclose(soft.q, hard.q, atol=1e-3)
     np.testing.assert_allclose(soft.dq, hard.dq, atol=2e-3)
-
-
-def test_any_arm_may_be_elastic_in_some_joints() -> None:
-    """The humanoid arm under gravity hangs its springs by torque over stiffness."""
-    robot = load_robot('humanoid_arm')
-    joints = robot.joints[1], robot.joints[3]
-    names = '+'.join(joints)
-    springs = make_effect(f'joint_elasticity@{names}', robot).with_shape([[2e-3]])
-    stiffness = np.array([2000.0, 500.0])
-    arm = ArmModel(robot).with_effect(springs, 1.0 / stiffness)
-    arm = arm.with_effect(make_effect('rotor_inertia', robot), np.full(6, 0.02))
-    arm = arm.with_effect(make_effect('viscous_friction', robot), np.full(6, 0.3))
-    arm = arm.with_effect(make_effect('coulomb_friction', robot), np.full(6, 50.0))
-    plant = Plant(arm, elasticity=Elasticity())
-    q = np.full(6, 0.3)
-    state = plant.state(q)
-    for _ in range(300):
-        state = step(plant, state, np.zeros(6))
-    motor, speed, _ = plant.motors(state)
-    load = arm.load(Motion.of_states(robot.joints, state.q, 0.0, 0.0))[0]
-    np.testing.assert_array_equal(speed, 0.0)
-    elastic = [robot.index(joint) for joint in joints]
-    np.testing.assert_allclose((motor - state.q)[elastic], load[elastic] / stiffness, atol=1e-7)
 
 
 def test_backlash_lets_the_link_fly_between_its_flanks() -> None:
