@@ -60,38 +60,26 @@ def array(point):
     return np.array([point.x, point.y, point.z])
 
 
-def test_spheres_are_at_the_joints_in_the_frame_of_the_base(drawn):
-    _, markers = drawn([0.0] * 6)
-    data = ROBOT.model.createData()
-    pin.forwardKinematics(ROBOT.model, data, Q)
-    balls = of(markers, 'share')
-    assert len(balls) == ROBOT.n_joints
-    for j, ball in enumerate(balls):
-        np.testing.assert_allclose(
-            array(ball.pose.position), data.oMi[j + 1].translation, atol=1e-9
-        )
+def test_spheres_are_at_the_joints_and_arrows_along_their_axes_as_long_as_the_residual(drawn):
+    node, markers = drawn([2.0, -1.0, 0.5, 0.0, 0.0, 0.0])
     assert {marker.header.frame_id for marker in markers} == {ROBOT.base}
     assert len({(marker.ns, marker.id) for marker in markers}) == len(markers)
-
-
-def test_arrows_lie_along_the_axes_and_are_as_long_as_the_residual(drawn):
-    _, markers = drawn([2.0, -1.0, 0.5, 0.0, 0.0, 0.0])
     data = ROBOT.model.createData()
     jacobian = pin.computeJointJacobians(ROBOT.model, data, Q)
-    lengths = []
-    for j, arrow in enumerate(of(markers, 'residual')):
+    lengths, reds = [], []
+    for j, (ball, arrow) in enumerate(
+        zip(of(markers, 'share'), of(markers, 'residual'), strict=True)
+    ):
+        place = data.oMi[j + 1].translation
+        np.testing.assert_allclose(array(ball.pose.position), place, atol=1e-9)
+        reds.append(ball.color.r)
         assert arrow.type == Marker.ARROW
         begin, end = map(array, arrow.points)
         lengths.append((end - begin) @ jacobian[3:, j])
         np.testing.assert_allclose(np.cross(end - begin, jacobian[3:, j]), 0.0, atol=1e-9)
-    np.testing.assert_allclose(np.array(lengths[:3]) / lengths[0], [1.0, -0.5, 0.25], atol=0.02)
-    np.testing.assert_allclose(lengths[3:], 0.0, atol=1e-9)
-
-
-def test_colour_and_words_say_the_share_of_the_torque(drawn):
-    node, markers = drawn([2.0, 1.0, 0.0, 0.0, 0.0, 0.0])
-    reds = [ball.color.r for ball in of(markers, 'share')]
-    np.testing.assert_allclose(reds[:3], [1.0, 0.5, 0.0], atol=0.02)  # red from 20 % on
+    assert len(lengths) == ROBOT.n_joints
+    np.testing.assert_allclose(np.array(lengths) / lengths[0], [1, -0.5, 0.25, 0, 0, 0], atol=0.02)
+    np.testing.assert_allclose(reds[:4], [1.0, 0.5, 0.25, 0.0], atol=0.02)  # red from 20 % on
     first, *_ = (text.text for text in of(markers, 'joint'))
     assert ROBOT.joints[0] in first and '20 %' in first
     (share,) = (v for k, v in node.condition()[1].items() if k.endswith(ROBOT.joints[1]))

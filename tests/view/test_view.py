@@ -2,7 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A recording in rerun: what the file holds is what was recorded, predicted, and drawn."""
 
-from importlib.metadata import files
 import json
 import os
 from pathlib import Path
@@ -13,14 +12,14 @@ import subprocess
 import sys
 
 import armid_ros as ar
-from armid_ros.cli import main
 from armid_ros.view import rerun_log
 from armid_ros.view.rerun_log import interpolated_poses, log_recording, open_stream
-from click.testing import CliRunner
 import numpy as np
 import pinocchio as pin
 import pytest
 import rerun.chunk
+
+from tests.cli.conftest import armid
 
 TRUE = ('viscous_friction:viscous_coefficient=0.3', 'torque_offset@elbow:torque_offset=1.5')
 
@@ -67,17 +66,20 @@ def scalars(columns):
     return np.ravel([value for value in columns[name] if value is not None])
 
 
-def test_the_file_holds_arm_curves_and_residual(found, recording):
+def test_the_file_holds_poses_curves_and_residual_and_the_marked_joint_in_another_colour(
+    found, model, recording
+):
     for joint in recording.joints:
-        assert f'/arm/{joint}' in found
         for entity in ('torque/{}/measured', 'torque/{}/predicted', 'residual/{}', 'position/{}'):
             assert f'/{entity.format(joint)}' in found
     np.testing.assert_allclose(scalars(found['/position/elbow']), recording.q[:, 2])
     means = [scalars(found[f'/residual/{joint}']).mean() for joint in recording.joints]
     assert means == pytest.approx([0.0, 0.0, 1.5], abs=0.05)
-
-
-def test_the_marked_joint_has_another_colour(found):
+    t, q = interpolated_poses(recording)
+    data, k = model.robot.model.createData(), len(t) // 2
+    pin.forwardKinematics(model.robot.model, data, q[k])
+    places = [v for name, v in found['/arm/elbow'].items() if name.endswith('translation')]
+    np.testing.assert_allclose(np.squeeze(places[0][k]), data.oMi[3].translation, atol=1e-6)
     colours = {
         entity.split('/')[2]: values[0]
         for entity, columns in found.items()
@@ -85,15 +87,6 @@ def test_the_marked_joint_has_another_colour(found):
         if entity.startswith('/arm/') and 'colors' in name
     }
     assert colours['elbow'] != colours['shoulder'] == colours['waist']
-
-
-def test_poses_are_those_of_the_arm(model, recording, found):
-    t, q = interpolated_poses(recording)
-    data = model.robot.model.createData()
-    k = len(t) // 2
-    pin.forwardKinematics(model.robot.model, data, q[k])
-    places = [v for name, v in found['/arm/elbow'].items() if name.endswith('translation')]
-    np.testing.assert_allclose(np.squeeze(places[0][k]), data.oMi[3].translation, atol=1e-6)
 
 
 def test_bodies_have_the_size_of_the_description(recording, tmp_path):
@@ -126,10 +119,9 @@ def test_bodies_have_the_size_of_the_description(recording, tmp_path):
     np.testing.assert_allclose(size(2, 'half_sizes'), 0.3, rtol=1e-6)
 
 
-def test_meshes_are_drawn_and_links_without_any_body_as_bars(tmp_path):
+def test_meshes_are_drawn_and_links_without_any_body_as_bars(example_robot, tmp_path):
     """Meshes of a shipped description, from their files, in the frames of their joints."""
-    paths = [entry for entry in files('example-robot-data') or [] if entry.name == 'panda.urdf']
-    described = ar.load_robot(paths[0].locate())
+    described = ar.load_robot(example_robot('panda.urdf'))
     bare = ar.load_robot(re.sub(r'(?s)<(visual|collision)>.*?</\1>', '', described.urdf))
     for robot, drawn in ((described, 'Asset3D:blob'), (bare, 'LineStrips3D:strips')):
         still = np.zeros((3, robot.n_joints))
@@ -149,9 +141,7 @@ def test_the_command_writes_a_file_and_marks_what_the_diagnosis_named(
     effects = [{'name': 'torque_offset', 'joints': ['elbow']}]
     (result / 'diagnosis.json').write_text(json.dumps({'effects': effects}))
     out = tmp_path / 'run.rrd'
-    arguments = ['view', str(tmp_path / 'run'), '--model', str(result), '--out', str(out)]
-    done = CliRunner().invoke(main, arguments)
-    assert done.exit_code == 0, done.output
+    done = armid('view', tmp_path / 'run', '--model', result, '--out', out)
     assert 'coloured: elbow' in done.output
     np.testing.assert_allclose(
         scalars(held(out)['/residual/elbow']), scalars(found['/residual/elbow'])
@@ -161,8 +151,7 @@ def test_the_command_writes_a_file_and_marks_what_the_diagnosis_named(
 def test_without_rerun_one_line_says_what_to_install(monkeypatch, urdf, recording, tmp_path):
     ar.write_recording(tmp_path / 'run', recording)
     monkeypatch.setitem(sys.modules, 'rerun', None)
-    done = CliRunner().invoke(main, ['view', str(tmp_path / 'run'), '--robot', str(urdf)])
-    assert done.exit_code == 2
+    done = armid('view', tmp_path / 'run', '--robot', urdf, code=2)
     assert 'armid_ros[view]' in done.output
     assert done.output.count('\n') == 1
 
