@@ -18,6 +18,7 @@ import numpy as np
 import pytest
 import yaml
 
+from tests.cli.test_compare import identified
 from tests.fuzz.mutants import (
     edited_text,
     edited_tree,
@@ -34,6 +35,16 @@ EFFECTS = ('viscous_friction', 'coulomb_friction', 'torque_offset', 'stribeck_fr
 TEXT_EDITS = st.lists(TEXT_EDIT, min_size=1, max_size=3)
 TREE_EDITS = st.lists(TREE_EDIT, min_size=1, max_size=3)
 XML_EDITS = st.lists(XML_EDIT, min_size=1, max_size=4)
+#: What the document of an identification has beside parameters and errors.
+MORE = {
+    'gravity': [0.0, 0.0, -9.81],
+    'grouping': [{'viscous_coefficient elbow': 1.0}, {'Izz1': 1.0, 'Iyy2': 1.0}],
+    'condition_number': 3.0,
+    'validation': [
+        {'bag': 'y', 'relative_error_percent': 6.0, 'rms': {'shoulder': 0.1, 'elbow': 0.1}}
+    ],
+    'model': 'model.yaml',
+}
 
 
 @pytest.fixture(scope='module')
@@ -47,32 +58,10 @@ def folder(tmp_path_factory):
         ('a', 'b'), 4.0, np.zeros(2), np.full((2, 3), 0.1), np.full((2, 3), 0.2)
     )
     save_excitation(Excitation(series, 2, 1.0), folder / 'whole' / 'excitation.yaml')
-    (folder / 'whole' / 'identification.json').write_text(json.dumps(identification(), indent=1))
+    identified(folder / 'other', 0.3)
+    document = identified(folder / 'whole', 0.31, **MORE) / 'identification.json'
+    document.write_text(json.dumps(json.loads(document.read_text()), indent=1))
     return folder
-
-
-def identification(more=0.0):
-    """Return an identification.json as a document, with values that are larger by so much."""
-    names = [('Izz1', 'a', 'kg m^2'), ('mx2', 'b', 'kg m')]
-    names += [('viscous_coefficient', joint, 'N m s/rad') for joint in 'ab']
-    values = [1.0, 0.2, 0.3, 0.4]
-    covariance = 1e-4 * (np.eye(4) + 0.3)
-    std = float(np.sqrt(covariance[0, 0]))
-    return {
-        'schema': 'armid/identification/1',
-        'robot': 'r',
-        'gravity': [0.0, 0.0, -9.81],
-        'parameters': [
-            {'name': n, 'joint': j, 'value': v + more, 'std': std, 'unit': u}
-            for (n, j, u), v in zip(names, values, strict=True)
-        ],
-        'covariance': [row[: k + 1].tolist() for k, row in enumerate(covariance)],
-        'grouping': [{name: 1.0} for name, _, _ in names],
-        'condition_number': 3.0,
-        'training': {'bags': ['x'], 'relative_error_percent': 5.0, 'rms': {'a': 0.1, 'b': 0.1}},
-        'validation': [{'bag': 'y', 'relative_error_percent': 6.0, 'rms': {'a': 0.1, 'b': 0.1}}],
-        'model': 'model.yaml',
-    }
 
 
 def finite(*arrays):
@@ -120,10 +109,7 @@ def sound_excitation(run, _):
 
 def compared(path):
     """Compare a mutant with another one that is whole."""
-    whole = path.with_name('whole_identification.json')
-    if not whole.exists():
-        whole.write_text(json.dumps(identification(more=0.01)))
-    return compare(read_parameters(whole), read_parameters(path)).document()
+    return compare(read_parameters(path.with_name('other')), read_parameters(path)).document()
 
 
 def sound_comparison(document, _):

@@ -16,10 +16,8 @@ from copy import deepcopy
 import os
 
 from armid_ros.arm import ArmModel
-from armid_ros.effects import parse_effect
 from armid_ros.identification.online.identifier import OnlineIdentifier, OnlineSettings
 from armid_ros.nodes.messages.joint_states import JointStateReader
-from armid_ros.robots import load_robot
 from builtin_interfaces.msg import Time
 from hypothesis import example, given, HealthCheck, settings, strategies
 import numpy as np
@@ -28,6 +26,7 @@ from rclpy.clock import Clock
 from rclpy.serialization import serialize_message
 from sensor_msgs.msg import JointState
 
+from tests.ros.controller import joint_state
 from tests.ros.test_online_identifier import EFFECT, PENDULUM, two_sines
 
 RATE, SECONDS, NOISE, RESOLUTION = 100.0, 4.0, 0.05, 1e-5
@@ -70,8 +69,7 @@ class Silent:
 
 def measured() -> tuple[np.ndarray, ...]:
     """Return the truth, and what sensors say of a motion: q, dq, tau."""
-    arm = ArmModel(load_robot(PENDULUM))
-    arm = arm.with_effect(*parse_effect(EFFECT, arm.robot))
+    arm = ArmModel.of(PENDULUM, effects=EFFECT)
     motion, rng = two_sines(arm, np.arange(COUNT) / RATE, 2.3), np.random.default_rng(0)
     q = np.round(motion.q / RESOLUTION) * RESOLUTION
     return arm, q, motion.dq, motion.tau + NOISE * rng.normal(size=q.shape)
@@ -90,11 +88,7 @@ TRUTH = FRESH[False].base.values(ARM_MODEL.theta)
 
 
 def message(k: int) -> JointState:
-    nanoseconds = 1000 * 10**9 + round(k * 1e9 / RATE)
-    state = JointState(name=['shoulder', 'elbow'])
-    state.header.stamp = Time(sec=nanoseconds // 10**9, nanosec=nanoseconds % 10**9)
-    state.position, state.velocity, state.effort = Q[k].tolist(), DQ[k].tolist(), TAU[k].tolist()
-    return state
+    return joint_state(1000.0 + k / RATE, ['shoulder', 'elbow'], Q[k], DQ[k], TAU[k])
 
 
 def spoil(state: JointState, kind: str, *how: object) -> list[JointState]:
