@@ -15,9 +15,7 @@ each the identifier has to learn from what comes, and in the end to know the arm
 import os
 
 from armid_ros.arm import ArmModel
-from armid_ros.effects import parse_effect
 from armid_ros.nodes.online_identifier import OnlineIdentifierNode
-from armid_ros.robots import load_robot
 import numpy as np
 import pytest
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
@@ -50,8 +48,7 @@ class World:
         self.bench, self.rng = bench, rng
         (folder / 'arm.urdf').write_text(PENDULUM)
         self.description = str(folder / 'arm.urdf')
-        arm = ArmModel(load_robot(PENDULUM))
-        self.arm = arm.with_effect(*parse_effect(EFFECT, arm.robot))
+        self.arm = ArmModel.of(PENDULUM, effects=EFFECT)
         self.k, self.offset, self.made = 0, 0.0, 0
         self.identifiers, self.publishers = [], []
         self.begin_identifier()

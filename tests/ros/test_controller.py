@@ -60,9 +60,10 @@ def set_parameter(node, name, value):
 
 def test_an_arm_that_follows_gets_to_the_end(bench, arm, excitation):
     node = begun(bench, arm, excitation)
+    assert node.activity == 'running'
     arm.run(100.4 + node.duration)
     assert len(arm.accepted) == 1
-    assert node.elapsed is None
+    assert (node.activity, node.elapsed) == ('complete', None)
     np.testing.assert_allclose(arm.q, excitation.at([excitation.duration]).q[0], atol=1e-3)
     assert not node.condition()[0]
 

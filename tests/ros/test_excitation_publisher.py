@@ -4,7 +4,6 @@
 
 import json
 
-from armid_ros.cli.excite import excite
 from armid_ros.errors import ArmidError, TrajectoryError
 from armid_ros.excitation import Excitation, load_excitation, plan_run, save_excitation
 from armid_ros.excitation.supervision import slowed
@@ -13,12 +12,12 @@ from armid_ros.nodes.excitation_publisher import ExcitationPublisherNode
 from armid_ros.nodes.qos import STREAM
 from armid_ros.recording import read_waypoints
 from armid_ros.recording.trajectory import waypoints_of
-from click.testing import CliRunner
 import numpy as np
 import pytest
 from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectory
 
+from tests.cli.conftest import armid
 from tests.ros.controller import Controller, joint_state, SECOND, seconds_of
 from tests.ros.test_controller import begun, free_planner, HOME, publisher, ROBOT, waiting
 
@@ -32,8 +31,7 @@ def plan(tmp_path_factory):
     """Run armid excite, hurriedly, with drives as good as they may be."""
     out = tmp_path_factory.mktemp('plan')
     options = '--robot humanoid_arm --duration 8 --acceleration 30 --starts 1 --iterations 2'
-    result = CliRunner().invoke(excite, [*options.split(), '--speed', 'slow', '--out', str(out)])
-    assert result.exit_code == 0, result.output
+    armid('excite', *options.split(), '--speed', 'slow', '--out', out)
     return out
 
 
@@ -242,24 +240,6 @@ def test_an_arm_that_follows_as_well_as_is_tolerated_goes_on(bench, arm, excitat
     arm.run(102.0)
     told(bench, (JOINTS, arm.state(102.2).q[0] + 0.3), at=[102.2])
     assert node.elapsed == pytest.approx(2.0) and len(arm.accepted) == 1
-
-
-def test_that_a_run_is_complete_is_logged_once_and_in_the_status(bench, arm, excitation):
-    diagnostics, said = bench.diagnostics(), []
-    node = publisher(bench, arm, excitation)
-    node.get_logger().info = said.append
-    assert bench.diagnose(node, diagnostics).message == 'ready'
-    node.start()
-    bench.spin_until(lambda: arm.accepted, 'the trajectory')
-    length = node.duration
-    arm.run(102.0)
-    assert bench.diagnose(node, diagnostics).message == 'running'
-    arm.run(100.4 + length)
-    for _ in range(3):
-        node.poll()
-    assert bench.diagnose(node, diagnostics).message == 'complete'
-    (words,) = [text for text in said if 'complete' in text]
-    assert f'{length:.1f} s' in words
 
 
 def test_slowing_down_is_the_derivative_of_where_it_is(excitation):

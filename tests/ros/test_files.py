@@ -2,14 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Launch files, parameter files and the reference name what nodes really have."""
 
-from importlib import import_module
-import json
 from pathlib import Path
 import re
-from xml.etree import ElementTree
 
 from armid_ros.nodes.base import COMMON
-from armid_ros.robots import load_robot
 import pytest
 from sensor_msgs.msg import JointState
 import yaml
@@ -27,14 +23,6 @@ TABLES = {
 }
 
 
-@pytest.mark.parametrize('name', NODES)
-def test_a_node_has_a_main_and_a_table_that_explains_itself(name):
-    assert callable(import_module(NODES[name].__module__).main)
-    for parameter in NODES[name].table:
-        assert parameter.description.endswith('.') or '[' in parameter.description
-        assert not parameter.objection(parameter.default)
-
-
 @pytest.mark.parametrize('path', sorted((ROOT / 'config').glob('*.yaml')), ids=lambda p: p.name)
 def test_parameter_files_hold_parameters_of_the_right_type(path):
     for node, content in yaml.safe_load(path.read_text()).items():
@@ -42,28 +30,6 @@ def test_parameter_files_hold_parameters_of_the_right_type(path):
         for name, value in content['ros__parameters'].items():
             assert type(value) is type(table[name].default), name
             assert not table[name].objection(value)
-
-
-def test_layouts_show_joints_of_the_shipped_arm():
-    joints = set(load_robot('humanoid_arm').joints)
-    curves = [
-        curve.get('name')
-        for curve in ElementTree.parse(ROOT / 'config' / 'plotjuggler_layout.xml').iter('curve')
-    ]
-    named = {m[1] for c in curves if (m := re.search(r'/(\w+)/(?:position|velocity|effort)$', c))}
-    assert named == joints
-    layout = json.loads((ROOT / 'config' / 'foxglove_layout.json').read_text())
-
-    def leaves(node):
-        if isinstance(node, str):
-            return [node]
-        return leaves(node['first']) + leaves(node['second'])
-
-    assert sorted(leaves(layout['layout'])) == sorted(layout['configById'])
-
-
-def test_every_node_with_an_executable_is_in_the_reference():
-    assert {path.name for path in (ROOT / 'scripts').iterdir()} == {*NODES, 'armid'}
 
 
 def documented(name, column):

@@ -7,7 +7,6 @@ import re
 from armid_msgs.msg import Diagnosis
 from armid_ros.arm import ArmModel
 from armid_ros.arm.model_file import model_text, read_model
-from armid_ros.effects import parse_effect
 from armid_ros.motion import Motion
 from armid_ros.nodes.live import LiveDiagnosis, LiveSettings
 from armid_ros.nodes.live_diagnosis import LiveDiagnosisNode
@@ -47,13 +46,6 @@ class Silent:
         pass
 
 
-def arm_with(*effects):
-    arm = ArmModel(ROBOT)
-    for text in effects:
-        arm = arm.with_effect(*parse_effect(text, ROBOT))
-    return arm
-
-
 def set_effects(arm, *effects):
     return arm.set_parameters([Parameter('effects', value=list(effects) or [''])])[0]
 
@@ -82,14 +74,13 @@ def run(bench, arm, node, seconds):
 @pytest.fixture
 def idle(bench):
     helper = Silent()
-    return bench.add(
-        LiveDiagnosisNode, LiveDiagnosis(arm_with(*KNOWN), LiveSettings(learning=0.0)), helper
-    ), helper
+    live = LiveDiagnosis(ArmModel.of(ROBOT, effects=KNOWN), LiveSettings(learning=0.0))
+    return bench.add(LiveDiagnosisNode, live, helper), helper
 
 
 def test_friction_that_rises_is_named_and_taken_over(bench):
     arm = simulated(bench, *KNOWN)
-    live = LiveDiagnosis(arm_with(*KNOWN), LiveSettings(learning=8.0))
+    live = LiveDiagnosis(ArmModel.of(ROBOT, effects=KNOWN), LiveSettings(learning=8.0))
     node = bench.add(LiveDiagnosisNode, live, InProcess())
     diagnoses = bench.listen(Diagnosis, 'live_diagnosis/diagnosis', LATCHED)
     models = bench.listen(String, 'live_diagnosis/model', LATCHED)
@@ -113,7 +104,7 @@ def test_friction_that_rises_is_named_and_taken_over(bench):
 
 def test_a_simulated_arm_becomes_what_a_model_describes_and_refuses_the_rest(bench):
     twin = simulated(bench)
-    description = arm_with('torque_offset:torque_offset=0.7')
+    description = ArmModel.of(ROBOT, effects='torque_offset:torque_offset=0.7')
     publisher = bench.matched_publisher(String, 'model', LATCHED)
     states = bench.listen(JointState, 'joint_states')
     twin.step()

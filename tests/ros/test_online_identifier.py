@@ -11,7 +11,6 @@ from armid_ros.identification.online.identifier import OnlineIdentifier
 from armid_ros.motion import Motion
 from armid_ros.nodes.online_identifier import OnlineIdentifierNode
 from armid_ros.nodes.qos import LATCHED
-from armid_ros.robots import load_robot
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticStatus
 import numpy as np
@@ -43,8 +42,7 @@ RATE = 200.0
 
 @pytest.fixture(scope='module')
 def arm():
-    arm = ArmModel(load_robot(PENDULUM))
-    return arm.with_effect(*parse_effect(EFFECT, arm.robot))
+    return ArmModel.of(PENDULUM, effects=EFFECT)
 
 
 def two_sines(arm, t, factor):
