@@ -59,11 +59,6 @@ def test_a_start_of_wrong_length_or_in_degrees_is_an_error(start, answer):
         ar.design_excitation('humanoid_arm', start=start, **QUICK)
 
 
-def test_a_start_is_a_list_of_numbers():
-    plan = ar.design_excitation('humanoid_arm', start=6 * [0.0], **QUICK)
-    np.testing.assert_array_equal(plan.start, 0.0)
-
-
 def test_an_effect_is_given_once():
     effect = 'payload@wrist_pitch:payload_m=0.9'
     with pytest.raises(ModelError, match='twice'):
