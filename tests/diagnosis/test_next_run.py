@@ -147,7 +147,7 @@ def test_the_run_separates_the_names_as_far_as_was_said(bench, doubtful, chosen)
     for pair in chosen.separations:
         measured = np.sqrt(max(squares(pair.rival) - own, 0.0))
         assert measured == pytest.approx(pair.z, rel=0.5)
-    assert chosen.expected_z > 5.0
+    assert chosen.document()['expected_z'] > 5.0
 
 
 def test_only_a_known_payload_tells_a_gain_from_the_mass():

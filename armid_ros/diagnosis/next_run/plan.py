@@ -67,11 +67,6 @@ class NextRun:
     separations: tuple[Separation, ...]
 
     @property
-    def expected_z(self) -> float:
-        """Return the smallest predicted z-score by which two effects are separated."""
-        return min(pair.z for pair in self.separations)
-
-    @property
     def sentence(self) -> str:
         """Return a sentence on the motion and the pairs of effects that it separates."""
         separated = sorted((s for s in self.separations if s.distinct), key=lambda one: one.z)
@@ -102,7 +97,7 @@ class NextRun:
                 {'name': one.name, 'rival': one.rival, 'expected_z': one.z}
                 for one in self.separations
             ],
-            'expected_z': self.expected_z,
+            'expected_z': min(pair.z for pair in self.separations),
         }
 
 
