@@ -11,14 +11,10 @@ from armid_ros.robots import load_robot
 import numpy as np
 import pytest
 
+from tests.serial_arm import serial_arm
+
 INERTIA = 0.3
-TURNTABLE = f"""
-<robot name="turntable"><link name="base"/>
-  <link name="table"><inertial><mass value="1"/>
-    <inertia ixx="0.1" iyy="0.1" izz="{INERTIA}" ixy="0" ixz="0" iyz="0"/></inertial></link>
-  <joint name="turn" type="revolute"><parent link="base"/><child link="table"/>
-    <axis xyz="0 0 1"/><limit lower="-3" upper="3" velocity="100" effort="100"/></joint>
-</robot>"""
+TURNTABLE = serial_arm('turn revolute 0,0,1 0,0,0', moments=(0.1, 0.1, INERTIA))
 
 
 def link_sine(omega, rate=2000.0):

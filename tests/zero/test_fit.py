@@ -9,20 +9,15 @@ from armid_ros.zero.fit import fit_rests
 import numpy as np
 import pytest
 
+from tests.serial_arm import serial_arm
 from tests.zero.machine import rests_of, Secret
 
 #: A vertical slide and two vertical axes.
-SCARA = """<robot name="scara"><link name="base"/>{}</robot>""".format(
-    ''.join(
-        f"""<link name="l{k}"><inertial><mass value="2"/><origin xyz="0.2 0 0"/>
-        <inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial></link>
-        <joint name="j{k}" type="{kind}"><parent link="{parent}"/><child link="l{k}"/>
-        <origin xyz="0.3 0 0"/><axis xyz="0 0 1"/>
-        <limit lower="-2" upper="2" effort="50" velocity="1"/></joint>"""
-        for k, (parent, kind) in enumerate(
-            [('base', 'revolute'), ('l0', 'revolute'), ('l1', 'prismatic')]
-        )
-    )
+SCARA = serial_arm(
+    'j0 revolute 0,0,1 0.3,0,0',
+    'j1 revolute 0,0,1 0.3,0,0',
+    'j2 prismatic 0,0,1 0.3,0,0',
+    centre='0.2 0 0',
 )
 
 

@@ -15,20 +15,14 @@ from armid_ros.simulation.sensors import Sensors
 import numpy as np
 import pytest
 
-from ..conftest import multisine
+from tests.serial_arm import serial_arm
 
-URDF = """
-<robot name="swing"><link name="base"/>
-  <link name="bar"><inertial><origin xyz="0 0 -0.3"/><mass value="2"/>
-    <inertia ixx="0.1" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0"/></inertial></link>
-  <joint name="swing" type="revolute"><parent link="base"/><child link="bar"/>
-    <axis xyz="0 1 0"/><limit lower="-3" upper="3" velocity="100" effort="100"/></joint>
-</robot>"""
+from ..conftest import multisine
 
 
 @pytest.fixture(scope='module')
 def swing():
-    return load_robot(URDF)
+    return load_robot(serial_arm('swing revolute 0,1,0 0,0,0'))
 
 
 @pytest.fixture(scope='module')
@@ -77,7 +71,7 @@ def test_the_rigid_body_needs_no_more_samples_than_it_has_content(arm):
 @pytest.mark.parametrize(('kind', 'inertia'), [('prismatic', 2.0), ('revolute', 0.1)])
 def test_a_joint_that_stops_as_it_reverses_loses_no_inertia(kind, inertia):
     """Friction is between its limits while a joint stands, which is not its sign times a level."""
-    robot = load_robot(URDF.replace('revolute', kind).replace('0 1 0', '0 0 1'))
+    robot = load_robot(serial_arm(f'swing {kind} 0,0,1 0,0,0'))
     structure, arm = ArmModel(robot), ArmModel(robot)
     for name, value in {'viscous_friction': 2.0, 'coulomb_friction': 2.5}.items():
         structure = structure.with_effect(make_effect(name, robot), [0.0])
