@@ -20,11 +20,6 @@ import pytest
 from ..conftest import multisine, recorded
 
 
-def sine(rate=1000.0, duration=10.0, hz=1.0):
-    t = np.arange(round(rate * duration)) / rate
-    return t, np.sin(2 * np.pi * hz * t)[:, None]
-
-
 @pytest.mark.parametrize(
     ('rate', 'jitter', 'decimation'), [(1000.0, 0.0, 10), (500.0, 0.3, 5), (200.0, 0.0, 10)]
 )
@@ -46,11 +41,11 @@ def test_derivatives_of_a_sine_have_no_phase(rate, jitter, decimation):
 
 def test_decimation_passes_the_band_and_stops_what_would_alias():
     used = Conditioning(1000.0, 50.0, 20)
-    t, slow = sine(hz=2.0)
+    t = np.arange(10_000) / 1000.0
+    slow, fast = (np.sin(2.0 * np.pi * hz * t)[:, None] for hz in (2.0, 47.0))
     kept = np.array(decimated_samples(len(t), used))
     np.testing.assert_allclose(decimate(slow, used), slow[kept], atol=3e-3)
-    _, fast = sine(hz=47.0)  # would alias to 3 Hz
-    assert np.abs(decimate(fast, used)).max() < 5e-3
+    assert np.abs(decimate(fast, used)).max() < 5e-3  # would alias to 3 Hz
 
 
 def test_decimation_in_chunks_is_seamless():
@@ -65,20 +60,13 @@ def test_decimation_in_chunks_is_seamless():
         np.testing.assert_allclose(whole[row], np.tensordot(taps, window, axes=1), atol=1e-12)
 
 
-def test_a_gap_splits_a_recording(arm):
-    t, q = sine()
-    keep = (t < 4.0) | (t > 4.5)
-    recording = Recording(joints=('a',), t=t[keep], q=q[keep], tau=q[keep], source='bag')
-    parts = list(segments(recording, Conditioning(1000.0, 50.0, 10)))
-    assert len(parts) == 2
-    assert parts[0].t[-1] < 4.0 < 4.5 < parts[1].t[0]
-
-
 def test_what_is_across_a_gap_is_no_motion(arm):
     motion = multisine(arm.robot.joints, 40.0, 1000.0, seed=2)
     whole = recorded(arm, motion, position_noise=1e-6)
     cut = whole.select((whole.t < 20.0) | (whole.t > 22.0))
     used = conditioning([whole], SignalSettings())
+    before, after = segments(cut, used)
+    assert before.t[-1] < 20.0 < 22.0 < after.t[0]
     assert conditioning([cut], SignalSettings()).decimation > 0.5 * used.decimation
     assert np.all(velocity_error(cut, used) < 2.0 * velocity_error(whole, used))
 
@@ -123,23 +111,18 @@ def test_velocities_lack_what_positions_show_beyond_the_cutoff():
     assert above < 0.01 * lacking
 
 
-def test_a_cutoff_beyond_the_rate_is_refused(arm):
-    t, q = sine(rate=100.0)
-    recording = Recording(joints=('a',), t=t, q=q, tau=q, source='bag')
-    with pytest.raises(IdentificationError, match='160 samples/s'):
-        conditioning([recording], SignalSettings(cutoff_hz=80.0))
-
-
-@pytest.mark.parametrize(('factor', 'unit'), [(1e3, 'milliseconds'), (1e6, 'microseconds')])
-def test_stamps_that_are_no_seconds_are_named(factor, unit):
-    t, q = sine()
-    recording = Recording(joints=('a',), t=t, q=q, tau=q, source='bag')
-    with pytest.raises(IdentificationError, match=f'bag: .*{unit}'):
-        conditioning([replace(recording, t=factor * t)], SignalSettings())
-
-
-def test_a_cutoff_that_was_asked_for_is_too_low(arm, structure):
-    run = recorded(arm, multisine(arm.robot.joints, 2.0, 500.0, seed=1), torque_noise=0.01)
-    settings = IdentificationSettings(signals=SignalSettings(cutoff_hz=0.001))
-    with pytest.raises(IdentificationError, match=r'bag: --cutoff'):
-        identify(structure, [run], settings, rng=np.random.default_rng(0))
+@pytest.mark.parametrize(
+    ('time', 'cutoff_hz', 'fact'),
+    [
+        (1.0, 300.0, '600 samples/s'),
+        (1e3, None, 'run: .*milliseconds'),
+        (1e6, None, 'run: .*microseconds'),
+        (1.0, 0.001, 'run: --cutoff'),
+    ],
+)
+def test_a_cutoff_or_stamps_that_cannot_be_are_refused(arm, structure, time, cutoff_hz, fact):
+    motion = multisine(arm.robot.joints, 2.0, 500.0, seed=1)
+    run = recorded(arm, motion, torque_noise=0.01, source='run')
+    settings = IdentificationSettings(signals=SignalSettings(cutoff_hz=cutoff_hz))
+    with pytest.raises(IdentificationError, match=fact):
+        identify(structure, [replace(run, t=time * run.t)], settings, rng=np.random.default_rng(0))

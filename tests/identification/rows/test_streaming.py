@@ -34,23 +34,23 @@ def bag(folder, arm, gaps=()):
     return path
 
 
-def rows_of(path, arm, samples):
-    """Return the rows of a bag by pieces, and how many pieces there were."""
+def pieces_of(path, arm, samples):
+    """Return the pieces of a bag with their rows, and the base columns."""
     columns = arm.base_parameters(np.random.default_rng(0)).independent
-    pieces = list(
-        streamed(path, arm, columns, lambda piece: USED, samples, settings=ReadSettings())
-    )
-    return [rows for _, parts in pieces for rows in parts], len(pieces), columns
+    pieces = streamed(path, arm, columns, lambda piece: USED, samples, settings=ReadSettings())
+    return list(pieces), columns
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(('gaps', 'samples'), [((), 4000), (((21.3, 22.0), (40.0, 40.5)), 1700)])
 def test_rows_of_pieces_are_those_of_the_whole(tmp_path, smooth, gaps, samples):
     path = bag(tmp_path, smooth, gaps)
-    parts, count, columns = rows_of(path, smooth, samples)
+    pieces, columns = pieces_of(path, smooth, samples)
+    parts = [rows for _, some in pieces for rows in some]
     recording = read_recording(path, joints=smooth.robot.joints)
     whole = regressions(smooth, columns, [recording], USED)
-    assert count >= 12_000 // samples
+    assert len(pieces) >= 12_000 // samples
+    assert max(len(piece) for piece, _ in pieces) < samples + 700
     assert sum(len(part.motion) for part in parts) == sum(len(part.motion) for part in whole)
     stacked, expected = (np.concatenate([p.columns for p in some]) for some in (parts, whole))
     np.testing.assert_allclose(stacked, expected, rtol=1e-9, atol=1e-9)
@@ -58,13 +58,6 @@ def test_rows_of_pieces_are_those_of_the_whole(tmp_path, smooth, gaps, samples):
     np.testing.assert_allclose(one.values, other.values, rtol=1e-9, atol=1e-11)
 
 
-def test_pieces_are_no_longer_than_they_may_be(tmp_path, smooth):
-    path = bag(tmp_path, smooth)
-    columns = smooth.base_parameters(np.random.default_rng(0)).independent
-    pieces = streamed(path, smooth, columns, lambda piece: USED, 2000, settings=ReadSettings())
-    assert max(len(piece) for piece, _ in pieces) < 2000 + 700
-
-
-def test_pieces_of_a_shorter_reach_than_the_filters_still_ends(tmp_path, smooth):
-    parts, _, _ = rows_of(bag(tmp_path, smooth), smooth, 150)
-    assert sum(len(part.motion) for part in parts) > 1400
+def test_pieces_of_a_shorter_reach_than_the_filters_still_end(tmp_path, smooth):
+    pieces, _ = pieces_of(bag(tmp_path, smooth), smooth, 150)
+    assert sum(len(part.motion) for _, some in pieces for part in some) > 1400
