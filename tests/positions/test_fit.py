@@ -27,20 +27,6 @@ def run(robot, secret):
     return measured, CommandedMotion.of(commanded, measured)
 
 
-@pytest.fixture(scope='module')
-def unaided(robot, run):
-    """Return a fit without known gains."""
-    return fit_positions(LoopModel(robot), [run])
-
-
-@pytest.fixture(scope='module')
-def silent(robot, secret):
-    """Return positions and commands without velocities."""
-    quiet = replace(secret, velocities=False)
-    measured, commanded = play(robot, quiet, np.random.default_rng(6), duration=SECONDS)
-    return measured, CommandedMotion.of(commanded, measured)
-
-
 def true_values(model, secret):
     truth = secret.truth(model.robot)
     return np.array([truth[one.name, one.joint] for one in model.parameters])
@@ -64,35 +50,20 @@ def test_the_loop_moves_as_in_an_independent_engine(robot, secret):
         np.testing.assert_allclose(q, window.q, atol=1e-4)
 
 
-def test_positions_determine_delay_gains_friction_and_tool(robot, secret, unaided):
-    truth, n = true_values(LoopModel(robot), secret), robot.n_joints
+def test_positions_determine_delay_gains_friction_and_tool(robot, secret, run):
+    """Without known gains; most intervals hold the truth, and the residual is the noise."""
+    model, (measured, commands) = LoopModel(robot), run
+    late = replace(commands, t=commands.t + 100.0)
+    with pytest.raises(IdentificationError, match='positions and commands'):
+        fit_positions(model, [(measured, late)])
+    unaided = fit_positions(model, [run])
+    truth, n = true_values(model, secret), robot.n_joints
     friction = slice(3 * n + 1, 5 * n + 1)
     np.testing.assert_allclose(unaided.values[friction], truth[friction], rtol=0.05)
     np.testing.assert_allclose(unaided.values[1 : n + 1], truth[1 : n + 1], rtol=0.05)
     assert unaided.of('command_delay')[0] == pytest.approx(secret.delay, abs=5e-4)
     assert unaided.of('payload_m', robot.joints[-1])[0] == pytest.approx(secret.mass, rel=0.05)
-
-
-def test_most_intervals_hold_the_truth_and_the_residual_is_the_noise(robot, secret, unaided):
-    truth = true_values(LoopModel(robot), secret)
-    held = np.abs(unaided.values - truth) <= 1.96 * unaided.std
-    assert held.mean() >= 0.85
+    assert np.mean(np.abs(unaided.values - truth) <= 1.96 * unaided.std) >= 0.85
     noise = np.hypot(secret.noise, secret.resolution / np.sqrt(12.0))
     np.testing.assert_allclose(unaided.residual, noise, rtol=0.1)
     assert np.all(unaided.tracking > 20.0 * unaided.residual)
-
-
-@pytest.mark.long
-def test_viscous_friction_and_velocity_gain_are_one_without_commanded_velocities(robot, silent):
-    found = fit_positions(LoopModel(robot), [silent])
-    for joint in robot.joints:
-        assert np.isinf(found.of('viscous_coefficient', joint)[1])
-        assert np.isfinite(found.of('coulomb_torque', joint)[1])
-    assert any('give --gains' in reason for reason in found.reasons)
-
-
-def test_a_recording_without_its_commands_is_refused(robot, run):
-    measured, commands = run
-    late = replace(commands, t=commands.t + 100.0)
-    with pytest.raises(IdentificationError, match='positions and commands'):
-        fit_positions(LoopModel(robot), [(measured, late)])
