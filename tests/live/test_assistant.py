@@ -48,11 +48,6 @@ def test_a_process_of_its_own_answers_as_this_one_does(asked, answered, tmp_path
         assert document['verdict'] == answer.verdict
 
 
-def test_nothing_can_be_written_or_planned_before_a_diagnosis(tmp_path):
-    for task in (('save', tmp_path), ('plan', 0)):
-        assert isinstance(Worker().run(*task), IdentificationError)
-
-
 def test_the_process_survives_a_job_that_fails_is_replaced_and_ends_with_its_owner(tmp_path):
     with working() as assistant:
         assistant.ask('diagnose', DiagnosisRequest(None, None))
@@ -67,6 +62,11 @@ def test_the_process_survives_a_job_that_fails_is_replaced_and_ends_with_its_own
         assert isinstance(wait(assistant), IdentificationError)  # there is no diagnosis so far
         assistant._pipe.close()
         assert assistant._process.wait(timeout=PATIENCE) == 0
+
+
+def test_nothing_can_be_written_or_planned_before_a_diagnosis(tmp_path):
+    for task in (('save', tmp_path), ('plan', 0)):
+        assert isinstance(Worker().run(*task), IdentificationError)
 
 
 def test_a_plan_is_a_motion_that_can_be_read(answered):

@@ -99,11 +99,10 @@ def test_a_name_counts_the_second_time_until_it_is_gone_or_accepted(live, known_
     assert live.accepted is live.request().arm is patched
 
 
-def stream(live, duration, moving=True, begin=0.0):
+def stream(live, duration, begin=0.0):
     asked = []
     for t in np.arange(begin, begin + duration, 0.005):
-        q = np.full(6, np.sin(t) if moving else 0.0)
-        live.add(t, q, np.zeros(6), np.zeros(6))
+        live.add(t, np.full(6, np.sin(t)), np.zeros(6), np.zeros(6))
         if live.due:
             asked.append(round(t, 1))
             live.request()
@@ -148,15 +147,6 @@ def test_another_change_is_looked_for_once_the_model_is_right(live, known_arm, p
     assert live.request().of_one_arm
     live.take(said(patched, 'consistent'))
     assert not live.request().of_one_arm
-
-
-def test_an_arm_at_rest_is_not_asked_about(live):
-    assert stream(live, 60.0, moving=False) == []
-
-
-def test_after_a_gap_the_motion_counts_anew(live):
-    stream(live, 7.0)
-    assert stream(live, 7.0, begin=20.0) == []
 
 
 def test_the_misfit_is_learned_first_of_the_arm_as_it_was_then(known_arm, patched):
