@@ -32,23 +32,6 @@ def with_coulomb(robot, values) -> ArmModel:
     return ArmModel(robot).with_effect(make_effect('coulomb_friction', robot), values)
 
 
-@pytest.mark.parametrize('push', [10.001, -14.0])
-def test_a_block_pushed_more_slides_the_way_it_is_pushed(slider, push: float) -> None:
-    plant = Plant(with_coulomb(slider(), [10.0]))
-    final = run(plant, plant.state([0.0]), 1.0, [push])[-1]
-    acceleration = (push - 10.0 * np.sign(push)) / 2.0
-    assert final.q[0] == pytest.approx(acceleration / 2, rel=1e-2)
-    assert final.dq[0] == pytest.approx(acceleration, rel=1e-9)
-
-
-def test_a_block_stops_after_its_braking_distance_and_stays(slider) -> None:
-    plant = Plant(with_coulomb(slider(), [10.0]))
-    slide = run(plant, plant.state([0.0], [2.0]), 1.0, [0.0])
-    assert slide[-1].q[0] == pytest.approx(2.0 * 2.0**2 / (2 * 10.0), abs=2.0 * plant.dt)
-    assert all(state.dq[0] == 0.0 for state in slide[401:])
-    assert min(state.dq[0] for state in slide) == 0.0
-
-
 def test_asymmetric_levels_hold_between_both(slider) -> None:
     robot = slider()
     arm = with_coulomb(robot, [10.0]).with_effect(

@@ -26,15 +26,6 @@ def energy(plant: Plant, state: State) -> float:
     return pin.computeMechanicalEnergy(model, model.createData(), state.q, state.dq)
 
 
-@pytest.mark.parametrize('gravity', [9.81, 1.62])
-def test_free_fall_is_a_parabola(slider, gravity: float) -> None:
-    plant = Plant(ArmModel(slider(axis='0 0 1').with_gravity([0.0, 0.0, -gravity])))
-    fall = states(plant, plant.state([1.0], [0.5], [-gravity]), 2000)
-    t = np.array([s.t for s in fall])
-    q = np.array([s.q[0] for s in fall])
-    np.testing.assert_allclose(q, 1.0 + 0.5 * t - gravity * t**2 / 2, atol=1e-10)
-
-
 @pytest.mark.parametrize('amplitude', [0.01, 2.5])
 def test_a_pendulum_swings_with_its_period(pendulum, amplitude: float) -> None:
     plant = Plant(ArmModel(pendulum()))
@@ -76,19 +67,11 @@ def test_viscous_friction_decays_exponentially_however_stiff(slider, damping: fl
     assert np.all(dq >= 0.0)
 
 
-def test_friction_dissipates_what_it_does_in_work(pendulum) -> None:
-    robot = pendulum(links=2)
-    arm = ArmModel(robot)
-    arm = arm.with_effect(make_effect('viscous_friction', robot), [0.1, 0.05])
-    arm = arm.with_effect(make_effect('coulomb_friction', robot), [0.3, 0.1])
+def test_asymmetric_friction_alone_is_an_offset_and_never_holds(slider) -> None:
+    robot = slider()
+    arm = ArmModel(robot).with_effect(make_effect('asymmetric_friction', robot), [4.0, 0.0])
     plant = Plant(arm)
-    swing = states(plant, plant.state([1.5, 0.0]), 4000)
-    dq = np.array([s.dq for s in swing])
-    middle = (dq[1:] + dq[:-1]) / 2
-    work = np.sum(np.array([0.1, 0.05]) * middle**2 + np.array([0.3, 0.1]) * np.abs(middle))
-    lost = energy(plant, swing[0]) - energy(plant, swing[-1])
-    assert lost > 3.0
-    assert work * plant.dt == pytest.approx(lost, rel=1e-3)
+    assert states(plant, plant.state([0.0]), 1000)[-1].dq[0] == pytest.approx(-2.0, rel=1e-12)
 
 
 def test_a_joint_stops_at_its_limit_and_stays_until_it_is_pushed_off(pendulum) -> None:

@@ -118,20 +118,6 @@ def test_what_does_not_fit_is_refused(arm) -> None:
         simulate(arm, far, rng=rng)
 
 
-ONE_JOINT = """
-<robot name="one"><link name="base"/>
-  <link name="arm"><inertial><origin xyz="0.2 0 0"/><mass value="{mass}"/>
-    <inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial></link>
-  <joint name="hinge" type="{kind}"><parent link="base"/><child link="arm"/><axis xyz="0 1 0"/>
-    <limit lower="-2" upper="2" velocity="3" effort="20"/></joint>
-</robot>
-"""
-
-
-def one_joint(kind='revolute', mass=1.0):
-    return robot_from_urdf(ONE_JOINT.format(kind=kind, mass=mass), source='one.urdf')
-
-
 def sine(joints):
     t = np.arange(300) / 100.0
     angle = 2.0 * t[:, np.newaxis] + np.arange(len(joints))
@@ -139,17 +125,25 @@ def sine(joints):
 
 
 @pytest.mark.parametrize('kind', ['revolute', 'continuous'])
-def test_an_arm_of_one_joint_follows(kind):
+def test_an_arm_of_one_joint_follows(pendulum, kind):
     """Without a range there is no middle of it, and no warning either."""
-    robot = one_joint(kind)
+    robot = robot_from_urdf(pendulum().urdf.replace('revolute', kind))
     run = simulate(ArmModel(robot), sine(robot.joints), rng=np.random.default_rng(0))
     assert np.abs(run.truth.q - run.reference.q).max() < 1e-3
 
 
-def test_a_joint_that_moves_nothing_cannot_be_simulated():
-    text = ONE_JOINT.format(kind='revolute', mass=1)
-    text = re.sub('<inertial>.*</inertial>', '', text, flags=re.DOTALL)
-    with pytest.raises(ModelError, match=r"hinge'.* 'arm'"):
+def test_a_link_of_negative_mass_is_named():
+    robot = load_robot('humanoid_arm')
+    bodies = robot.rigid_parameters.reshape(-1, 10).copy()
+    bodies[2] *= -1.0
+    arm = ArmModel(robot.with_inertias(bodies.ravel()))
+    with pytest.raises(ModelError, match=f"'{robot.links[2]}'.*-"):
+        simulate(arm, sine(robot.joints), rng=np.random.default_rng(0))
+
+
+def test_a_joint_that_moves_nothing_cannot_be_simulated(pendulum):
+    text = re.sub('<inertial>.*</inertial>', '', pendulum().urdf)
+    with pytest.raises(ModelError, match=r"joint1'.* 'link1'"):
         Plant(ArmModel(robot_from_urdf(text)))
 
 
@@ -161,18 +155,12 @@ class Pushing(Controller):
         return 1e3 * dq + 1.0
 
 
-def test_an_arm_that_flies_away_does_not_follow_and_warns_of_nothing():
-    robot = robot_from_urdf(
-        ONE_JOINT.format(kind='continuous', mass=1.0).replace('effort="20"', 'effort="1e300"'),
-        source='one.urdf',
-    )
-    with pytest.raises(ModelError, match='hinge'):
-        simulate(
-            ArmModel(robot),
-            sine(robot.joints),
-            rng=np.random.default_rng(0),
-            controller=Pushing(),
-        )
+def test_an_arm_that_flies_away_does_not_follow_and_warns_of_nothing(pendulum):
+    text = pendulum().urdf.replace('revolute', 'continuous').replace('"100"', '"1e300"')
+    robot = robot_from_urdf(text)
+    way, rng = sine(robot.joints), np.random.default_rng(0)
+    with pytest.raises(ModelError, match='joint1'):
+        simulate(ArmModel(robot), way, rng=rng, controller=Pushing())
 
 
 def test_what_needs_springs_or_has_none_is_told_so():
