@@ -4,10 +4,8 @@
 
 from armid_ros.arm import ArmModel
 from armid_ros.cli import main
-from armid_ros.effects import make_effect
 from armid_ros.motion import Motion
 from armid_ros.recording import write_recording
-from armid_ros.robots import load_robot
 from click.testing import CliRunner
 import numpy as np
 import pytest
@@ -48,6 +46,5 @@ def bag_of(path, arm, seed, moving=slice(None)):
 def bags(tmp_path_factory):
     """Return two recordings of the shipped arm with viscous friction."""
     folder = tmp_path_factory.mktemp('bags')
-    arm = ArmModel(load_robot(ROBOT))
-    arm = arm.with_effect(make_effect('viscous_friction', arm.robot), np.full(6, 0.1))
+    arm = ArmModel.of(ROBOT, effects='viscous_friction:viscous_coefficient=0.1')
     return [bag_of(folder / name, arm, seed) for seed, name in enumerate(('train', 'held_out'))]

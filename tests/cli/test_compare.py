@@ -4,13 +4,6 @@
 
 import json
 
-from armid_ros.arm import ArmModel, load_model, save_model
-from armid_ros.effects import make_effect
-from armid_ros.estimate import Estimate
-from armid_ros.identification.parameters_file import read_parameters
-from armid_ros.model.base_parameters import symbol
-from armid_ros.robots import load_robot
-import numpy as np
 import pytest
 
 from .conftest import armid
@@ -101,62 +94,3 @@ def test_a_model_that_describes_no_arm_ends_a_strict_run(tmp_path, compared):
     third = identified(tmp_path / 'c', 0.081)
     for pair, code in (((first, second), 3), ((second, first), 3), ((first, third), 0)):
         compared(*pair, '--strict', code=code)
-
-
-def test_what_a_model_leaves_is_a_change_where_no_parameter_is(tmp_path, compared):
-    text, page, document = compared(
-        identified(tmp_path / 'a', 0.08, errors=(4.0, 1.0)),
-        identified(tmp_path / 'b', 0.081, errors=(4.1, 30.0)),
-    )
-    for fact in ('elbow: ', '30 times', 'armid diagnose'):
-        assert fact in text
-    assert '>changed<' in page
-    assert {one['joint']: one['changed'] for one in document['residuals']} == {
-        'shoulder': False,
-        'elbow': True,
-    }
-
-
-def modelled(folder, mass):
-    """Write a model, and the identification beside it that tells sums of its parameters alone."""
-    robot = load_robot('humanoid_arm')
-    pi = robot.rigid_parameters.copy()
-    pi[-10] += mass
-    friction = make_effect('viscous_friction', robot)
-    arm = ArmModel(robot).with_theta(pi).with_effect(friction, np.full(6, 0.1 + 1e-4 * mass))
-    folder.mkdir()
-    own = friction.parameters(robot)
-    estimate = Estimate(own, arm.values[0], np.diag(np.full(6, 1e-6)))
-    save_model(folder / 'model.yaml', arm, robot.name, estimate)
-    values = {symbol(n): float(v) for n, v in zip(arm.parameters, arm.theta, strict=True)}
-    terms = [{symbol(name): 1.0} for name in own] + [{'m6': 1.0, 'm5': 0.5}]
-    heads = [(name.name, name.joint, name.unit) for name in own] + [('m6 + 0.5 m5', 'wrist', 'kg')]
-    sums = [sum(f * values[key] for key, f in row.items()) for row in terms]
-    return write(
-        folder,
-        robot=robot.name,
-        gravity=[float(g) for g in robot.gravity],
-        parameters=rows_of({head: (one, 1e-3) for head, one in zip(heads, sums, strict=True)}),
-        grouping=terms,
-        training={'relative_error_percent': 1.0},
-    )
-
-
-def test_a_model_is_compared_by_the_identification_beside_it(tmp_path, compared):
-    folders = modelled(tmp_path / 'a', 0.0), modelled(tmp_path / 'b', 0.4)
-    files = [folder / 'model.yaml' for folder in folders]
-    assert 'of 7' in compared(*files)[0]
-    assert read_parameters(files[0]).source == str(folders[0] / 'identification.json')
-    for folder in folders:
-        (folder / 'identification.json').unlink()
-    text = armid('compare', *files, '--out', tmp_path / 'none', code=2).output
-    assert 'no covariance' in text
-
-
-def test_an_identification_of_another_model_is_left_alone(tmp_path):
-    file = modelled(tmp_path / 'a', 0.0) / 'model.yaml'
-    arm = load_model(file)
-    theta = arm.theta.copy()
-    theta[-1] += 0.1
-    save_model(file, arm.with_theta(theta), 'humanoid_arm')
-    assert read_parameters(file).source == str(file)

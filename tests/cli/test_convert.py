@@ -27,9 +27,6 @@ def csv(recording, tmp_path):
     return path
 
 
-SAID = ('--degrees', '--current-gain', 0.05)
-
-
 def test_a_dry_run_shows_and_writes_nothing(csv, tmp_path):
     text = armid('convert', csv, '--robot', ROBOT, '--dry-run', '--out', tmp_path / 'bag').stdout
     words = ' '.join(text.split())

@@ -5,19 +5,15 @@
 from __future__ import annotations
 
 import json
-from pathlib import Path
 import re
 import shutil
-from typing import Any
 
 from armid_ros.arm import load_model, save_model
-from armid_ros.cli import main
 from armid_ros.cli.diagnose import share_of_percent
 from armid_ros.diagnosis import Diagnosis
 from armid_ros.model import inverse_dynamics
 from armid_ros.recording import write_recording
 import click
-from click.testing import CliRunner
 import pytest
 
 from tests.diagnosis.conftest import Bench, URDF
@@ -166,25 +162,18 @@ def test_a_description_without_masses_is_no_model_to_compare_with(files, tmp_pat
 SECONDS, PERIODS = 4.5, (1.6, 1.3, 1.1)
 
 
-def diagnosed(folder: Path, straps: Straps, seed: int, wrong_masses: float = 0.0) -> Any:
-    """Record what is hidden at three speeds, and let the command line look for it."""
-    bags = []
-    recorded = walks(straps, seed, seconds=SECONDS, periods=PERIODS, wrong_masses=wrong_masses)
-    for number, walk in enumerate(recorded):
-        bags.append(str(folder / f'run_{number}'))
-        write_walk(Path(bags[-1]), walk)
-    robot, partner = (str(description(name)) for name in ('exoskeleton_legs', 'human_legs'))
-    out = str(folder / 'found')
-    asked = ['diagnose', *bags, '--robot', robot, '--partner', partner, '--out', out, '--json']
-    done = CliRunner().invoke(main, asked)
-    assert done.exit_code == 0, done.output
-    return json.loads(done.stdout)
-
-
 @pytest.mark.long
 def test_springs_on_one_leg_are_named_there(tmp_path) -> None:
+    """Recorded at three speeds, beside masses that are wrong."""
     straps = Straps(('swing_shank', 'swing_thigh'), 1e4)
-    document = diagnosed(tmp_path, straps, 0, wrong_masses=0.1)
+    recorded = walks(straps, 0, seconds=SECONDS, periods=PERIODS, wrong_masses=0.1)
+    bags = [tmp_path / f'run_{number}' for number in range(len(PERIODS))]
+    for path, walk in zip(bags, recorded, strict=True):
+        write_walk(path, walk)
+    robot, partner = (description(name) for name in ('exoskeleton_legs', 'human_legs'))
+    out = tmp_path / 'found'
+    asked = ('--robot', robot, '--partner', partner, '--out', out, '--json')
+    document = json.loads(armid('diagnose', *bags, *asked).stdout)
     assert document['verdict'] == 'named'
     (effect,) = document['effects']
     assert (effect['name'], effect['ambiguous_with']) == ('human_interaction', [])
@@ -193,23 +182,12 @@ def test_springs_on_one_leg_are_named_there(tmp_path) -> None:
         assert tie['stiffness'] == pytest.approx(1e4, rel=0.005)
         assert tie['interval'][0] < 1e4 < tie['interval'][1]
         assert tie['partner_joint'] == tie['joint'].replace('exo', 'human')
-    page = (tmp_path / 'found' / 'report.html').read_text(encoding='utf-8')
+    page = (out / 'report.html').read_text(encoding='utf-8')
     assert 'swing_thigh' in page
-    arm = load_model(tmp_path / 'found' / document['model'])
+    arm = load_model(out / document['model'])
     assert sorted(tie.name for one in arm.effects for tie in one.ties) == sorted(straps.segments)
 
 
-@pytest.mark.long
-def test_a_pair_that_is_not_tied_gets_no_name(tmp_path) -> None:
-    document = diagnosed(tmp_path, Straps(), 1)
-    assert document['verdict'] == 'consistent'
-    assert document['effects'] == []
-
-
 def test_ties_without_a_partner_are_refused(tmp_path) -> None:
-    done = CliRunner().invoke(
-        main,
-        ['diagnose', 'bag', '--robot', 'exoskeleton_legs', '--out', str(tmp_path), '--tie', 'a=b'],
-    )
-    assert done.exit_code == 2
-    assert 'also needs --partner' in done.output
+    asked = ('diagnose', 'bag', '--robot', 'exoskeleton_legs', '--out', tmp_path, '--tie', 'a=b')
+    assert 'also needs --partner' in armid(*asked, code=2).output

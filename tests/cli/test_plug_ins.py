@@ -55,7 +55,9 @@ def run(*arguments):
 def test_a_command_is_listed_and_run_and_refuses_what_is_not_finite(installed):
     assert 'greet' in run('--help')[1] and 'Say hello.' in run('--help')[1]
     assert run('greet', '--times', '2') == (0, 'hello 2\n')
-    assert run('greet', '--times', 'nan')[0] == 2
+    for number in ('nan', 'inf', '-inf'):
+        code, said = run('greet', '--times', number)
+        assert code == 2 and "'--times'" in said and number in said
 
 
 def test_a_command_that_fails_names_its_package_and_breaks_no_other(installed):

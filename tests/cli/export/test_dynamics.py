@@ -12,6 +12,8 @@ from armid_ros.effects.traits import Traits
 import numpy as np
 import pytest
 
+from tests.simulation.test_compiled import TREE
+
 STATES = 100
 EFFECTS = (
     'viscous_friction:viscous_coefficient=0.3',
@@ -21,21 +23,6 @@ EFFECTS = (
     'payload:payload_m=0.4,payload_mx=0.02,payload_mz=0.06,payload_Ixx=0.03,payload_Ixz=0.002',
     'base_tilt:tilt_x=0.2,tilt_y=-0.1',
 )
-LINK = """<link name="{}"><inertial><origin xyz="0.1 0.02 0.03"/><mass value="2"/>
-  <inertia ixx="0.03" ixy="0.002" ixz="0.001" iyy="0.04" iyz="0.003" izz="0.05"/></inertial></link>
-"""
-JOINT = """<joint name="{}" type="{}"><parent link="{}"/><child link="{}"/>
-  <origin xyz="0.1 0.2 0.3" rpy="0.3 0.2 0.1"/><axis xyz="0.6 0 0.8"/>
-  <limit lower="-1" upper="1" velocity="1" effort="9"/></joint>
-"""
-#: Two branches on a link that slides, one of which slides again; the name is no identifier.
-TREE = [
-    *('<robot name="2 arms"><link name="base"/>', *map(LINK.format, ('a', 'b', 'c', 'd'))),
-    JOINT.format('rail', 'prismatic', 'base', 'a'),
-    JOINT.format('left', 'revolute', 'a', 'b'),
-    JOINT.format('lift', 'prismatic', 'b', 'c'),
-    *(JOINT.format('right', 'revolute', 'a', 'd'), '</robot>'),
-]
 #: Reads states and prints torques.
 MAIN = """#include <cstdio>
 #include "torque.hpp"
@@ -53,8 +40,9 @@ int main() {
 
 @pytest.fixture(scope='module')
 def arm():
-    """Return an arm with all effects that the code has."""
-    return ar.ArmModel.of(ar.load_robot(''.join(TREE)), effects=EFFECTS)
+    """Return an arm of two branches with all effects that the code has, and no identifier."""
+    tree = TREE.replace('name="tree"', 'name="2 arms"')
+    return ar.ArmModel.of(ar.load_robot(tree), effects=EFFECTS)
 
 
 @pytest.fixture(scope='module')
