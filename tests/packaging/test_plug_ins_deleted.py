@@ -57,7 +57,6 @@ OF_TABLES = (
     'api/test_front_door.py::test_a_recording_is_read_by_robot_or_by_names_from_bags_and_tables',
     'api/test_front_door.py::test_columns_without_names_are_read_by_number_from_zero',
     'cli/test_inspect.py::test_a_table_is_inspected_as_a_bag_is',
-    'recording/test_temperature.py::test_a_table_has_columns_of_temperatures',
 )
 
 
