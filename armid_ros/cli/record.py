@@ -135,20 +135,17 @@ def _parse_effect(text: str, robot: Robot) -> tuple[Effect, FloatArray]:
 
     effect, values = parse_effect(text, robot)
     if not any(values):
-        sizes = ', '.join(f'{q.name} [{q.unit or "1"}]' for q in effect.quantities)
-        shapes = ', '.join(f'{s.name} [{s.unit or "1"}]' for s in effect.shapes)
-        first = effect.quantities[0].name
         raise ModelError(
-            f"--effect '{text}' has zero size and would change nothing: it takes {sizes}"
-            + (f', and the shape {shapes}' if shapes else '')
-            + f'; write {text.partition(":")[0]}:{first}=0.1'
+            f"--effect '{text}' has zero size and would change nothing; write "
+            f'{text.partition(":")[0]}:{effect.quantities[0].name}=0.1. '
+            f"'armid effects {effect.name}' lists its values"
         )
     if effect.traits.weighs and not possible_loads(robot, values):
         least = 'payload_m times distance squared'
         if values[0] > 0.0:
             point = pin.Inertia(values[0], values[1:4] / values[0], np.zeros((3, 3)))
-            inertia = zip(LINK_PARAMETERS, point.toDynamicParameters(), strict=True)
-            parts = [f'payload_{name}={size:.6g}' for name, size in list(inertia)[4:] if size]
+            inertia = zip(LINK_PARAMETERS[4:], point.toDynamicParameters()[4:], strict=True)
+            parts = [f'payload_{name}={size:.6g}' for name, size in inertia if size]
             least = f'at least those of a point mass: {",".join(parts) or 0}'
         say(
             f"warning: --effect '{text}': no body within reach of the arm has these values. "
