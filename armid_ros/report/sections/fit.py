@@ -181,9 +181,9 @@ def forward_section(
     names = labels if any(not pair.same for pair in pairs) else ('the model',)
     blocks: list[Templated] = [
         Paragraph(
-            f'Root mean square position error of {" and ".join(names)}, the worst joint first. '
-            'The recorded torques drive the simulated arm. An 8 Hz feedback keeps it at the '
-            'recorded motion, because commanded positions are not recorded.'
+            'Root mean square position error of each joint, the worst joint first. The recorded '
+            'torques drive the simulated arm. An 8 Hz feedback keeps it at the recorded motion, '
+            'because commanded positions are not recorded.'
         )
     ]
     for number, pair in enumerate(pairs):
