@@ -4,7 +4,7 @@
 
 from dataclasses import replace
 
-from armid_ros.diagnosis.data.evidence import noise_floor
+from armid_ros.diagnosis.data.evidence import _in_informative_rows, noise_floor
 from armid_ros.diagnosis.data.trajectory import trajectories
 from armid_ros.diagnosis.settings import Thresholds
 from armid_ros.identification.rows.signals import conditioning, SignalSettings
@@ -100,3 +100,12 @@ def test_coloured_noise_repeats_and_a_machine_nearby_does_not(bench):
     assert min(floor.structure[1] for floor in swept) > 4.0
     assert swept[0].structure[1] >= ONE_PERIOD
     assert all(floor.structure[0] < ONE_PERIOD for floor in swept)
+
+
+def test_a_sample_is_as_informative_as_the_row_nearest_to_it(bench):
+    part = cut(bench.recordings())[1]
+    samples = np.arange(part.rows[0], part.rows[-1])
+    nearest = np.argmin(np.abs(samples[:, np.newaxis] - part.rows), axis=1)
+    found = _in_informative_rows(part, samples, 0)
+    assert not found.all()
+    np.testing.assert_array_equal(found, part.informative[nearest, 0])
