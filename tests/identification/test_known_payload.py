@@ -4,8 +4,6 @@
 
 from dataclasses import replace
 
-from armid_ros.arm import ArmModel
-from armid_ros.effects import make_effect
 from armid_ros.errors import IdentificationError
 from armid_ros.identification import identify, SignalSettings
 from armid_ros.identification.known_payload import (
@@ -14,7 +12,6 @@ from armid_ros.identification.known_payload import (
     payloads_of,
     with_payload,
 )
-from armid_ros.robots import load_robot
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -24,13 +21,6 @@ from .conftest import multisine, recorded
 GAINS = np.array([1.05, 1.08, 1.1, 1.06, 1.09, 1.07])
 SIGNALS = SignalSettings()
 BAGS = ['a.mcap', 'b.mcap', 'c.mcap']
-
-
-@pytest.fixture(scope='module')
-def arm():
-    robot = load_robot('humanoid_arm')
-    effect = make_effect('viscous_friction', robot)
-    return ArmModel(robot).with_effect(effect, np.full(robot.n_joints, 0.3))
 
 
 @pytest.fixture(scope='module')
@@ -51,24 +41,20 @@ def ladder(arm):
     return recordings
 
 
-def payloads(arm, recordings, masses=(1.0, 2.6)):
+def payloads(arm, recordings):
     link = arm.robot.links[-1]
-    texts = [f'{bag}={mass}@{link}:0,0,-0.05' for bag, mass in zip('bc', masses, strict=True)]
+    texts = [f'b=1.0@{link}:0,0,-0.05', f'c=2.6@{link}:0,0,-0.05']
     return payloads_of(texts, recordings, arm.robot)
 
 
-def test_gains_come_out_with_their_intervals(arm, ladder):
-    gains = drive_gains(arm, ladder, payloads(arm, ladder), SIGNALS, np.random.default_rng(0))
+def test_gains_come_out_with_their_intervals_and_the_arm_as_it_is(arm, ladder):
+    rng = np.random.default_rng(0)
+    loaded = payloads(arm, ladder)
+    gains = drive_gains(arm, ladder, loaded, SIGNALS, rng)
     sure = np.isfinite(gains.std)
     assert sure.sum() >= 5
     assert np.all(np.abs(gains.values - GAINS)[sure] < 1.5 * gains.half_width[sure])
     assert np.all(gains.std[sure] < 0.02)
-
-
-def test_the_arm_is_identified_as_it_is(arm, ladder):
-    rng = np.random.default_rng(0)
-    loaded = payloads(arm, ladder)
-    gains = drive_gains(arm, ladder, loaded, SIGNALS, rng)
     result = identify(arm, corrected(arm, ladder, loaded, gains, SIGNALS), rng=rng)
     motion = multisine(arm.robot.joints, 10.0, 100.0, 9, amplitude=0.7)
     wanted = arm.torque(motion)
