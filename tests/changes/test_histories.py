@@ -73,18 +73,10 @@ def test_wear_is_a_trend_with_its_slope():
     assert abs(change.size - 0.02 * MONTH) < 3 * change.std
 
 
-def test_the_interval_of_wear_holds_the_truth_as_often_as_it_says():
-    series = fleet(np.random.default_rng(3), 250, beyond=1.0)
-    spread = spreads(series)
-    slopes = np.array([wear(one, spread[one.parameter]) for one in series])
-    inside = np.mean(np.abs(slopes[:, 0]) < 1.96 * slopes[:, 1])
-    assert inside == pytest.approx(0.95, abs=0.02)
-
-
 def test_of_the_arms_named_few_are_healthy():
     rng = np.random.default_rng(4)
     false, true = 0, 0
-    for _ in range(4):
+    for _ in range(2):
         series = fleet(rng, 200)
         for arm in range(40):
             k = 8 * arm + int(rng.integers(8))
@@ -94,28 +86,13 @@ def test_of_the_arms_named_few_are_healthy():
         sick = {f'arm_{arm}' for arm in range(40)}
         false, true = false + len(found - sick), true + len(found & sick)
     assert false <= 0.05 * (false + true) + 2 * np.sqrt(0.05 * (false + true))
-    assert true > 80
+    assert true > 40
 
 
 def test_what_bags_differ_by_beyond_their_deviations_is_learned_from_all_arms():
     series = fleet(np.random.default_rng(5), 100, beyond=2.0)
     for spread in spreads(series).values():
         assert spread.std == pytest.approx(0.02, rel=0.15)
-
-
-@pytest.mark.parametrize('at', [0, 5])
-def test_one_odd_bag_is_no_change(at):
-    series = fleet(np.random.default_rng(8), 50)
-    for k in range(0, len(series), 16):
-        series[k] = changed(series[k], np.where(np.arange(10) == at, 0.5, 0.0))
-    assert names(series) == set()
-
-
-@pytest.mark.parametrize('lasting', [3, 7])
-def test_what_lasts_three_bags_is_a_change(lasting):
-    series = fleet(np.random.default_rng(9), 50)
-    series[16] = changed(series[16], np.where(np.arange(10) >= 10 - lasting, 0.5, 0.0))
-    assert names(series) == {'arm_2'}
 
 
 def test_a_day_that_all_siblings_share_is_no_change_of_any():
@@ -136,11 +113,23 @@ def test_healthy_arms_whose_days_differ_as_real_ones_do_are_rarely_named(bags):
     assert true >= (10 if bags == 10 else 34)
 
 
-def test_wear_is_as_uncertain_as_scatter_that_lasts_for_days_makes_it():
-    rng = np.random.default_rng(12)
-    series = fleet(rng, 100, bags=40, beyond=0.0)
-    walks = lasting(rng, 40, (len(series), 40))
-    series = [changed(one, 0.03 * walk) for one, walk in zip(series, walks, strict=True)]
+@pytest.mark.parametrize(
+    ('where', 'named'), [([0], 0), ([5], 0), ([7, 8, 9], 1), (range(3, 10), 1)]
+)
+def test_one_odd_bag_is_no_change_and_what_lasts_three_bags_is(where, named):
+    series = fleet(np.random.default_rng(8), 50)
+    series[16] = changed(series[16], np.where(np.isin(np.arange(10), where), 0.5, 0.0))
+    assert names(series) == ({'arm_2'} if named else set())
+
+
+@pytest.mark.parametrize(('bags', 'beyond', 'lasts'), [(10, 1.0, 0.0), (40, 0.0, 0.03)])
+def test_the_interval_of_wear_holds_the_truth_as_often_as_it_says(bags, beyond, lasts):
+    """Scatter may last for days."""
+    rng = np.random.default_rng(3)
+    series = fleet(rng, 250, bags, beyond)
+    walks = lasting(rng, bags, (len(series), bags))
+    series = [changed(one, lasts * walk) for one, walk in zip(series, walks, strict=True)]
     spread = spreads(series)
     slopes = np.array([wear(one, spread[one.parameter]) for one in series])
-    assert np.mean(np.abs(slopes[:, 0]) < 1.96 * slopes[:, 1]) == pytest.approx(0.95, abs=0.03)
+    inside = np.mean(np.abs(slopes[:, 0]) < 1.96 * slopes[:, 1])
+    assert inside == pytest.approx(0.95, abs=0.03)
