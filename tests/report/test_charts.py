@@ -24,7 +24,7 @@ def data_of(html):
     return json.loads(re.search(r'<script type="application/json">(.*?)</script>', html)[1])
 
 
-def test_thinning_keeps_every_peak():
+def test_thinning_keeps_every_peak_and_break():
     rng = np.random.default_rng(2)
     y = rng.standard_normal(200_000)
     y[123_456] = 40.0
@@ -36,10 +36,6 @@ def test_thinning_keeps_every_peak():
     for samples in np.array_split(np.arange(len(y)), 500):
         inside = y[kept[np.isin(kept, samples)]]
         assert (inside.min(), inside.max()) == (y[samples].min(), y[samples].max())
-
-
-def test_thinning_keeps_breaks():
-    y = np.sin(np.arange(50_000.0))
     y[30_000] = np.nan
     assert 30_000 in thinned(y, most=500)
 

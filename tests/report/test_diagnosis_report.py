@@ -15,7 +15,6 @@ from armid_ros.report.diagnosis_report import (
     diagnosis_report,
     overlay_section,
     Story,
-    tone_of,
     whole_overlays,
 )
 from armid_ros.report.notation import (
@@ -112,6 +111,8 @@ def test_the_joint_with_the_cause_is_the_one_that_is_drawn_in_colour(html, quiet
     assert drawing.count('polygon') == 3  # to the shoulder, and two links
     plain = quiet[quiet.index('<svg class="arm"') : quiet.index('</svg>')]
     assert 'var(--predicted)' not in plain
+    assert 'class="verdict fair"' in html  # amber
+    assert 'class="verdict good"' in quiet and 'bar role-before' not in quiet
 
 
 def test_causes_that_are_one_have_one_bar(found):
@@ -129,11 +130,6 @@ def test_what_is_not_checked_is_said_in_short(found):
     still = [replace(part, unsure=np.array([0.0, np.inf]) + part.unsure) for part in found.data]
     assert dict(Story(replace(nothing, data=tuple(still))).rows)['Not checked'] == ['elbow']
     assert 'Not checked' not in dict(Story(nothing).rows)
-
-
-def test_a_named_change_is_amber_and_an_unchanged_arm_green(found, html, quiet):
-    assert tone_of(found) == 'fair' and 'class="verdict fair"' in html
-    assert 'class="verdict good"' in quiet and 'bar role-before' not in quiet
 
 
 def test_a_model_that_simulates_worse_has_a_limitation(found, recordings, html):
