@@ -4,6 +4,7 @@
 
 from armid_ros.arm import ArmModel
 from armid_ros.effects import make_effect
+from armid_ros.identification import identify
 from armid_ros.identification.online.background import at_once, Background
 from armid_ros.motion import Motion
 from armid_ros.recording import Recording
@@ -71,3 +72,16 @@ def recorded(arm, motion, seed=0, torque_noise=0.0, position_noise=0.0, source='
         source=source,
         temperature=motion.temperature,
     )
+
+
+@pytest.fixture(scope='session')
+def recording(arm):
+    """Return a recording of 20 s with noise of both sensors."""
+    motion = multisine(arm.robot.joints, 20.0, 200.0, seed=1)
+    return recorded(arm, motion, torque_noise=0.02, position_noise=1e-6)
+
+
+@pytest.fixture(scope='session')
+def identified(structure, recording):
+    """Return the identification of the arm from this recording."""
+    return identify(structure, [recording], rng=np.random.default_rng(0))

@@ -5,42 +5,26 @@ import re
 
 from armid_ros.arm import ArmModel
 from armid_ros.errors import IdentificationError
-from armid_ros.identification import grade, IdentificationSettings, identify, SignalSettings
+from armid_ros.identification import grade, identify
 from armid_ros.model import random_motion
 from armid_ros.robots import robot_from_urdf
 import numpy as np
 import pytest
 
-from .conftest import multisine, recorded
+from .conftest import multisine
 
 
-@pytest.fixture(scope='module')
-def motion(arm):
-    return multisine(arm.robot.joints, 20.0, 200.0, seed=1)
+def run(structure, *recordings):
+    return identify(structure, recordings, rng=np.random.default_rng(0))
 
 
-@pytest.fixture(scope='module')
-def recording(arm, motion):
-    return recorded(arm, motion, torque_noise=0.02, position_noise=1e-6)
-
-
-def run(structure, *recordings, **signals):
-    settings = IdentificationSettings(signals=SignalSettings(**signals))
-    return identify(structure, recordings, settings, rng=np.random.default_rng(0))
-
-
-@pytest.fixture(scope='module')
-def result(structure, recording):
-    return run(structure, recording)
-
-
-def test_parameters_come_back_within_their_uncertainty_and_predict_any_motion(arm, result):
-    truth = result.base.values(arm.theta)
-    error = (result.estimate.values - truth) / result.estimate.std
+def test_parameters_come_back_within_their_uncertainty_and_predict_any_motion(arm, identified):
+    truth = identified.base.values(arm.theta)
+    error = (identified.estimate.values - truth) / identified.estimate.std
     assert np.sqrt(np.mean(error**2)) < 1.4
     assert np.abs(error).max() < 5.0
     other = random_motion(arm.robot, np.random.default_rng(9), 200)
-    off = np.linalg.norm(result.arm.torque(other) - arm.torque(other))
+    off = np.linalg.norm(identified.arm.torque(other) - arm.torque(other))
     assert off < 0.03 * np.linalg.norm(arm.torque(other))
 
 
@@ -81,7 +65,7 @@ def test_a_short_recording_is_said_and_not_refused(structure, recording):
     [(r'<inertial>.*?</inertial>', ''), (r'<mass value="[^"]*"', '<mass value="0"')],
 )
 @pytest.mark.filterwarnings('error::RuntimeWarning')
-def test_an_arm_described_without_masses_is_identified(arm, motion, recording, described, left):
+def test_an_arm_described_without_masses_is_identified(arm, recording, described, left):
     """First moments that are found stand on masses that no motion tells."""
     text = re.sub(described, left, arm.robot.urdf, flags=re.DOTALL)
     bare = robot_from_urdf(text, joints=arm.robot.joints)

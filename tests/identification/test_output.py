@@ -16,13 +16,6 @@ NEVER, NOT_SHOWN, _, WEAK = get_args(Reason)
 
 
 @pytest.fixture(scope='module')
-def result(arm, structure):
-    motion = multisine(arm.robot.joints, 15.0, 200.0, seed=1)
-    recording = recorded(arm, motion, 0, 0.02, 1e-5)
-    return identify(structure, [recording], rng=np.random.default_rng(0))
-
-
-@pytest.fixture(scope='module')
 def elbow_only(arm, structure):
     """Identify from a recording in which nothing but the elbow moves."""
     full = multisine(arm.robot.joints, 15.0, 200.0, seed=1)
@@ -31,13 +24,13 @@ def elbow_only(arm, structure):
     return identify(structure, [recorded(arm, motion, 0, 0.02)], rng=np.random.default_rng(0))
 
 
-def test_covariance_and_grouping_survive_the_file(result, tmp_path):
+def test_covariance_and_grouping_survive_the_file(identified, tmp_path):
     path = tmp_path / 'identification.json'
-    write_document(path, identification_document(result, 'arm', {}))
-    assert len(path.read_text().splitlines()) < 20 * result.base.rank  # a row is a line
+    write_document(path, identification_document(identified, 'arm', {}))
+    assert len(path.read_text().splitlines()) < 20 * identified.base.rank  # a row is a line
     read = read_parameters(path)
-    size = np.outer(result.estimate.std, result.estimate.std)
-    correlation = result.estimate.covariance / size
+    size = np.outer(identified.estimate.std, identified.estimate.std)
+    correlation = identified.estimate.covariance / size
     np.testing.assert_allclose(read.covariance / size, correlation, rtol=1e-8, atol=1e-10)
     (group,) = (key for key in read.terms if key.name.startswith('my2 + '))
     assert group.name == 'my2 + 0.35 (m3 + m4 + m5 + m6) - mz3'
