@@ -207,8 +207,6 @@ class TestRefused:
             (robot(ARM).replace('<mass value="1.5"/>', ''), "'upper'.* <mass>"),
             (robot(ARM).replace('"1.5"', '"inf"'), "'upper': value='inf' of <mass>"),
             (robot(ARM).replace('"0.01"', '"1e101"'), "'upper': ixx='1e101' of <inertia>"),
-            (robot(ARM).replace('0.1 0.02', '0 inf'), "'upper': xyz='0 inf -0.03' of <origin>"),
-            (robot(ARM).replace('0 1 0', 'nan 0 1'), "'shoulder': xyz='nan 0 1' of <axis>"),
             (robot(ARM).replace('0 1 0', '1e308 1e308 0'), "'shoulder': xyz='1e308 1e308 0' of"),
             (robot(ARM).replace('0.2 0 0', '0 0 nan'), "'shoulder': rpy='0 0 nan' of <origin>"),
             (robot(ARM).replace('<limit', '<dynamics damping="inf"/><limit'), "damping='inf' of"),
@@ -267,13 +265,6 @@ class TestGravity:
     def test_what_is_no_gravity_is_refused(self, value: Any) -> None:
         with pytest.raises(RobotError, match='gravity'):
             parse_gravity(value)
-
-    def test_another_gravity_is_another_robot(self) -> None:
-        earth = robot_from_urdf(TWO_LINKS)
-        moon = earth.with_gravity((0.0, 0.0, -1.62))
-        ratio = inverse_dynamics(moon, 0.3, 0.0, 0.0) / inverse_dynamics(earth, 0.3, 0.0, 0.0)
-        np.testing.assert_allclose(ratio, 1.62 / 9.81)
-        np.testing.assert_array_equal(earth.gravity, (0.0, 0.0, -9.81))
 
 
 class TestRigidParameters:
@@ -347,41 +338,32 @@ def test_xacro_arguments_reach_the_file_and_what_it_includes(tmp_path: Path) -> 
         load_robot(f'{tmp_path}/arm.urdf mass:=4.0')
 
 
-def star(n_links: int, kind: str = 'fixed') -> str:
-    """Return a description of many links, a few deep."""
+def tree(n_links: int, kind: str = 'fixed', children: int = 4) -> str:
+    """Return a description of many links, each of which carries so many others."""
     body = '<inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1"/></inertial>'
     links = ''.join(f'<link name="l{k}">{body}</link>' for k in range(n_links))
     joints = ''.join(
-        f'<joint name="j{k}" type="{"continuous" if k == 1 else kind}"><parent link="l{k // 4}"/>'
-        f'<child link="l{k}"/><limit velocity="1" effort="1" lower="-1" upper="1"/></joint>'
+        f'<joint name="j{k}" type="{"continuous" if k == 1 else kind}">'
+        f'<parent link="l{(k - 1) // children}"/><child link="l{k}"/>'
+        '<limit velocity="1" effort="1" lower="-1" upper="1"/></joint>'
         for k in range(1, n_links)
     )
-    return f'<robot name="star">{links}{joints}</robot>'
-
-
-def chain(n_links: int) -> str:
-    """Return a description of many links, each carried by the one before it."""
-    links = ''.join(f'<link name="l{k}"/>' for k in range(n_links))
-    joints = ''.join(
-        f'<joint name="j{k}" type="fixed"><parent link="l{k - 1}"/><child link="l{k}"/></joint>'
-        for k in range(1, n_links)
-    )
-    return f'<robot name="chain">{links}{joints}</robot>'
+    return f'<robot name="tree">{links}{joints}</robot>'
 
 
 class TestSizes:
     """Large descriptions are read or refused; none ends the process."""
 
     def test_thousands_of_links_are_read(self) -> None:
-        assert load_robot(star(3000)).n_joints == 1
+        assert load_robot(tree(3000)).n_joints == 1
 
     def test_a_chain_too_long_for_recursion_is_refused(self) -> None:
         with pytest.raises(RobotError, match="'l19999'"):
-            load_robot(chain(20_000))
+            load_robot(tree(20_000, children=1))
 
     def test_more_driven_joints_than_memory_has_room_for_are_refused(self) -> None:
         with pytest.raises(RobotError, match=r'999 .*150'):
-            load_robot(star(1000, 'revolute'))
+            load_robot(tree(1000, 'revolute'))
 
 
 class TestXacroIsAProgram:

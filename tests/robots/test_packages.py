@@ -5,11 +5,11 @@
 import os
 
 from armid_ros.arm import ArmModel, load_model, save_model
-from armid_ros.cli import main
 from armid_ros.errors import RobotError
 from armid_ros.robots import collision_model, load_robot, xacro_expansion
-from click.testing import CliRunner
 import pytest
+
+from tests.cli.conftest import armid
 
 XACRO = '<robot xmlns:xacro="http://www.ros.org/wiki/xacro" name="arm">'
 INERTIAL = (
@@ -97,10 +97,8 @@ def test_a_package_is_given_on_the_command_line_and_known_to_the_model(workspace
     place = package(workspace / 'a' / 'b' / 'my files', 'other', RESOURCES)
     with pytest.raises(RobotError, match='--package arm_resources='):
         load_robot(path)
-    out = workspace / 'layout'
-    command = ['layout', '--robot', f'{path} prefix:=right_', '--out', str(out)]
-    done = CliRunner().invoke(main, [*command, '--package', f'arm_resources={place}'])
-    assert done.exit_code == 0, done.output
+    asked = ('layout', '--robot', f'{path} prefix:=right_', '--out', workspace / 'layout')
+    armid(*asked, '--package', f'arm_resources={place}')
     source = f"{path} prefix:=right_ 'package:arm_resources:={place}'"
     robot = load_robot(source)
     assert robot.joints == ('right_joint',)
@@ -114,10 +112,8 @@ def test_a_package_is_given_on_the_command_line_and_known_to_the_model(workspace
 )
 def test_a_package_that_is_none_is_refused(workspace, text):
     path = description(workspace / 'arm')
-    command = ['layout', '--robot', str(path), '--package', text, '--out', str(workspace / 'out')]
-    done = CliRunner().invoke(main, command)
-    assert done.exit_code == 2
-    assert 'package' in done.output
+    asked = ('layout', '--robot', path, '--package', text, '--out', workspace / 'out')
+    assert 'package' in armid(*asked, code=2).output
 
 
 def test_an_unknown_macro_is_named_where_no_package_is_missing(workspace):

@@ -77,7 +77,7 @@ def test_spheres_are_at_the_joints_and_arrows_along_their_axes_as_long_as_the_re
         begin, end = map(array, arrow.points)
         lengths.append((end - begin) @ jacobian[3:, j])
         np.testing.assert_allclose(np.cross(end - begin, jacobian[3:, j]), 0.0, atol=1e-9)
-    assert len(lengths) == ROBOT.n_joints
+    assert len(lengths) == ROBOT.n_joints and lengths[0] > 0.0
     np.testing.assert_allclose(np.array(lengths) / lengths[0], [1, -0.5, 0.25, 0, 0, 0], atol=0.02)
     np.testing.assert_allclose(reds[:4], [1.0, 0.5, 0.25, 0.0], atol=0.02)  # red from 20 % on
     first, *_ = (text.text for text in of(markers, 'joint'))
