@@ -9,7 +9,6 @@ from armid_ros.simulation import Reference, Sensors, simulate, SimulatedArm
 import numpy as np
 import pytest
 
-from tests.simulation.conftest import gravity_pd
 from tests.simulation.test_run import MIDDLE
 
 SENSORS = Sensors(
@@ -145,17 +144,6 @@ def test_reset_brings_it_home_and_forgets_the_trajectory(arm) -> None:
     np.testing.assert_array_equal(arm.state.q, MIDDLE)
     arm.reset(steps=2000)
     assert arm.advance().t == 2.001
-
-
-def test_it_starts_in_the_middle_of_its_range_unless_told(humanoid) -> None:
-    arm = SimulatedArm(
-        ArmModel(humanoid), rng=np.random.default_rng(0), controller=gravity_pd(ArmModel(humanoid))
-    )
-    np.testing.assert_allclose(arm.state.q, (humanoid.lower + humanoid.upper) / 2)
-    arm.advance(1000)
-    np.testing.assert_allclose(arm.state.q, (humanoid.lower + humanoid.upper) / 2, atol=1e-12)
-    with pytest.raises(TrajectoryError, match=' 9'):
-        SimulatedArm(ArmModel(humanoid), rng=np.random.default_rng(0), start=np.full(6, 9.0))
 
 
 def test_time_only_goes_forwards(arm) -> None:
