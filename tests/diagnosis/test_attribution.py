@@ -11,7 +11,9 @@ from armid_ros.diagnosis.search.joint_fit import JointFit
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.diagnosis.verdict.attribution import (
     Attribution,
+    cross_validated,
     headline,
+    held_out_gains,
 )
 from armid_ros.effects import CATALOGUE
 import numpy as np
@@ -61,3 +63,8 @@ def test_a_cause_that_predicts_nothing_of_other_data_is_minor(bench, sprung):
     assert kept is sprung and shares.share([0]) > 0.95
     fewer, shares = headline(sprung, evidence_of(bench, None), 0.0, settings)
     assert (fewer.steps, fewer.minor, shares.order) == ((), ('spring',), ())
+
+
+def test_folds_that_were_not_fitted_show_it_as_well(sprung):
+    folds, whole = cross_validated(sprung), held_out_gains(sprung, [0], sprung.evidence)
+    assert folds.share([0]) == pytest.approx(whole.share([0]), abs=0.01)
