@@ -8,10 +8,7 @@ from armid_ros.diagnosis.data.evidence import joints_that_do_not_repeat, NoiseFl
 from armid_ros.diagnosis.settings import Thresholds
 from armid_ros.diagnosis.verdict.finding import Finding, Rival
 from armid_ros.diagnosis.verdict.where import Excess
-from armid_ros.diagnosis.verdict.words import (
-    decide,
-    sentence,
-)
+from armid_ros.diagnosis.verdict.words import decide, sentence, share_interval_in_words
 from armid_ros.effects import CATALOGUE
 from armid_ros.report.sections.diagnosed import named_section
 import numpy as np
@@ -61,6 +58,10 @@ def test_what_is_not_explained_has_the_cause_that_explains_most_of_it(bench):
     assert verdict(bench, left=4.0, minor=[finding(bench, 0.001)]) == plain
     text = verdict(bench, left=4.0, minor=[finding(bench)]).summary
     assert all(fact in text for fact in ('elbow', '0.100', '0.020 rad', '5.7 degrees', '30 %'))
+
+
+def test_a_share_has_its_interval(bench):
+    assert share_interval_in_words(finding(bench)) == ' (20 % to 40 %)'
 
 
 @pytest.mark.parametrize(
