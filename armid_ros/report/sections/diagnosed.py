@@ -250,9 +250,9 @@ def _detectable_row(name: str, sizes: Sequence[Detectable]) -> tuple[str, str, s
         unit = '' if one.parameter is None else f' {pretty(one.parameter.unit)}'
         where = f' in {", ".join(one.joints)}' if one.joints else ''
         ends.append(f'{digits(one.size)}{unit.rstrip()}{where}')
-    best, worst = (*dict.fromkeys(ends), '', '')[:2]
+    best, worst = ends or ('', '')
     never = '; '.join(', '.join(s.joints) or 'the arm' for s in own if not math.isfinite(s.size))
-    return name_in_words(name), best, worst, never
+    return name_in_words(name), best, worst if worst != best else '', never
 
 
 def candidates_section(diagnosis: Diagnosis) -> ContentSection:
