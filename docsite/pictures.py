@@ -3,7 +3,7 @@
 """
 Drawing of the pictures of the documentation.
 
-``python -m docsite.pictures [NAME.png ...]`` draws them. ``armid demo`` draws those of the demo.
+``python -m docsite.pictures [NAME.png ...]`` draws them. Pictures of reports are screenshots.
 
 """
 
@@ -251,6 +251,11 @@ def bodies() -> Figure:
 def _masses(*, physical: bool) -> np.ndarray:
     model = ar.identify('my_arm.urdf', 'friday', physical=physical)
     return np.asarray(model.arm.robot.rigid_parameters[::10])
+
+
+def predicted() -> Figure:
+    """Draw measured and predicted torques of all joints in a held-out recording."""
+    return _sized(ar.identify('my_arm.urdf', 'monday', validate='tuesday').plot())
 
 
 def own_effect() -> Figure:
@@ -534,7 +539,7 @@ PICTURES = {
     for picture in (
         *(bodies, candidates, chain, comparison, control, currents, damaged, deviations),
         *(excitation, exo_cycle, fleet, growth, installed, learned, limits, live, online),
-        *(own_effect, payload, recording, refused, reliability, springs, temperature),
+        *(own_effect, payload, predicted, recording, refused, reliability, springs, temperature),
     )
 }
 
