@@ -39,12 +39,15 @@ def draw_joints(
         count, sharex=True, squeeze=False, figsize=size, layout='constrained'
     )
     for joint, (name, axis) in enumerate(zip(joints, axes[:, 0], strict=True)):
-        for label, (t, values) in curves.items():
-            axis.plot(t, values[:, joint], label=label, linewidth=1.0)
+        for number, (label, (t, values)) in enumerate(curves.items(), start=1):
+            # broad under fine, so that equal curves are visible
+            width = 1.0 + 2.0 * (len(curves) - number)
+            axis.plot(t, values[:, joint], label=label, linewidth=width)
         axis.set_title(name, loc='left', fontsize='medium')
         axis.grid(True, alpha=0.3)
     axes[-1, 0].set_xlabel('time [s]')
     figure.supylabel(quantity)
     if len(curves) > 1:
-        axes[0, 0].legend(loc='upper right')
+        labels = axes[0, 0].get_legend_handles_labels()
+        figure.legend(*labels, loc='outside upper right', ncols=len(curves))
     return np.asarray(axes[:, 0])
