@@ -129,20 +129,13 @@ def _arm_page(found: Watch, arm: WatchedArm, diagnoses: Diagnoses) -> str:
     for row in (one for one in arm.wear if (one['name'], one['joint']) not in steps):
         std = (row['upper'] - row['lower']) / (2.0 * HALF_WIDTH)
         unit = f'{row["unit"]} a month'
-        rows.append(
-            (
-                parameter_label(row['name'], row['joint']),
-                with_interval(row['per_month'], std, unit),
-            )
-        )
+        trend = with_interval(row['per_month'], std, unit)
+        rows.append((parameter_label(row['name'], row['joint']), trend))
     hint = (
         'Slope of a straight line through all bags with its 95 % interval, fitted separately. '
         'An interval that includes 0 shows no wear. Parameters with a sudden change have no trend.'
     )
-    sections += [
-        _table('Wear', ('Parameter', 'Trend'), rows, (1,), hint),
-        _bags(arm),
-    ]
+    sections += [_table('Wear', ('Parameter', 'Trend'), rows, (1,), hint), _bags(arm)]
     if arm.refused:
         sections.append(_refused(arm.refused))
     subtitle = f'{counted(len(arm.bags), "bag")} · false discovery rate {found.alpha:g}'
