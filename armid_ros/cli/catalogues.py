@@ -18,13 +18,12 @@ def robots(as_json: bool) -> None:
     from armid_ros.files import json_text
     from armid_ros.robots import shipped_robots
 
-    shipped = shipped_robots()
+    rows = [{'name': name, 'what it is': text} for name, text in shipped_robots().items()]
     if as_json:
-        rows = [{'name': name, 'what it is': text} for name, text in shipped.items()]
         click.echo(json_text(rows, indent=1))
         return
-    for name, text in shipped.items():
-        _say_wrapped(f'{name}: {text}')
+    for row in rows:
+        _say_wrapped(f'{row["name"]}: {row["what it is"]}')
 
 
 @click.command(epilog='Example: armid effects payload')

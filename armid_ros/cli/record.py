@@ -128,7 +128,6 @@ def simulate(
 def _parse_effect(text: str, robot: Robot) -> tuple[Effect, FloatArray]:
     """Parse --effect; ModelError for an effect of size zero, warning for an impossible payload."""
     from armid_ros.effects import parse_effect
-    from armid_ros.model.rigid_body import LINK_PARAMETERS
     from armid_ros.simulation.plant import possible_loads
     import numpy as np
     import pinocchio as pin
@@ -141,16 +140,13 @@ def _parse_effect(text: str, robot: Robot) -> tuple[Effect, FloatArray]:
             f"'armid effects {effect.name}' lists its values"
         )
     if effect.traits.weighs and not possible_loads(robot, values):
-        least = 'payload_m times distance squared'
-        if values[0] > 0.0:
-            point = pin.Inertia(values[0], values[1:4] / values[0], np.zeros((3, 3)))
-            inertia = zip(LINK_PARAMETERS[4:], point.toDynamicParameters()[4:], strict=True)
-            parts = [f'payload_{name}={size:.6g}' for name, size in inertia if size]
-            least = f'at least those of a point mass: {",".join(parts) or 0}'
+        point = pin.Inertia(values[0], values[1:4] / (values[0] or np.inf), np.zeros((3, 3)))
+        inertia = zip(effect.quantities[4:], point.toDynamicParameters()[4:], strict=True)
+        parts = [f'{quantity.name}={size:.6g}' for quantity, size in inertia if size]
         say(
             f"warning: --effect '{text}': no body within reach of the arm has these values. "
             'payload_mx etc. are payload_m times distance. payload_Ixx etc. are about the joint, '
-            f'{least}',
+            f'at least those of a point mass: {",".join(parts) or 0}',
             'yellow',
         )
     return effect, values
