@@ -70,7 +70,7 @@ def plan(
             f'armid zero fit BAG --robot {robot_source} --out zeros'
         )
         summary = replace(result.summary(), then='', steps=[step])
-        origin = options.origin(robot_source, read, result.seed)
+        origin = replace(options.origin(robot_source, read, result.seed), step=step)
         options.deliver(result, staged, origin, as_json, summary)
 
 
