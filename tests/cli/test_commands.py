@@ -119,6 +119,17 @@ def test_robots_and_effects_are_listed_for_people_and_programs():
     text = armid('effects').output
     for effect in CATALOGUE.values():
         assert all(one.name in text for one in (*effect.quantities, *effect.shapes))
+    (one,) = json.loads(armid('effects', 'payload', '--json').output)
+    assert one['name'] == 'payload'
+    assert "'payload'" in armid('effects', 'paylod', code=2).stderr
+
+
+def test_the_smallest_inertia_of_an_impossible_payload_is_possible(tmp_path):
+    asked = (*SIMULATE, '--trajectory', tmp_path / 'none.yaml', '--effect')
+    payload = 'payload:payload_m=0.4,payload_mx=0.05,payload_mz=0.12'
+    warned = armid(*asked, payload, code=2).output
+    least = re.search(r'point mass: (\S+)', warned)[1]
+    assert 'no body within reach' not in armid(*asked, f'{payload},{least}', code=2).output
 
 
 @pytest.mark.parametrize(
