@@ -212,7 +212,7 @@ class Fitness:
 
     def sentences(self) -> list[str]:
         """Return a sentence on limits and unchecked items, and a sentence on distances."""
-        limits = 'No limit violated'
+        limits = 'The motion keeps all limits'
         if self.unchecked:
             limits += f'; not checked: {"; ".join(self.unchecked)}'
         parts = []

@@ -157,7 +157,7 @@ def _verdict(found: Watch, diagnoses: Diagnoses) -> VerdictSection:
     blamed = [arm.arm for arm in found.arms if _diagnosed(arm, diagnoses.get(arm.arm))]
     ill = counts['changed'] + counts['wearing']
     tested = len(found.arms) - counts['too few bags']
-    sentences = [f'No parameter of {counted(tested, "tested arm")} changed.']
+    sentences = [f'No parameter changed in {tested} of {counted(len(found.arms), "arm")}.']
     longest = 60  # characters
     named = ', '.join(arm.arm for arm in found.arms if arm.health in ('changed', 'wearing'))
     if ill:

@@ -76,8 +76,10 @@ def decide(
             f'{f"{names} is provisional" if names else "No effect of the arm is named"}.'
         )
         return Verdict('not_repeatable', text)
-    error = f'the error of {arm.robot.joints[int(np.argmax(worst.ratio))]} {worst.where}'
-    size = larger(np.sqrt(worst.ratio.max())) + f' expected from {floor}{worst.more}'
+    joints, units, largest = arm.robot.joints, arm.robot.torque_units, int(np.argmax(worst.ratio))
+    number = '' if gap is None else f' ({gap.after[largest]:.2g} {units[largest]})'
+    error = f'the error of {joints[largest]}{number} {worst.where}'
+    size = f'{larger(np.sqrt(worst.ratio.max()))} the limit that follows from {floor}{worst.more}'
     at_floor = f'is at the level of {floor}'
     refit = _refit(given_body, arm.robot, floor)
     shown = bool(minor) and minor[0].share >= 0.01
@@ -87,11 +89,9 @@ def decide(
             text = f'No effect in the catalogue explains {error}. It is {size}.'
             text += f' Best candidate: {small}' if small else ''
             return Verdict('unknown', f'{text} {refit}'.rstrip())
-        number = ''
         if gap is not None:
             largest = int(np.argmax(gap.after / np.maximum(gap.floor, 1e-12)))
-            unit = arm.robot.torque_units[largest]
-            number = f' ({gap.after[largest]:.2g} {unit} in {arm.robot.joints[largest]})'
+            number = f' ({gap.after[largest]:.2g} {units[largest]} in {joints[largest]})'
         known = floor not in (NOISE, ESTIMATED) and not refit
         text = 'Nothing changed: the model' if known else 'The model'
         text += f' explains the recordings. The remaining error{number} {at_floor}'
@@ -113,7 +113,7 @@ def _refit(given_body: Excess | None, robot: Robot, floor: str) -> str:
     times = larger(np.sqrt(given_body.ratio.max()))
     return (
         f'Rigid body and friction were refitted: as given, the error of {robot.joints[worst]} is '
-        f'{times} expected from {floor}. armid check ROBOT BAG compares the links, '
+        f'{times} the limit that follows from {floor}. armid check ROBOT BAG compares the links, '
         f'{robot.links[worst]} first. '
     )
 

@@ -74,8 +74,8 @@ def verdict(found: Reproduction) -> VerdictSection:
         paper = 100.0 * float(np.mean(one.table.ratio))
         held &= bool(100.0 * gravity.mean() <= 1.0)  # % of the peak
         lines += [
-            f'{name}: mean torque error {digits(100.0 * float(noisy.mean()))} % of the peak '
-            f'torque; the paper has {digits(paper)} %.',
+            f'Mean torque error {digits(100.0 * float(noisy.mean()))} % of the peak torque, '
+            f'{digits(paper)} % in the paper: {name}.',
             f'Without torque noise it is {digits(100.0 * float(gravity.mean()))} % with gravity '
             f'alone, {digits(100.0 * float(dynamics.mean()))} % with the full dynamics.',
         ]
