@@ -44,6 +44,7 @@ def test_units_are_those_of_joint_or_pair_in_a_file_as_well(scara, tmp_path, eff
 
 
 TIME = Shape('time', 's', 0.1, 1e5, 600.0, (10.0, 60.0, 3000.0))
+POWER = Shape('power', '', 0.3, 4.0, 2.0, (1.0, 2.0))
 LAG = Shape('lag', 's', 0.0, 1.0, 0.0, (0.0, 0.001, 0.01))
 
 
@@ -52,8 +53,10 @@ LAG = Shape('lag', 's', 0.0, 1.0, 0.0, (0.0, 0.001, 0.01))
     [
         (TIME, 206.0, 40.0, True),
         (TIME, 206.0, 25000.0, False),
+        (TIME, 206.0, np.inf, False),
         (LAG, 0.0, 0.002, True),
         (LAG, 0.0, 0.05, False),
+        (POWER, 2.0, 3.0, False),
     ],
 )
 def test_a_shape_is_determined_where_its_interval_leaves_something_out(

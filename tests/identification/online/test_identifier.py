@@ -146,8 +146,9 @@ def test_before_any_motion_the_model_is_the_one_given(arm):
     assert online.delay is None
 
 
-def test_an_arm_may_have_a_single_joint():
+def test_an_arm_may_have_a_single_joint_without_a_known_limit():
     robot = load_robot('humanoid_arm', joints=('shoulder_pitch',))
+    robot = replace(robot, torque_limit=np.full(1, np.inf))
     motion = multisine(robot.joints, 10.0, 200.0, seed=0)
     online = OnlineIdentifier(ArmModel(robot), rng=np.random.default_rng(0))
     feed(online, motion.t, motion.q, ArmModel(robot).torque(motion))
