@@ -116,7 +116,7 @@ def named_rows(
 def named_section(findings: Sequence[Finding]) -> ContentSection:
     """Return the section with the parameters of the named effects."""
     heads = ('Effect', 'Parameter', 'Joint', 'Value, 95 %')
-    return ContentSection('Parameters', [DataTable(heads, named_rows(findings), (0, 1, 2, 3))])
+    return ContentSection('Parameters', [DataTable(heads, named_rows(findings), (0, 1, 2))])
 
 
 def evidence_section(diagnosis: Diagnosis) -> ContentSection:
