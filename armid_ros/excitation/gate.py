@@ -78,9 +78,28 @@ class MotionGate:
         room = np.where(np.isfinite(robot.torque_limit), 0.1 * robot.torque_limit, 0.0)
         return cls(run, limits, planner.clearance, np.maximum(np.abs(torque).max(axis=0), room))
 
-    def stop(
-        self, phase: float, duration: float, measured: FloatArray, velocity: FloatArray
-    ) -> Motion:
+    def deviation(self, monitor: PoseMonitor, begun: float) -> tuple[FloatArray, FloatArray]:
+        """
+        Return position and velocity of each joint relative to the run, when they were measured.
+
+        Parameters
+        ----------
+        monitor : PoseMonitor
+            Measured positions of the arm.
+        begun : float
+            When the run began [s].
+
+        Returns
+        -------
+        q, dq : ndarray, shape (n,)
+            Measured minus planned [rad or m, and per second]; NaN: unknown.
+
+        """
+        # positions may be old after a loss of joint states
+        path, joint = self.run.at(monitor.seen - begun), np.arange(len(monitor.seen))
+        return monitor.q - path.q[joint, joint], monitor.velocity() - path.dq[joint, joint]
+
+    def stop(self, phase: float, duration: float, q: FloatArray, dq: FloatArray) -> Motion:
         """
         Return the motion that slows the arm down to rest along the path of the run.
 
@@ -92,9 +111,9 @@ class MotionGate:
             Time since the start of the run [s].
         duration : float
             Time to come to rest [s]; longer if the acceleration limits require it.
-        measured, velocity : ndarray, shape (n,)
-            Position [rad or m] and velocity [rad/s or m/s] of the arm; NaN: unknown. The
-            controller needs time to return to the path from there.
+        q, dq : ndarray, shape (n,)
+            Position [rad or m] and velocity [rad/s or m/s] of the arm relative to the run; NaN:
+            unknown. The controller needs time to return to the path.
 
         Returns
         -------
@@ -114,15 +133,14 @@ class MotionGate:
         while check_limits(self.limits, motion) and longer * duration <= longest:
             duration *= longer
             motion = slowed(self.run, phase, duration, self.run.rate)
-        step = np.nan_to_num(np.abs(measured - path.q[0]))
-        lead = self._time_of(step, np.nan_to_num(np.abs(velocity - path.dq[0])))
+        lead = self._time_of(np.nan_to_num(np.abs(q)), np.nan_to_num(np.abs(dq)))
         reached = int(np.searchsorted(motion.t, lead))
         if reached < len(motion.t):
             return motion.select(slice(reached, None))
         return replace(motion.select(slice(-1, None)), t=np.array([lead]))
 
     def hold(
-        self, set_point: FloatArray, speed: FloatArray, measured: FloatArray, largest: float
+        self, set_point: FloatArray, speed: FloatArray, measured: FloatArray, largest: FloatArray
     ) -> Motion:
         """
         Return the motion on a straight line from the set point to the measured position.
@@ -133,8 +151,8 @@ class MotionGate:
             Set point of the controller [rad or m], and its absolute velocity [rad/s or m/s].
         measured : ndarray, shape (n,)
             Measured position [rad or m].
-        largest : float
-            Largest step of a joint [rad or m].
+        largest : ndarray, shape (n,)
+            Largest step of each joint [rad or m].
 
         Raises
         ------
@@ -143,12 +161,12 @@ class MotionGate:
 
         """
         step = np.abs(measured - set_point)
-        if not step.max() <= largest:
-            j = int(np.argmax(step))
+        if not (step <= largest).all():
+            j = int(np.argmax(step - largest))
             joint, unit = self.limits.joints[j], self.limits.unit('position', j)
             raise TrajectoryError(
                 f"joint '{joint}' is {step[j]:.3g} {unit} from its set point, more than "
-                f'{largest:g} {unit}'
+                f'{largest[j]:.3g} {unit}'
             )
         inside = np.clip(measured, self.limits.lower, self.limits.upper)
         near = clear_line(self.clearance, set_point, inside)
@@ -156,31 +174,13 @@ class MotionGate:
             raise TrajectoryError(
                 f'{near.first} and {near.second} would come within {near.distance:.4f} m'
             )
+        return self.rest(inside, step, speed)
+
+    def rest(self, goal: FloatArray, step: FloatArray, speed: FloatArray) -> Motion:
+        """Return the motion to rest at a near goal, for a step and a speed of each joint, (n,)."""
         needed = max(self._time_of(step, speed), HANDOVER_TIME)
         t, still = needed + np.array([0.0, HANDOVER_TIME / 2.0]), np.zeros((2, len(step)))
-        return Motion(self.limits.joints, t, np.vstack([inside, inside]), still, still)
-
-    def overload(self, effort: FloatArray, factor: float) -> str:
-        """
-        Return a message on a joint whose effort is too large; empty if there is none.
-
-        Parameters
-        ----------
-        effort : ndarray, shape (n,)
-            Measured effort [N m or N]; NaN: none.
-        factor : float
-            Multiple of the predicted effort that is allowed; 0: any effort.
-
-        """
-        beyond = np.nan_to_num(np.abs(effort)) - factor * self.effort
-        j = int(np.argmax(beyond))
-        if not (factor > 0.0 and self.effort[j] > 0.0 and beyond[j] > 0.0):
-            return ''
-        return (
-            f"the effort of joint '{self.limits.joints[j]}' is {abs(effort[j]):.3g} "
-            f'{self.limits.unit("torque", j)}, more than effort_factor {factor:g} times the '
-            f'predicted {self.effort[j]:.3g}'
-        )
+        return Motion(self.limits.joints, t, np.vstack([goal, goal]), still, still)
 
     def _time_of(self, step: FloatArray, speed: FloatArray) -> float:
         """Return the time [s] that joints need for a small step within their limits."""
@@ -217,8 +217,8 @@ class Ending:
         Why the run ended.
     blocked : bool
         Whether the arm did not follow and has to be held at its present position.
-    warned : bool
-        Whether a warning that the arm still moves was reported.
+    warned : str
+        Latest reported warning: the arm is 'moving', or its motion is 'unknown'; empty: none.
 
     """
 
@@ -228,7 +228,7 @@ class Ending:
     sent: float
     reason: str
     blocked: bool = False
-    warned: bool = False
+    warned: str = ''
 
     def stopped_again(
         self, monitor: PoseMonitor, now: float, tolerance: float, duration: float
@@ -239,10 +239,10 @@ class Ending:
             return None
         if not 0.0 <= phase < self.gate.run.duration:
             return None
-        away = np.abs(monitor.pose.q - self.gate.run.at([phase]).q[0]).max()
+        away = np.abs(monitor.q - self.gate.run.at([phase]).q[0]).max()
         if not away <= tolerance or not monitor.unsteady(_REST_TIME, 2):
             return None
-        return self.gate.stop(phase, duration, monitor.pose.q, monitor.velocity())
+        return self.gate.stop(phase, duration, *self.gate.deviation(monitor, self.begun))
 
     def updated(
         self,
@@ -278,37 +278,29 @@ class Ending:
             Message to report; empty if none.
 
         """
-        if self.last is not None and self.blocked and monitor.unsteady(_REST_TIME) == '':
-            # hold the arm at its measured position if this step of the set point is allowed
-            ending, measured = replace(self, blocked=False), monitor.pose.q
-            row = int(np.searchsorted(self.last.t, now - self.sent))
-            row = min(row, len(self.last.t) - 1)
-            set_point, speed = self.last.q[row], np.abs(self.last.dq[row])
-            if np.abs(measured - set_point).max() <= tolerance:
-                return ending, None, ''
-            try:
-                # largest step of the set point to a blocked arm, in units of the tracking
-                # tolerance
-                motion = self.gate.hold(set_point, speed, measured, 3.0 * tolerance)
-            except TrajectoryError as error:
-                return (
-                    ending,
-                    None,
-                    f'{self.reason}; the set point stays where it is: {error}; if the arm is '
-                    'pushed, use the emergency stop',
-                )
-            return replace(ending, last=motion, sent=now), motion, ''
+        lost = monitor.staleness(now, patience)
+        at_rest = not lost and monitor.unsteady(_REST_TIME) == ''
+        if self.last is not None and self.blocked and at_rest:
+            return self._held(self.last, monitor, now, tolerance)
         lasts = 0.0 if self.last is None else float(self.last.t[-1])
+        if now - self.sent < lasts + patience:
+            return self, None, ''
+        if lost and not self.reason:  # the run is complete
+            return None, None, ''
+        if lost:
+            unknown = f'{lost}: whether the arm is at rest is unknown; use the emergency stop'
+            report = '' if self.warned == 'unknown' else unknown
+            return replace(self, warned='unknown'), None, report
         moving = monitor.unsteady(_REST_TIME, 2)
-        if now - self.sent < lasts + patience or moving is None:
+        if moving is None:
             return self, None, ''
         if not moving:
             return None, None, ''
         stop = self.stopped_again(monitor, now, tolerance, duration)
-        ending = replace(self, warned=True)
+        ending = replace(self, warned='moving')
         if stop is not None:
             ending = replace(ending, last=stop, sent=now)
-        if self.warned:
+        if self.warned == 'moving':
             return ending, stop, ''
         if self.last is None:
             return ending, None, f'{self.reason}; {moving}, and another client uses the controller'
@@ -317,3 +309,31 @@ class Ending:
             stop,
             f'the arm still moves although it was stopped: {moving}; use the emergency stop',
         )
+
+    def _held(
+        self, last: Motion, monitor: PoseMonitor, now: float, tolerance: float
+    ) -> tuple[Ending, Motion | None, str]:
+        """Hold a blocked arm at its measured position if this step of the set point is allowed."""
+        ending, measured, elapsed = replace(self, blocked=False), monitor.q, now - self.sent
+        begin = self.gate.run.at([self.sent - self.begun])
+        over = elapsed >= last.t[-1]
+        row = min(int(np.searchsorted(last.t, elapsed)), len(last.t) - 1)
+        path, row = (last, row) if elapsed > 0.0 else (begin, 0)
+        set_point, speed = path.q[row], np.abs(path.dq[row])
+        if np.abs(measured - set_point).max() <= tolerance:
+            return (ending if over else self), None, ''
+        # a joint takes back what it did since the fault, and as much as it was off before, at most
+        # three times the tracking tolerance
+        largest = np.abs(set_point - begin.q[0]) + 3.0 * tolerance
+        try:
+            motion = self.gate.hold(set_point, speed, measured, largest)
+        except TrajectoryError as error:
+            report = (
+                f'{self.reason}; the set point stays where it is: {error}; if the arm is pushed, '
+                'use the emergency stop'
+            )
+            if over:
+                return ending, None, report
+            motion = self.gate.rest(set_point, np.zeros(len(speed)), speed)
+            return replace(ending, last=motion, sent=now), motion, report
+        return replace(ending, last=motion, sent=now), motion, ''

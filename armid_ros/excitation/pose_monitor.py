@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from operator import le
 from typing import NamedTuple
 
-from armid_ros.excitation.supervision import MeasuredPose
+from armid_ros.excitation.supervision import staleness
 from armid_ros.motion import FloatArray
 from armid_ros.robots import Robot
 import numpy as np
@@ -52,7 +52,7 @@ class PoseMonitor:
     A position is accepted if it is finite, within the position limits, newer than the last
     accepted one, and reachable from it at the velocity limit. Positions that contradict the last
     accepted one are accepted when `MIN_AGREEING` of them agree with each other and no other
-    position was accepted meanwhile.
+    position was accepted meanwhile. Two senders of one joint have to agree.
 
     Parameters
     ----------
@@ -84,10 +84,14 @@ class PoseMonitor:
         self.rejected = 0
 
     @property
-    def pose(self) -> MeasuredPose:
-        """Return the last accepted position of each joint."""
-        q, seen, stamps = (np.array(values) for values in (self._q, self._seen, self._stamps))
-        return MeasuredPose(self._joints, q, seen, stamps)
+    def q(self) -> FloatArray:
+        """Return the last accepted positions, shape (n,) [rad or m]; NaN if there is none."""
+        return np.array(self._q)
+
+    @property
+    def seen(self) -> FloatArray:
+        """Return the arrival time of each position, (n,) [s]; minus infinity if there is none."""
+        return np.array(self._seen)
 
     @property
     def last_stamp_ns(self) -> int:
@@ -95,9 +99,27 @@ class PoseMonitor:
         return min(self._stamps)
 
     @property
+    def has_velocity(self) -> bool:
+        """Whether the last accepted joint states have finite velocities of all joints."""
+        latest = [source.states[-1].dq for source in self._sources.values() if source.states]
+        return bool(latest) and bool(np.isfinite(np.concatenate(latest)).all())
+
+    @property
     def sources(self) -> int:
-        """Number of senders of joint states; each sender has its own list of joint names."""
-        return len(self._sources)
+        """Number of senders of joint states, if no joint has two senders."""
+        # lists of joint names with a common joint of the arm count as those of one sender
+        groups = [set(source.joints) for source in self._sources.values()]
+        others = groups.count(set())
+        groups = [group for group in groups if group]
+        for joint in range(len(self._joints)):
+            shared = [group for group in groups if joint in group]
+            groups = [group for group in groups if joint not in group]
+            groups += [set().union(*shared)] if shared else []
+        return others + len(groups)
+
+    def staleness(self, now: float, timeout: float) -> str:
+        """Return a message if a joint position is older than a timeout [s]; otherwise empty."""
+        return staleness(self._joints, self.seen, now, timeout)
 
     def update(
         self,
@@ -136,15 +158,10 @@ class PoseMonitor:
         if fault:
             self._reject(fault, now)
             return
-        seen = max(self._seen[j] for j in source.joints)
-        last = (
-            source.states[-1]
-            if source.states
-            else _State(seen, 0, [self._q[j] for j in source.joints], dq)  # from other senders
-        )
-        if stamp_ns == last.stamp_ns != 0 and last.q == q:
+        if stamp_ns and source.states and source.states[-1][1:3] == (stamp_ns, q):
             return  # repeated message
-        fault = self._unreachable(source, state, last)
+        seen = max(self._seen[j] for j in source.joints)
+        fault = self._contradicted(source, state, seen)
         if fault:
             self._reject(fault, now)
             if source.contradicting and self._unreachable(source, state, source.contradicting[-1]):
@@ -242,6 +259,14 @@ class PoseMonitor:
             f"the position of joint '{self._joints[j]}' is {q[k]:.4g} {self._units[j]}, "
             f'outside its limits {self._lower[j]:.4g} to {self._upper[j]:.4g} {self._units[j]}'
         )
+
+    def _contradicted(self, source: _Source, state: _State, seen: float) -> str:
+        """Return a message if a state contradicts the last one of its own or of another sender."""
+        fault = self._unreachable(source, state, source.states[-1]) if source.states else ''
+        if fault or (source.states and source.states[-1].arrived >= seen):
+            return fault
+        others = _State(seen, 0, [self._q[j] for j in source.joints], state.dq)
+        return self._unreachable(source, state, others)
 
     def _unreachable(self, source: _Source, state: _State, last: _State) -> str:
         """Return a message if a new position is too far from the last, or its stamp too old."""

@@ -5,11 +5,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Protocol
 
 from armid_ros.arm import ArmModel
-from armid_ros.motion import FloatArray, freeze, Motion
+from armid_ros.motion import FloatArray, Motion
 import numpy as np
 import numpy.typing as npt
 
@@ -24,76 +23,31 @@ class Path(Protocol):
         """Return the motion on the path at given times [s]."""
 
 
-@dataclass(frozen=True)
-class MeasuredPose:
+def staleness(joints: Sequence[str], seen: FloatArray, now: float, timeout: float) -> str:
     """
-    Latest measured positions of the joints of an arm, from all publishers.
+    Return a message if the position of a joint is older than a timeout; otherwise empty.
 
-    Attributes
+    Parameters
     ----------
-    joints : tuple of str
+    joints : sequence of str
         n joint names.
-    q : ndarray, shape (n,)
-        Latest positions [rad or m]; NaN if none was received.
     seen : ndarray, shape (n,)
-        Arrival time of each position [s]; minus infinity if none was received.
-    stamps : ndarray of int, shape (n,)
-        Timestamps of the positions [ns]; a message with the same stamp is ignored.
+        Arrival time of the latest position [s]; minus infinity if none was received.
+    now, timeout : float
+        Time, and largest age of a position [s].
 
     """
-
-    joints: tuple[str, ...]
-    q: FloatArray
-    seen: FloatArray
-    stamps: npt.NDArray[np.int64]
-
-    def __post_init__(self) -> None:
-        """Freeze the arrays of positions and arrival times."""
-        freeze(self, 'q', 'seen')
-
-    @classmethod
-    def unknown(cls, joints: tuple[str, ...]) -> MeasuredPose:
-        """Return a measured pose without any received position."""
-        n = len(joints)
-        return cls(joints, np.full(n, np.nan), np.full(n, -np.inf), np.zeros(n, np.int64))
-
-    def updated(self, positions: npt.ArrayLike, stamp_ns: int, now: float) -> MeasuredPose:
-        """
-        Return the pose with the new positions of a joint state message.
-
-        Parameters
-        ----------
-        positions : array_like, shape (n,)
-            Positions [rad or m]; not finite for joints that the message does not have.
-        stamp_ns : int
-            Timestamp of the message [ns]; 0 if it has none.
-        now : float
-            Arrival time [s].
-
-        """
-        new = np.isfinite(positions)
-        if stamp_ns:
-            new &= self.stamps != stamp_ns
-        return MeasuredPose(
-            self.joints,
-            np.where(new, positions, self.q),
-            np.where(new, now, self.seen),
-            np.where(new, stamp_ns, self.stamps),
-        )
-
-    def staleness(self, now: float, timeout: float) -> str:
-        """Return a message if a joint position is older than a timeout [s]; otherwise empty."""
-        age = now - self.seen
-        oldest = int(np.argmax(age))
-        if age[oldest] <= timeout:
-            return ''
-        joint = self.joints[oldest]
-        if not np.isfinite(age[oldest]):
-            return f"no position of joint '{joint}' was received"
-        return (
-            f"the last new position of joint '{joint}' came {age[oldest]:.2f} s ago, more than "
-            f'{timeout:g} s'
-        )
+    age = now - seen
+    oldest = int(np.argmax(age))
+    if age[oldest] <= timeout:
+        return ''
+    joint = joints[oldest]
+    if not np.isfinite(age[oldest]):
+        return f"no position of joint '{joint}' was received"
+    return (
+        f"the last new position of joint '{joint}' came {age[oldest]:.2f} s ago, more than "
+        f'{timeout:g} s'
+    )
 
 
 def tracking_fault(

@@ -4,11 +4,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 import math
 from typing import Any
 
 from armid_ros.excitation.pose_monitor import MIN_AGREEING, PoseMonitor
+from armid_ros.excitation.supervision import tracking_fault
 from armid_ros.motion import FloatArray
 from armid_ros.nodes.base import ArmidNode
 from armid_ros.nodes.messages.timeliness import StampDifference
@@ -34,6 +35,8 @@ class ArmWatch:
         Accepts or rejects measured positions.
     stamps : StampDifference
         Difference between the stamps and the clock of the node.
+    overloads : ndarray of int, shape (n,)
+        Number of the latest efforts of each joint that were too large, in a row.
 
     """
 
@@ -46,7 +49,7 @@ class ArmWatch:
         Parameters
         ----------
         node : ArmidNode
-            Node that subscribes.
+            Node that subscribes, with `PUBLISHER_PARAMETERS`.
         robot : Robot
             Robot with the position limits.
         tolerance : float
@@ -57,8 +60,9 @@ class ArmWatch:
         """
         self.monitor = PoseMonitor(robot, tolerance)
         self.stamps = StampDifference(node.get_clock())
-        self._efforts: tuple[Iterable[str], Iterable[float]] = (), ()
-        self._node, self._joints, self._on_state = node, robot.joints, on_state
+        self._efforts: dict[str, float] = {}
+        self.overloads = np.zeros(robot.n_joints, dtype=int)
+        self._node, self._robot, self._on_state = node, robot, on_state
         self._messages = JointStateMessages()
         self._steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._stepped_ns = 0
@@ -74,11 +78,16 @@ class ArmWatch:
             JointState, 'joint_states', self._on_joint_states, qos_profile_sensor_data, raw=True
         )
 
+    def take_effort(self) -> FloatArray:
+        """Return the efforts that arrived since the last call, (n,) [N m or N]; NaN: none."""
+        new, self._efforts = self._efforts, {}
+        return np.array([new.get(joint, math.nan) for joint in self._robot.joints])
+
     @property
-    def effort(self) -> FloatArray:
-        """Efforts in the last joint state, shape (n,) [N m or N]; NaN if missing."""
-        known = dict(zip(*self._efforts, strict=False))
-        return np.array([known.get(joint, math.nan) for joint in self._joints])
+    def behind(self) -> float:
+        """Return the time since the oldest stamp of the present positions [s]; NaN: no stamp."""
+        stamp, now = self.monitor.last_stamp_ns, self._node.get_clock().now().nanoseconds
+        return (now - stamp) * 1e-9 if stamp else math.nan
 
     def now(self) -> float:
         """Return the time for message ages [s]: of a steady clock, or of /clock if used."""
@@ -90,9 +99,59 @@ class ArmWatch:
             while (taken := self._states.handle.take_message(JointState, True)) is not None:
                 self._states.callback(taken[0])
 
+    def fault_since(self, q: FloatArray, behind: float, simulated: bool) -> str:
+        """Return why an arm that was at rest at `q` and `behind` may have moved; else empty."""
+        self.catch_up()
+        silence = self.behind - behind
+        if silence > self._node.value('state_timeout') and not simulated:
+            return f'no joint state was sent for {silence:.2g} s'
+        fault = self.monitor.contradiction(self.now(), 1)
+        # a controller covers 0.01 rad or m before the first waypoint, within `HANDOVER_TIME`
+        robot = self._robot
+        moved = tracking_fault(robot.joints, robot.position_units, q, self.monitor.q, 0.01)
+        return fault or moved
+
+    def fault_on_path(self, q: FloatArray, effort: FloatArray, largest: FloatArray) -> str:
+        """
+        Return why an arm does not follow its path; empty if it does.
+
+        A joint is off its planned position, or three of its efforts in a row are too large.
+
+        Parameters
+        ----------
+        q : ndarray, shape (n,)
+            Planned position [rad or m].
+        effort : ndarray, shape (n,)
+            Efforts of `take_effort` [N m or N].
+        largest : ndarray, shape (n,)
+            Largest planned effort of each joint [N m or N].
+
+        """
+        robot, factor = self._robot, self._node.value('effort_factor')
+        large = (factor * largest > 0.0) & (np.abs(effort) > factor * largest)
+        # joints may have different senders
+        known = ~np.isnan(effort)
+        self.overloads = np.where(known, np.where(large, self.overloads + 1, 0), self.overloads)
+        tolerance, units = self._node.value('tracking_tolerance'), robot.position_units
+        fault = tracking_fault(robot.joints, units, q, self.monitor.q, tolerance)
+        j = int(np.argmax(self.overloads))
+        if fault or self.overloads[j] < 3:
+            return fault
+        return (
+            f"the effort of joint '{robot.joints[j]}' is {abs(effort[j]):.3g} "
+            f'{robot.torque_units[j]}, more than effort_factor {factor:g} times the predicted '
+            f'{largest[j]:.3g}'
+        )
+
+    def interruption(self, gap: float) -> str:
+        """Return a message if a time without supervision [s] is too long; otherwise empty."""
+        if gap <= self._node.value('state_timeout'):
+            return ''
+        return f'the arm was not supervised for {gap:.2f} s, as no joint state was processed'
+
     def staleness(self, timeout: float) -> str:
-        """Return a message on joints without new positions for `timeout` [s]; empty if none."""
-        fault = self.monitor.pose.staleness(self.now(), timeout)
+        """Return a message on joints without a new position for `timeout` [s]; empty if none."""
+        fault = self.monitor.staleness(self.now(), timeout)
         topic = self._states.topic_name
         if (
             not fault
@@ -102,20 +161,13 @@ class ArmWatch:
             return fault
         return f'{fault}; the quality of service of the publisher of {topic} is incompatible'
 
-    def fault_at_start(self, timeout: float, difference: float, simulated: bool) -> str:
-        """
-        Return why the arm must not start now; empty if it may start.
-
-        Parameters
-        ----------
-        timeout : float
-            Age above which a position is too old [s].
-        difference : float
-            Largest permitted difference between stamps and the node's clock [s]; may be infinite.
-        simulated : bool
-            Whether the arm is simulated, which decides the remedy in the message.
-
-        """
+    def fault_at_start(self, simulated: bool) -> str:
+        """Return why the arm, real or simulated, must not be started now; otherwise empty."""
+        value = self._node.value
+        timeout = value('state_timeout')
+        # largest difference between stamps and the clock of the node [s]
+        difference = timeout if value('simulation') else 0.1 * value('stopping')
+        difference = math.inf if value('zero_stamp') else difference
         topic = self._states.topic_name
         fault = self._node.missing_clock
         if fault:
@@ -161,5 +213,5 @@ class ArmWatch:
         now = self._age_clock(clock_ns)
         self.monitor.update(message.names, message.position, message.velocity, stamp, now)
         self.stamps.take(stamp, clock_ns)
-        self._efforts = message.names, message.effort
+        self._efforts.update(zip(message.names, message.effort, strict=False))
         self._on_state(now)

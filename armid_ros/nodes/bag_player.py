@@ -11,7 +11,7 @@ import time
 from typing import Any
 
 from armid_ros.errors import ArmidError, RecordingError
-from armid_ros.excitation.supervision import jump_fault, MeasuredPose
+from armid_ros.excitation.supervision import jump_fault, staleness
 from armid_ros.nodes.base import ArmidNode
 from armid_ros.nodes.messages.classes import message_class
 from armid_ros.nodes.parameters.table import NodeParameter, setting
@@ -60,11 +60,13 @@ class _JumpGuard:
             reference = waypoints_of(deserialize_message(cdr, JointTrajectory))
         except ArmidError as error:
             return str(error)
-        pose = MeasuredPose.unknown(reference.joints)
-        for message, seen in self.latest.values():
+        joints, n = reference.joints, len(reference.joints)
+        measured, seen = np.full(n, np.nan), np.full(n, -np.inf)
+        for message, arrived in self.latest.values():
             known = dict(zip(message.name, message.position, strict=False))
-            pose = pose.updated([known.get(j, np.nan) for j in pose.joints], 0, seen)
-        lost = pose.staleness(time.monotonic(), self.timeout)
+            q = np.array([known.get(joint, np.nan) for joint in joints])
+            measured[np.isfinite(q)], seen[np.isfinite(q)] = q[np.isfinite(q)], arrived
+        lost = staleness(joints, seen, time.monotonic(), self.timeout)
         if lost:
             return f'trajectory: {self._states.topic_name}: {lost}; arm position unknown'
         speeds = reference.dq
@@ -72,10 +74,10 @@ class _JumpGuard:
             speeds = np.diff(reference.q, axis=0) / np.diff(reference.t)[:, np.newaxis]
         top = np.abs(speeds).max(axis=0, initial=0.0)
         # velocity limits, or for joints without a limit the top speeds of the trajectory
-        known = [self._limits.get(joint, np.inf) for joint in reference.joints]
-        fastest = np.where(np.isfinite(known), known, top)
+        limits = [self._limits.get(joint, np.inf) for joint in joints]
+        fastest = np.where(np.isfinite(limits), limits, top)
         first = (float(reference.t[0]), reference.q[0])
-        fault = jump_fault(reference.joints, first, pose.q, fastest, self.tolerance)
+        fault = jump_fault(joints, first, measured, fastest, self.tolerance)
         return f'trajectory: {fault}; bring the arm to its first point' if fault else ''
 
     def _on_joint_states(self, message: JointState) -> None:

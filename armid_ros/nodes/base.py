@@ -63,6 +63,8 @@ class ArmidNode(Node):
         The parameters of the node.
     complaints : Complaints
         Inputs that the node rejected.
+    ends : callable
+        Returns whether the process of the node was told to end.
 
     """
 
@@ -72,6 +74,7 @@ class ArmidNode(Node):
         """Create the node; other arguments are those of rclpy's Node."""
         super().__init__(name, **kwargs)
         self.complaints = Complaints(self.get_logger())
+        self.ends: Callable[[], bool] = lambda: False
         self._clock_missed = self._trouble_logged = False
         self._entries = declare(self, self.parameters())
         self.add_on_set_parameters_callback(self._validate)

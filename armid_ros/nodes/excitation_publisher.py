@@ -15,7 +15,7 @@ from armid_ros.errors import ArmidError, TrajectoryError
 from armid_ros.excitation import Excitation, plan_run, TransferPlanner
 from armid_ros.excitation.gate import Ending, MotionGate
 from armid_ros.excitation.schedule import load_excitation, read_excitation
-from armid_ros.excitation.supervision import HANDOVER_TIME, Rehearsal, tracking_fault
+from armid_ros.excitation.supervision import HANDOVER_TIME, Rehearsal
 from armid_ros.files import reading
 from armid_ros.nodes.arm_watch import ArmWatch
 from armid_ros.nodes.base import ArmidNode
@@ -32,6 +32,9 @@ from armid_ros.nodes.running.process import run
 from armid_ros.nodes.trajectory_controller import TrajectoryController, write_trajectory
 import numpy as np
 from std_msgs.msg import String
+
+#: Parameters of the end of a run, in the order of `Ending.updated`.
+_LIMITS = ('state_timeout', 'tracking_tolerance', 'stopping')
 
 
 class ExcitationPublisherNode(ArmidNode):
@@ -83,8 +86,9 @@ class ExcitationPublisherNode(ArmidNode):
         self._gate: MotionGate | None = None
         self._ending: Ending | None = None
         self._begun_ns, self._begun, self._tracked = 0, -math.inf, -math.inf
+        self._supervised = -math.inf
         self._trouble = self._rehearsed = ''
-        self._overloads, self._runs, self._outcome = 0, 0, 'ready'
+        self._runs, self._outcome = 0, 'ready'
         self._rehearsal: Rehearsal | None = None
         self._waiting = bool(self.value('start'))
         self._deadline = time.monotonic() + self.value('subscriber_timeout')
@@ -148,9 +152,9 @@ class ExcitationPublisherNode(ArmidNode):
             # no joint states were processed while the path was planned
             lost = self._arm.staleness(patience) if now - self._begun > patience else ''
             lost = lost or self._arm.monitor.contradiction(now)
-            lost = lost or self._controller.trouble(patience)
-            if lost:
-                self._abort(lost)
+            gone = self._controller.trouble(patience)
+            if lost or gone:
+                self._abort(lost or gone, blocked=not lost)
             return
         if self._gate is not None:
             self._finish_run(self._gate)
@@ -158,7 +162,7 @@ class ExcitationPublisherNode(ArmidNode):
         if self._rehearsal is not None:
             self._report_rehearsal(self._rehearsal)
         elif self._waiting:
-            missing = self._fault_at_start() or self._controller.missing
+            missing = self._arm.fault_at_start(self._simulated) or self._controller.missing
             if not missing:
                 try:
                     self.start()
@@ -184,8 +188,9 @@ class ExcitationPublisherNode(ArmidNode):
         """Plan a run at a share of the excitation's speed; send it to the controller."""
         self._waiting = False
         if self.elapsed is not None:
-            raise TrajectoryError('the excitation is under way; ~/stop ends it')
-        fault, begin = self._fault_at_start(), self._arm.monitor.pose.q
+            raise TrajectoryError('an excitation is under way; ~/stop ends it')
+        fault = self._arm.fault_at_start(self._simulated)
+        begin, behind = self._arm.monitor.q, self._arm.behind
         if fault:
             raise TrajectoryError(f'the arm is not started: {fault}')
         planned = plan_run(
@@ -202,11 +207,9 @@ class ExcitationPublisherNode(ArmidNode):
         first = max(math.ceil(HANDOVER_TIME * self._rate), 1)
         message = write_trajectory(motion.select(slice(first, None)))
         self._controller.discover()  # no time passes between the stamp and the sending
-        self._arm.catch_up()
-        pose, units = self._arm.monitor.pose, self._planner.arm.robot.position_units
-        fault = self._arm.monitor.contradiction(self._arm.now(), 1)
-        # a controller covers 0.01 rad or m before the first waypoint, within `HANDOVER_TIME`
-        fault = fault or tracking_fault(pose.joints, units, begin, pose.q, 0.01)
+        fault = self._arm.fault_since(begin, behind, self._simulated)
+        if self.ends():
+            fault = 'the node was told to end'
         if fault:
             raise TrajectoryError(f'the arm is not started: during planning, {fault}')
         now = self.get_clock().now()
@@ -215,21 +218,16 @@ class ExcitationPublisherNode(ArmidNode):
         receiver = self._controller.begin(message)
         # the controller starts when its own clock reaches the stamp
         late = self._arm.stamps.late if not (self.value('zero_stamp') or self._simulated) else 0.0
-        self._begun_ns, self._begun = now.nanoseconds, self._arm.now() + late
+        self._begun_ns = now.nanoseconds
+        self._begun = self._supervised = self._arm.now() + late
         self._gate, self._ending, self._rehearsal = gate, None, None
-        self._overloads, self._trouble, self._rehearsed = 0, '', ''
+        self._arm.overloads[:] = 0
+        self._trouble = self._rehearsed = ''
         self._runs, self._outcome = self._runs + 1, 'complete'  # unless the run is stopped
         return self.log(
             f'sent a run of {planned.duration:g} s, with {planned.approach.duration:.1f} s of '
             f'approach, to {receiver}'
         )
-
-    def _fault_at_start(self) -> str:
-        """Return why the joint states do not allow a start; empty if they do."""
-        patience = self.value('state_timeout')
-        difference = patience if self.value('simulation') else 0.1 * self.value('stopping')
-        difference = math.inf if self.value('zero_stamp') else difference
-        return self._arm.fault_at_start(patience, difference, self._simulated)
 
     def stop(self) -> str:
         """Stop the arm on its path; if it still moves later, send the stop again."""
@@ -248,7 +246,7 @@ class ExcitationPublisherNode(ArmidNode):
         if motion is None:
             return self.log('the stop was sent before')
         self._ending = replace(ending, last=motion, sent=now)
-        self._controller.send_stop_again(write_trajectory(motion))
+        self._controller.send_stop(write_trajectory(motion), again=True)
         return self.log('the arm was still on its path, and was stopped again')
 
     @property
@@ -275,18 +273,25 @@ class ExcitationPublisherNode(ArmidNode):
         return self._trouble or waiting or self._rehearsed, values
 
     def check(self, values: Mapping[str, Any]) -> None:
-        """Raise a TrajectoryError if the new excitation file cannot be used now."""
-        if 'file' not in values:
-            return
-        with reading("parameter 'file'", TrajectoryError):
-            if self.elapsed is not None:
-                raise TrajectoryError('an excitation is under way; ~/stop ends it')
-            self._loaded(values['file'])
+        """Raise a TrajectoryError if the new excitation file or clock cannot be used now."""
+        if 'use_sim_time' in values:
+            raise TrajectoryError("the times of a run need one clock: set 'use_sim_time' at start")
+        if 'file' in values:
+            with reading("parameter 'file'", TrajectoryError):
+                self._require_rest()
+                self._loaded(values['file'])
 
     def changed(self, names: frozenset[str]) -> None:
         """Load another excitation after a change of the parameter `file`."""
         if 'file' in names:
-            self._excitation = self._loaded(self.value('file'))
+            self._excitation, self._rehearsed = self._loaded(self.value('file')), ''
+
+    def _require_rest(self) -> None:
+        """Raise a TrajectoryError if the arm may move: checks of a path would block the node."""
+        if self.elapsed is not None:
+            raise TrajectoryError('an excitation is under way; ~/stop ends it')
+        if self._ending is not None and self._ending.reason:
+            raise TrajectoryError('whether the arm is at rest after its stop is not yet known')
 
     def _loaded(self, path: str) -> Excitation:
         if not path:
@@ -332,23 +337,19 @@ class ExcitationPublisherNode(ArmidNode):
         elapsed = self.elapsed
         if elapsed is None or self._gate is None:
             return
-        monitor, robot = self._arm.monitor, self._planner.arm.robot
-        pose, effort = monitor.pose, self._arm.effort
+        gap, self._supervised = now - self._supervised, now
+        gate, monitor, effort = self._gate, self._arm.monitor, self._arm.take_effort()
         stamp_ns = self.last_stamp_ns
         phase = (stamp_ns - self._begun_ns) * 1e-9
         strange = abs(phase - elapsed) > self.value('state_timeout')
         if not stamp_ns or (strange and not self._simulated):
             phase = elapsed  # the stamp is from another clock; simulated joint states may be late
         if self._rehearsal is not None:
-            self._rehearsal.add(phase, pose.q, effort)
-        tolerance = self.value('tracking_tolerance')
-        wanted = self._gate.run.at([phase]).q[0]
-        fault = tracking_fault(pose.joints, robot.position_units, wanted, pose.q, tolerance)
-        contradiction = monitor.contradiction(now)
-        overload = self._gate.overload(effort, self.value('effort_factor'))
-        self._overloads = self._overloads + 1 if overload else 0
-        if contradiction or fault or self._overloads >= 3:
-            self._abort(contradiction or fault or overload, blocked=not contradiction)
+            self._rehearsal.add(phase, monitor.q, effort)
+        unknown = self._arm.interruption(gap) or monitor.contradiction(now)
+        fault = self._arm.fault_on_path(gate.run.at([phase]).q[0], effort, gate.effort)
+        if unknown or fault:
+            self._abort(unknown or fault, blocked=not unknown)
 
     def _abort(self, reason: str, *, blocked: bool = False) -> None:
         """Stop the arm and log the reason; if it is blocked, hold it at its position."""
@@ -357,14 +358,18 @@ class ExcitationPublisherNode(ArmidNode):
         self._report_trouble(f'stopped {elapsed:.2f} s after the start: {reason}')
 
     def _stop_run(self, reason: str, blocked: bool = False) -> None:
-        """Send a motion that stops the arm on its path, or that holds a blocked arm."""
-        gate, now = self._gate, self._arm.now()
+        """Send the motion that stops the arm on its path, or holds an arm that is at rest."""
+        gate, monitor, now = self._gate, self._arm.monitor, self._arm.now()
         self._gate = self._rehearsal = None
         self._outcome = 'stopped'
         self._ending = Ending(gate, self._begun, None, now, reason, blocked)
-        measured = self._arm.monitor.pose.q, self._arm.monitor.velocity()
-        motion = gate.stop(now - self._begun, self.value('stopping'), *measured)
+        deviation = gate.deviation(monitor, self._begun)
+        motion = gate.stop(now - self._begun, self.value('stopping'), *deviation)
         self._ending = replace(self._ending, last=motion)
+        ending, held, refused = self._ending.updated(monitor, now, *map(self.value, _LIMITS))
+        # positions alone may be frozen while the arm moves
+        if held is not None and not refused and monitor.has_velocity:
+            self._ending, motion = ending, held
         self._controller.send_stop(write_trajectory(motion))
 
     def _current_ending(self) -> Ending | None:
@@ -379,17 +384,23 @@ class ExcitationPublisherNode(ArmidNode):
         ending = self._current_ending()
         if ending is None:
             return
-        limits = map(self.value, ('state_timeout', 'tracking_tolerance', 'stopping'))
-        self._ending, motion, report = ending.updated(self._arm.monitor, self._arm.now(), *limits)
+        monitor, now = self._arm.monitor, self._arm.now()
+        self._ending, motion, report = ending.updated(monitor, now, *map(self.value, _LIMITS))
         if motion is not None:
-            self._controller.send_stop_again(write_trajectory(motion))
+            self._controller.send_stop(write_trajectory(motion), again=True)
         if report:
             self._report_trouble(report)
 
     def _finish_run(self, gate: MotionGate) -> None:
         self._gate, end = None, gate.run.at([gate.run.duration])
-        self._ending = Ending(gate, self._begun, replace(end, t=np.zeros(1)), self._arm.now(), '')
-        self.log(f'run complete: {gate.run.duration:.1f} s, approach included')
+        now, last = self._arm.now(), replace(end, t=np.zeros(1))
+        lost = self._arm.interruption(now - self._supervised)
+        self._ending = Ending(gate, self._begun, last, now, lost)
+        if lost:  # such as by a suspension of the process
+            self._rehearsal, self._outcome = None, 'stopped'
+            self._report_trouble(f'the run is over: {lost}')
+        else:
+            self.log(f'run complete: {gate.run.duration:.1f} s, approach included')
 
     def _on_goal_ended(self, reason: str) -> None:
         """React to the end of a controller goal; `reason` is empty after a complete run."""
@@ -421,13 +432,13 @@ class ExcitationPublisherNode(ArmidNode):
             self._rehearsed = self.log(f'rehearsed: {report}; {advice}')
 
     def _on_experiment(self, message: String) -> None:
-        """Load an excitation from the topic experiment; it runs after ~/start only."""
-        if self.elapsed is not None or self._waiting:
-            raise TrajectoryError(
-                'an excitation is under way or begins soon; the new excitation is ignored'
-            )
+        """Load an excitation from the topic experiment; only ~/start runs it."""
+        if self._waiting:
+            raise TrajectoryError('an excitation begins soon; the new excitation is ignored')
+        self._require_rest()
         excitation = read_excitation(message.data, self._experiments.topic_name)
         self._excitation = checked(excitation, self._planner, self._experiments.topic_name)
+        self._rehearsed = ''
         self.log(f'received an excitation of {self._excitation.duration:g} s; ~/start runs it')
 
     def _report_trouble(self, text: str) -> None:

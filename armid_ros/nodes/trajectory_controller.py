@@ -125,8 +125,19 @@ class TrajectoryController:
         return int(self._publisher.get_subscription_count())
 
     @property
+    def rivals(self) -> str:
+        """Return the names of other nodes that can send trajectories to the topic."""
+        own = self._node.get_fully_qualified_name()
+        found = self._node.get_publishers_info_by_topic(self.topic)
+        names = {f'{p.node_namespace.rstrip("/")}/{p.node_name}' for p in found}
+        return ', '.join(sorted(names - {own}))
+
+    @property
     def missing(self) -> str:
-        """Return why no controller can receive a trajectory; empty if one can."""
+        """Return why no controller can receive a trajectory; empty if a controller can."""
+        servers = self._servers if self.client is not None else 0
+        if servers > 1:  # a goal would move the arms of all
+            return f'{servers} controllers offer the action {self.action}: stop the others'
         if self._ready:
             return ''
         if self._kind == 'action':
@@ -144,8 +155,8 @@ class TrajectoryController:
         return self._error if self.under_way else math.nan
 
     def poll(self) -> None:
-        """Create the action client once a controller offers the action."""
-        if self._possible and self.client is None and self._offered:
+        """Make an action client as soon as a controller offers the action."""
+        if self._possible and self.client is None and self._servers:
             self._make_client()
 
     def discover(self) -> None:
@@ -159,7 +170,7 @@ class TrajectoryController:
 
         """
         self.poll()
-        if self.client is not None and self._offered:
+        if self.client is not None and self._servers:
             deadline = time.monotonic() + 1.0  # the discovery of an action takes at most this long
             while not self._ready and time.monotonic() < deadline:
                 time.sleep(0.005)
@@ -169,24 +180,19 @@ class TrajectoryController:
     def begin(self, trajectory: JointTrajectory) -> str:
         """Send the trajectory of a run; return the name of the receiver."""
         self._by_action = self._ready
+        others = f'; {self.rivals} can also move the arm by {self.topic}' if self.rivals else ''
         if self._by_action:
             names = ('tracking_tolerance', 'goal_tolerance', 'goal_time_tolerance')
             self._send_goal(trajectory, *map(self._node.value, names))
-            return f'the action {self.action}'
+            return f'the action {self.action}{others}'
         self._publisher.publish(trajectory)
-        return f'{self.readers} subscribers'
+        return f'{self.readers} subscribers{others}'
 
-    def send_stop(self, trajectory: JointTrajectory) -> None:
-        """Send a stop trajectory in the way in which the run was sent: as goal or message."""
+    def send_stop(self, trajectory: JointTrajectory, again: bool = False) -> None:
+        """Send a stop trajectory like that of the run; a repeated one always as a message, too."""
         if self._by_action:
             self._send_goal(trajectory, NO_TOLERANCE, NO_TOLERANCE)
-        else:
-            self._publisher.publish(trajectory)
-
-    def send_stop_again(self, trajectory: JointTrajectory) -> None:
-        """Send a stop trajectory as message and, if the run is a goal, as goal too."""
-        self.send_stop(trajectory)
-        if self._by_action:
+        if again or not self._by_action:
             self._publisher.publish(trajectory)
 
     def trouble(self, patience: float) -> str:
@@ -225,8 +231,9 @@ class TrajectoryController:
             self.client.destroy()
 
     @property
-    def _offered(self) -> bool:
-        return bool(self._node.count_publishers(f'{self.action}/_action/feedback'))
+    def _servers(self) -> int:
+        """Number of controllers that offer the action."""
+        return int(self._node.count_publishers(f'{self.action}/_action/feedback'))
 
     @property
     def _ready(self) -> bool:

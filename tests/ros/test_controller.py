@@ -3,6 +3,7 @@
 """The excitation publisher in front of a trajectory controller, with what can go wrong there."""
 
 from armid_ros.arm import ArmModel
+from armid_ros.errors import TrajectoryError
 from armid_ros.excitation import save_excitation, transfer_limits, TransferPlanner
 from armid_ros.excitation.schedule import excitation_text
 from armid_ros.nodes.excitation_publisher import ExcitationPublisherNode
@@ -75,6 +76,8 @@ def test_a_controller_that_keeps_going_is_stopped_again_and_reported(bench, arm,
     node.stop()
     arm.run(103.2)
     assert 'emergency stop' in node.condition()[0]
+    with pytest.raises(TrajectoryError, match='at rest'):
+        node._on_experiment(String(data=excitation_text(excitation)))
     arm.faults.deaf = False
     arm.run(105.5)
     np.testing.assert_allclose(arm.state(arm.now).dq, 0.0, atol=1e-9)
@@ -116,6 +119,8 @@ def test_a_rehearsal_is_slow_and_reports_how_the_arm_followed(bench, arm, excita
     assert all(fact in said for fact in ('rehearsed', '~/start', '100 %'))
     assert any(joint in said for joint in ROBOT.joints)
     assert len(arm.accepted) == 1
+    node._on_experiment(String(data=excitation_text(excitation.at_speed(0.4, 100.0))))
+    assert 'rehearsed' not in node.condition()[0]  # another path
 
 
 def test_with_a_zero_stamp_a_controller_of_another_clock_begins_at_once(bench, excitation):

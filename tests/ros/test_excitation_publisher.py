@@ -135,6 +135,20 @@ def test_joint_states_of_two_publishers_make_one_pose(bench, excitation):
     assert bench.call('excitation_publisher/start').success
 
 
+def test_two_publishers_of_a_joint_do_not_start_whatever_their_order(bench, excitation):
+    """As a simulated arm beside the real one, at the same pose."""
+    waiting(bench, excitation)
+    listening(bench)
+    first, second = (bench.matched_publisher(JointState, 'joint_states') for _ in range(2))
+    for seconds in STANDS:
+        bench.tick(round(seconds * SECOND))
+        first.publish(joint_state(seconds, JOINTS, HOME))
+        second.publish(joint_state(seconds, JOINTS[::-1], HOME[::-1]))
+        bench.settle()
+    answer = bench.call('excitation_publisher/start')
+    assert not answer.success and 'publishers' in answer.message
+
+
 def test_from_a_pose_that_is_not_free_it_does_not_start(bench, plan):
     waiting(bench, None, file=str(plan / 'excitation.yaml'), rate=50.0, floor='-0.3')
     heard = listening(bench)
@@ -214,23 +228,28 @@ def test_a_controller_that_starts_later_is_not_set_in_motion(bench, arm, excitat
     assert not late
 
 
-def test_a_blocked_arm_is_stopped_on_its_path_and_then_held_where_it_stands(
-    bench, arm, excitation
+@pytest.mark.parametrize('whole', [False, True])
+def test_a_blocked_arm_is_stopped_on_its_path_and_held_where_it_stands(
+    bench, arm, excitation, whole
 ):
+    """An arm whose joints all stand is held at once, as after a restart of the controller."""
     diagnostics = bench.diagnostics()
     node = begun(bench, arm, excitation, tracking_tolerance=0.1)
     arm.run(102.2)
     path, where = waypoints_of(arm.accepted[0]), arm.q.copy()
-    arm.faults.stuck = slice(None)
+    stuck = slice(None) if whole else [int(np.argmax(np.abs(arm.state(arm.now).dq)))]
+    arm.faults.stuck = stuck
     arm.run(104.2, step=0.05)
-    assert [seconds_of(m.header.stamp) for m in arm.accepted[1:]] == [0.0, 0.0]
-    stop, hold = (waypoints_of(message) for message in arm.accepted[1:])
+    assert {seconds_of(m.header.stamp) for m in arm.accepted[1:]} == {0.0}
+    *stops, hold = (waypoints_of(message) for message in arm.accepted[1:])
+    assert len(stops) == (0 if whole else 1)
     ahead = path.sample(2.0 + np.linspace(0.0, 2.0, 4001)).q
-    assert max(np.abs(ahead - q).max(axis=1).min() for q in stop.q) < 2e-3
-    np.testing.assert_allclose(hold.q, [where, where], atol=1e-9)
+    for stop in stops:
+        assert max(np.abs(ahead - q).max(axis=1).min() for q in stop.q) < 2e-3
+        curve = hold.for_robot(ROBOT).after(stop.q[-1], np.zeros(6), np.zeros(6))
+        curve.require_limits(ROBOT, 0.001)
+    np.testing.assert_allclose(hold.q[:, stuck], [where[stuck]] * 2, atol=1e-9)
     np.testing.assert_allclose(hold.dq, 0.0, atol=1e-9)
-    curve = hold.for_robot(ROBOT).after(stop.q[-1], np.zeros(6), np.zeros(6))
-    curve.require_limits(ROBOT, 0.001)
     message = bench.diagnose(node, diagnostics).message
     assert any(joint in message for joint in JOINTS) and '0.1 rad' in message
 

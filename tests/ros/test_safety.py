@@ -12,10 +12,12 @@ from armid_ros.excitation import (
     CollisionScene,
     Excitation,
     Limits,
+    plan_run,
     random_feasible,
     transfer_limits,
     TransferPlanner,
 )
+from armid_ros.nodes import excitation_publisher
 from armid_ros.nodes.excitation_publisher import ExcitationPublisherNode
 from armid_ros.robots import load_robot
 from builtin_interfaces.msg import Time
@@ -108,15 +110,13 @@ class Bed:
         q, dq = state.q[0], state.dq[0]
         if np.any(q < ROBOT.lower - 1e-6) or np.any(q > ROBOT.upper + 1e-6):
             self.violations.append(f'{arm.now:.2f} s: outside the limits: {q}')
-        moved = np.abs(q - self._before)
+        moved, ratio = np.abs(q - self._before), np.abs(state.ddq[0]) / self.accelerations
         if arm.faults.stuck is not None:
-            moved[arm.faults.stuck] = (
-                0.0  # a controller begins where the arm is, not its set point
-            )
+            # a controller begins where the arm is, not its set point
+            moved[arm.faults.stuck] = ratio[arm.faults.stuck] = 0.0
         if np.any(np.abs(dq) > self.limit) or np.any(moved > self.limit * self.dt + 1e-4):
             self.violations.append(f'{arm.now:.2f} s: too fast: {dq}, {moved / self.dt}')
         if self.paths:
-            ratio = np.abs(state.ddq[0]) / self.accelerations
             if ratio.max() > 1.05:
                 self.violations.append(f'{arm.now:.2f} s: {ratio.max():.2f} x the acceleration')
             away = min(np.abs(path - q).max(axis=1).min() for path in self.paths)
@@ -129,6 +129,11 @@ class Bed:
     def run(self, seconds):
         for _ in range(round(seconds / self.dt)):
             self.step()
+
+    def suspend(self, seconds):
+        """Let time go by without the node, and without a check of the set point."""
+        self.arm.now = round(self.arm.now + round(seconds / self.dt) * self.dt, 6)
+        self._before = self.arm.state(self.arm.now).q[0]
 
     def call(self, name):
         """Call a service; what it refuses is no violation."""
@@ -235,6 +240,146 @@ def test_wrong_positions_do_not_move_the_arm(bench, excitation, value, count):
         assert np.abs(bed.arm.state(bed.arm.now).dq).max() < 1e-3
     if count == 1 and value != 'just beyond the tolerance':
         assert bed.node.elapsed is not None
+
+
+def test_a_second_sender_that_begins_at_the_same_pose_stops_the_arm(bench, excitation):
+    bed, stands = Bed(bench, excitation), []
+
+    def joined(messages):
+        stands.extend(messages[:1] if not stands else ())
+        (message,) = messages
+        second = JointState(header=message.header, name=stands[0].name[::-1])
+        second.position = stands[0].position[::-1]
+        return [message, second]
+
+    bed.changes.append(joined)
+    bed.run(0.6)
+    assert not bed.call('start')
+    bed.run(3.0)
+    assert bed.node.elapsed is None and 'publisher' in bed.node.condition()[0]
+    assert np.abs(bed.arm.state(bed.arm.now).dq).max() < 1e-3
+    assert not bed.violations
+
+
+def with_gripper(messages):
+    """Return messages beside those of another device."""
+    return [
+        x
+        for m in messages
+        for x in (JointState(header=m.header, name=['finger'], position=[0.0]), m)
+    ]
+
+
+def by_halves(messages):
+    """Return messages of two drivers of one arm."""
+    fields = ('name', 'position', 'velocity', 'effort')
+    return [
+        JointState(header=m.header, **{f: getattr(m, f)[half] for f in fields})
+        for m in messages
+        for half in (slice(3), slice(3, None))
+    ]
+
+
+@pytest.mark.parametrize('change', [with_gripper, by_halves])
+@pytest.mark.parametrize('count', [1, 10**6])
+def test_efforts_of_one_of_several_senders_are_compared(bench, excitation, change, count):
+    bed, left = Bed(bench, excitation, effort_factor=2.0), [count]
+
+    def loaded(messages):
+        for message in messages if bed.node.elapsed and left[0] > 0 else ():
+            message.effort = [50.0, *list(message.effort)[1:]]
+            left[0] -= 1
+        return messages
+
+    bed.changes += [loaded, change]
+    bed.run(0.6)
+    assert not bed.call('start')
+    bed.run(0.5)
+    assert (bed.node.elapsed is None) == (count > 1)
+
+
+@pytest.mark.parametrize('tolerance', [0.002, 0.02])
+def test_a_stuck_joint_is_not_pushed_after_the_stop(bench, excitation, tolerance):
+    """The set point goes back by what it went on after the fault, however much that is."""
+    bed = Bed(bench, excitation, step=0.005, tracking_tolerance=tolerance)
+    bed.run(0.6)
+    assert not bed.call('start')
+    bed.run(1.6)
+    joint = int(np.argmax(np.abs(bed.arm.state(bed.arm.now).dq)))
+    bed.arm.faults.stuck = joint
+    bed.run(3.0)
+    pushes = np.abs(np.array(bed.set_points)[:, joint] - bed.arm.q[joint])[-600:]
+    assert pushes.max() > 3.0 * tolerance and pushes[-1] < 1e-3
+    assert not bed.violations
+
+
+def test_frozen_positions_without_velocities_do_not_turn_the_arm_round(bench, excitation):
+    bed, frozen = Bed(bench, excitation), []
+
+    def freeze(messages):
+        for message in messages:
+            message.velocity = []
+            if bed.node.elapsed and bed.node.elapsed > 1.5:
+                frozen.append(message.position)
+                message.position = frozen[0]
+        return messages
+
+    bed.changes.append(freeze)
+    bed.run(0.6)
+    assert not bed.call('start')
+    bed.run(3.0)
+    stop = np.array([point.positions for point in bed.arm.accepted[1].points])
+    away = [np.abs(bed.paths[0] - q).max(axis=1).min() for q in stop]
+    assert max(away) < 0.01 and not bed.violations
+
+
+def test_an_arm_that_was_not_heard_of_while_it_was_planned_is_not_started(
+    bench, excitation, monkeypatch
+):
+    bed = Bed(bench, excitation)
+    bed.run(0.6)
+
+    def planning(*args, **options):
+        bed.arm.now += 0.6
+        return plan_run(*args, **options)
+
+    monkeypatch.setattr(excitation_publisher, 'plan_run', planning)
+    assert 'no joint state' in bed.call('start')
+    bed.run(0.6)
+    bed.node.ends = lambda: True
+    monkeypatch.undo()
+    assert 'end' in bed.call('start')
+    assert not bed.arm.accepted
+
+
+@pytest.mark.parametrize('seconds', [1.0, 60.0])
+def test_a_process_that_is_suspended_says_so(bench, excitation, seconds):
+    """As by Ctrl-Z: the arm goes on, and the first message is heard before a timer is called."""
+    bed = Bed(bench, excitation)
+    bed.run(0.6)
+    assert not bed.call('start')
+    bed.run(1.0)
+    bed.suspend(seconds)
+    bed.run(1.0)
+    assert bed.node.activity == 'stopped' and 'not supervised' in bed.node.condition()[0]
+    assert not bed.violations
+
+
+def test_without_joint_states_it_is_unknown_whether_the_arm_has_stopped(bench, excitation):
+    bed = Bed(bench, excitation)
+    bed.run(0.6)
+    assert not bed.call('start')
+    bed.run(1.5)
+    bed.changes.append(lambda messages: [])
+    bed.run(3.0)
+    assert 'unknown' in bed.node.condition()[0] and not bed.violations
+    assert len(bed.arm.accepted[1].points) > 40  # all of the way to rest, at 100 Hz
+
+
+def test_the_clock_of_a_run_cannot_be_changed(bench, excitation):
+    bed = Bed(bench, excitation)
+    result = bed.node.set_parameters([Parameter('use_sim_time', value=True)])[0]
+    assert not result.successful and 'clock' in result.reason
 
 
 def stamped(message, seconds):
@@ -388,7 +533,7 @@ def test_at_1_khz_the_first_stop_comes_within_20_ms(bench, excitation, fault):
 def event(bed, rng):
     """Let something happen that nobody planned."""
     joint = int(rng.integers(6))
-    kind = rng.integers(11)
+    kind = rng.integers(12)
     name = list(VALUES)[rng.integers(len(VALUES))]
     value, bed.displaced = VALUES[name], bed.displaced or name == 'just beyond the tolerance'
     if kind < 3:
@@ -406,6 +551,8 @@ def event(bed, rng):
     elif kind == 8:
         bed.changes.clear()
         bed.offset = 0.0
+    elif kind == 9:
+        bed.suspend(rng.uniform(0.1, 3.0))
     else:
         bed.call(rng.choice(['start', 'stop', 'rehearse']))
 

@@ -262,6 +262,14 @@ def test_a_controller_that_is_gone_is_said(bench, arm, excitation):
     assert f'/{NAME}' in node.condition()[0]
 
 
+def test_two_controllers_of_an_action_are_not_started(bench, arm, excitation, stubborn):
+    node = publisher(bench, arm, excitation)
+    bench.spin_until(lambda: node._controller._servers == 2, 'the second controller')
+    answer = bench.call('excitation_publisher/start')
+    assert not answer.success and '2 controllers' in answer.message
+    assert not stubborn.handles
+
+
 def test_without_an_action_the_topic_is_used_unless_the_action_is_required(bench, excitation):
     arm = Controller(bench, ROBOT, HOME)
     node = publisher(bench, arm, excitation)

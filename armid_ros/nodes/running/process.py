@@ -123,6 +123,7 @@ def run(make_node: Callable[[], ArmidNode], args: Sequence[str] | None = None) -
         executor = kinds[node.value('executor')]()
         executor.add_node(node)
         ending.with_parent = node.value('end_with_parent')
+        node.ends = lambda: ending.due
         with steady():
             while rclpy.ok() and not (node.finished or ending.due):
                 executor.spin_once(timeout_sec=0.1)  # without this, the events executor hangs
