@@ -15,7 +15,7 @@ from armid_ros.excitation.supervision import jump_fault, staleness
 from armid_ros.nodes.base import ArmidNode
 from armid_ros.nodes.messages.classes import message_class
 from armid_ros.nodes.parameters.table import NodeParameter, setting
-from armid_ros.nodes.qos import offered
+from armid_ros.nodes.qos import offered, STREAM
 from armid_ros.nodes.running.process import run
 from armid_ros.recording.bag import Bag
 from armid_ros.recording.message_types import JOINT_TRAJECTORY
@@ -93,7 +93,9 @@ class BagPlayerNode(ArmidNode):
     """
     Node that publishes the messages of a bag, unchanged.
 
-    A JointTrajectory is sent only if no joint of the arm on joint_states would jump.
+    A JointTrajectory is sent only if no joint of the arm on joint_states would jump. It is not
+    latched, so a controller that starts later does not move the arm. The end of the node does not
+    stop the arm.
 
     If the bag also has joint_states, its trajectories are sent only if no other node publishes
     joint_states. With use_sim_time, the bag is played along the time of /clock.
@@ -271,9 +273,13 @@ class BagPlayerNode(ArmidNode):
         for name, topic in topics.items():
             if (self._wanted and name not in self._wanted) or name == '/clock':
                 continue
+            # a controller that starts later must not move the arm
+            moves = topic.type_name == JOINT_TRAJECTORY
             try:
                 publishers[topic.name] = self.create_publisher(
-                    message_class(topic.type_name), topic.name, offered(topic.qos)
+                    message_class(topic.type_name),
+                    topic.name,
+                    STREAM if moves else offered(topic.qos),
                 )
             except RecordingError as error:
                 self.complaints.add('topic', f'{name} is not played: {error}')
@@ -296,7 +302,10 @@ class BagPlayerNode(ArmidNode):
         if guard is not None and message.topic in self._descriptions:
             guard.describe(message.cdr)
         if guard is not None and message.topic in self._trajectories:
-            if not self._has_states:
+            publisher = self._topics[message.topic]
+            if not self._has_states and not publisher.get_subscription_count():
+                self._refused = f'trajectory: no node subscribes to {publisher.topic_name}'
+            elif not self._has_states:
                 self._refused = guard.objection(message.cdr) or self._refused
             elif self.count_publishers(self._states) > 1:
                 self._refused = (

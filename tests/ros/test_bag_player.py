@@ -5,7 +5,7 @@
 from armid_ros.errors import ArmidError
 from armid_ros.motion import Motion
 from armid_ros.nodes.bag_player import BagPlayerNode
-from armid_ros.nodes.qos import LATCHED
+from armid_ros.nodes.qos import LATCHED, STREAM
 from armid_ros.recording import write_joint_trajectory, write_recording
 from armid_ros.recording.bag import Bag
 from armid_ros.recording.writer import BagWriter
@@ -105,7 +105,7 @@ def plan(tmp_path):
 
 def played(bench, plan, states, **parameters):
     """Play a plan to an arm that reports some states, and return the player and what was sent."""
-    heard = bench.listen(JointTrajectory, 'joint_trajectory', LATCHED)
+    heard = bench.listen(JointTrajectory, 'joint_trajectory', STREAM)
     player = bench.add(BagPlayerNode, bag=plan, **{'subscriber_timeout': 0.5, **parameters})
     drivers = bench.probe.create_publisher(JointState, 'joint_states', 10)
     bench.spin_until(drivers.get_subscription_count, 'joint_states')
@@ -119,6 +119,15 @@ def played(bench, plan, states, **parameters):
 def test_a_trajectory_is_sent_to_an_arm_that_is_where_it_begins(bench, plan):
     player, heard = played(bench, plan, [(['b', 'a'], [-0.2, 0.1])], subscriber_timeout=60.0)
     assert len(heard) == 1 and not player.failure
+    late = bench.listen(JointTrajectory, 'joint_trajectory', LATCHED)
+    bench.settle()
+    assert not late
+
+
+def test_a_trajectory_that_nobody_takes_is_a_failure(bench, plan):
+    player = bench.add(BagPlayerNode, bag=plan, subscriber_timeout=0.0)
+    bench.spin_until(lambda: player.finished)
+    assert '/joint_trajectory' in player.failure and not player.published['/joint_trajectory']
 
 
 @pytest.mark.parametrize(
@@ -149,7 +158,7 @@ def test_the_trajectory_of_a_recording_is_kept_from_another_arm(bench, bag, plan
                         for message in read.messages():
                             if message.topic == topic.name:
                                 writer.write(topic.name, message.cdr, 7 * SECOND)
-    heard = bench.listen(JointTrajectory, 'joint_trajectory', LATCHED)
+    heard = bench.listen(JointTrajectory, 'joint_trajectory', STREAM)
     bench.probe.create_publisher(JointState, 'joint_states', 10)
     player = bench.add(BagPlayerNode, bag=str(whole), subscriber_timeout=0.0, rate=100.0)
     bench.spin_until(lambda: player.finished)
