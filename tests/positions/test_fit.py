@@ -67,3 +67,15 @@ def test_positions_determine_delay_gains_friction_and_tool(robot, secret, run):
     noise = np.hypot(secret.noise, secret.resolution / np.sqrt(12.0))
     np.testing.assert_allclose(unaided.residual, noise, rtol=0.1)
     assert np.all(unaided.tracking > 20.0 * unaided.residual)
+
+
+@pytest.mark.long
+def test_viscous_friction_and_velocity_gain_are_one_without_commanded_velocities(robot, secret):
+    quiet = replace(secret, velocities=False)
+    measured, commanded = play(robot, quiet, np.random.default_rng(6), duration=SECONDS)
+    run = measured, CommandedMotion.of(commanded, measured)
+    found = fit_positions(LoopModel(robot), [run])
+    for joint in robot.joints:
+        assert np.isinf(found.of('viscous_coefficient', joint)[1])
+        assert np.isfinite(found.of('coulomb_torque', joint)[1])
+    assert any('give --gains' in reason for reason in found.reasons)

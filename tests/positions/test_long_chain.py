@@ -28,14 +28,6 @@ def silent(robot, secret):
     return measured, CommandedMotion.of(commanded, measured)
 
 
-def test_viscous_friction_and_velocity_gain_are_one_without_commanded_velocities(robot, silent):
-    found = fit_positions(LoopModel(robot), [silent])
-    for joint in robot.joints:
-        assert np.isinf(found.of('viscous_coefficient', joint)[1])
-        assert np.isfinite(found.of('coulomb_torque', joint)[1])
-    assert any('give --gains' in reason for reason in found.reasons)
-
-
 def test_given_gains_separate_viscous_friction_and_wrong_ones_are_named(robot, secret, silent):
     gains = np.array([secret.kp, secret.kd])
     found = fit_positions(LoopModel(robot), [silent], gains)
