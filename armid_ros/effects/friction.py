@@ -193,7 +193,7 @@ class ThermalChange(ThermalFriction):
 
     """
 
-    quantities = (*ThermalFriction.quantities, replace(*ViscousFriction.quantities, lower=-np.inf))
+    quantities = (*ThermalFriction.quantities, *ViscousFriction.quantities)
 
     def law(self, x: JointStates) -> tuple[FloatArray, ...]:
         """Return the friction torque per unit of dFv and c: (1 - exp(-t / T)) dq and dq."""

@@ -129,10 +129,11 @@ def bounds_of_change(effect: Effect, arm: ArmModel) -> tuple[FloatArray, FloatAr
     """Return the smallest and largest change (P,) that keeps effect values in their bounds."""
     lower, upper = effect.bounds()
     there = {
-        name: value
+        (parameter.name, parameter.joint): value
         for own, values in zip(arm.effects, arm.values, strict=True)
-        if isinstance(effect, type(own)) and not own.shapes and not own.points
-        for name, value in zip(own.parameters(arm.robot), values.tolist(), strict=True)
+        if not own.shapes and not own.points
+        for parameter, value in zip(own.parameters(arm.robot), values.tolist(), strict=True)
     }
-    values = np.array([there.get(name, 0.0) for name in effect.parameters(arm.robot)])
+    names = [(parameter.name, parameter.joint) for parameter in effect.parameters(arm.robot)]
+    values = np.array([there.get(name, 0.0) for name in names])
     return lower - values, upper - values

@@ -122,7 +122,9 @@ class JointFit:
             The effects with their initial values.
 
         """
-        linear, named = self.linear(named), tuple(named)
+        start = np.zeros(sum(len(own.kept) + len(own.effect.shape) for own in named))
+        named = step_within_bounds(self.arm, named, start)
+        linear = self.linear(named)
         posterior = linear.posterior(self.hyperparameters, self.recordings)
         loss = self._loss(named)
         # the comparison has refined the shapes, so four Gauss-Newton steps suffice

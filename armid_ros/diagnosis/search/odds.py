@@ -279,13 +279,9 @@ def fit_causes(
     numbers = zip(factor.tolist(), explained.tolist(), size.tolist(), strict=True)
     arrays = zip(numbers, values, std, resolution, strict=True)
     fits = [CauseFit(*three, *rest) for three, *rest in arrays]
-    possible = [
-        log_probability_in_bounds(*one, nuisance) for one in zip(causes, fits, strict=True)
-    ]
-    return [
-        replace(fit, factor=fit.factor + own, in_bounds=own)
-        for fit, own in zip(fits, possible, strict=True)
-    ]
+    bounds = [log_probability_in_bounds(*one, nuisance) for one in zip(causes, fits, strict=True)]
+    pairs = zip(fits, bounds, strict=True)
+    return [replace(fit, factor=fit.factor + own, in_bounds=own) for fit, own in pairs]
 
 
 def log_probability_in_bounds(cause: Cause, fit: CauseFit, nuisance: Nuisance) -> float:
