@@ -178,7 +178,7 @@ def find_mistake(
         return found
 
     delay = torque_delay(robot, recording, used)
-    tried = rows([*hypotheses(robot, slow), *([] if delay is None else [delay])])
+    tried = rows([*hypotheses(robot, slow), *([] if delay is None else [delayed(*delay)])])
     for ratio in ('as_described', 'as_fitted'):
         tried += rows(max(tried, key=attrgetter(ratio)).hypothesis.nearby())
     # hypotheses with which the model predicts the corrected data
@@ -244,9 +244,16 @@ def slow_motions(recordings: Sequence[Recording], used: Conditioning) -> list[Mo
     return result
 
 
-def torque_delay(robot: Robot, recording: Recording, used: Conditioning) -> Hypothesis | None:
+class Delay(NamedTuple):
+    """Delay of a torque, negative if early, and half-width of its 95 % interval [s]."""
+
+    seconds: float
+    half_width: float
+
+
+def torque_delay(robot: Robot, recording: Recording, used: Conditioning) -> Delay | None:
     """
-    Return the hypothesis that torques are delayed; None if the 95 % interval includes zero.
+    Return the delay of torques behind positions; None if its 95 % interval includes zero.
 
     A delay shifts the whole torque in time. Presliding friction delays only the friction: after a
     reversal it grows with the distance that the joint has travelled (Dahl 1968), which takes tens
@@ -276,7 +283,7 @@ def torque_delay(robot: Robot, recording: Recording, used: Conditioning) -> Hypo
         # a smaller step [s], or a small share of the interval, changes no decision
         if abs(seconds - before) < max(1e-4, 0.05 * half):
             break
-    return delayed(seconds, float(half)) if abs(seconds) > half else None
+    return Delay(seconds, float(half)) if abs(seconds) > half else None
 
 
 def _delay_rows(robot: Robot, motion: Motion, used: Conditioning) -> tuple[FloatArray, ...]:
