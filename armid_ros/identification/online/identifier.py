@@ -141,8 +141,9 @@ class OnlineIdentifier:
         window = max(1, round(4.0 / self._row_period))  # 4 s, beyond the correlation of errors
         self._scores = RobustCovariance(window, settings.forgetting, self._work)
         self._watch = None
-        if settings.false_alarm_time is not None:
-            watched = NuisanceRows(arm, settings.cutoff), change_candidates(arm, self.base)
+        candidates = change_candidates(arm, self.base)
+        if settings.false_alarm_time is not None and candidates:
+            watched = NuisanceRows(arm, settings.cutoff), candidates
             self._watch = ChangeWatch(
                 self._estimator, *watched, settings.false_alarm_time, self._work
             )
@@ -295,7 +296,7 @@ class OnlineIdentifier:
                 raise IdentificationError(
                     f'the setting {setting.name} cannot change now; restart the identification'
                 )
-        if self._watch is None and settings.false_alarm_time is not None:
+        if self.settings.false_alarm_time is None and settings.false_alarm_time is not None:
             raise IdentificationError(
                 'false_alarm_time cannot be set now, as change detection was off at the start; '
                 'restart the identification'
