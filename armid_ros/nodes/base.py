@@ -64,7 +64,7 @@ class ArmidNode(Node):
     complaints : Complaints
         Inputs that the node rejected.
     ends : callable
-        Returns whether the process of the node was told to end.
+        Returns whether a signal ends the process of the node.
 
     """
 

@@ -209,7 +209,7 @@ class ExcitationPublisherNode(ArmidNode):
         self._controller.discover()  # no time passes between the stamp and the sending
         fault = self._arm.fault_since(begin, behind, self._simulated)
         if self.ends():
-            fault = 'the node was told to end'
+            fault = 'a signal ends the node'
         if fault:
             raise TrajectoryError(f'the arm is not started: during planning, {fault}')
         now = self.get_clock().now()

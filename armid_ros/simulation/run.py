@@ -192,9 +192,7 @@ def _simulated_motion(
                     f'{plant.robot.joints[joint]} is faster than {_MAX_SPEED:g} rad/s (or m/s) '
                     f'after {plant.dt * (done + step):.3g} s'
                 )
-            # with springs, the acceleration at the beginning of a step; else the mean over it
-            ddq = ddq[1:] if plant.springs is None else ddq[:-1]
-            motors = np.stack([q[:-1], dq[:-1], ddq])
+            motors = np.stack([q[:-1], dq[:-1], ddq[:-1] if plant.springs else ddq[1:]])
             pieces.append((motors, trace.links[:, :-1], trace.tau[np.newaxis, :-1]))
             done = trace.state.steps
             if progress is not None:
