@@ -157,7 +157,7 @@ def test_a_recording_of_other_joints_is_refused(runs):
 
 def test_what_lies_inside_of_results_prints_in_a_few_lines(model, runs):
     """A person looks at these, too; arrays of a recording are no answer."""
-    for one in (model.estimate, model.core, model.arm.robot, *model.predict(runs[0])):
+    for one in (runs[0], model.estimate, model.core, model.arm.robot, *model.predict(runs[0])):
         assert len(repr(one)) < 800
         assert len(repr(one).splitlines()) <= 11
 
