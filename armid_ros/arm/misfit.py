@@ -134,7 +134,7 @@ def misfit_of_block(block: Any) -> Misfit:
                 raise ModelError(f'misfit: {", ".join(RowFilters._fields)} have to be positive')
             filters = RowFilters(found[0], found[1], round(found[2]))
     except (AttributeError, KeyError, TypeError) as fault:
-        raise ModelError(f'misfit: invalid content: {type(fault).__name__} {fault}') from fault
+        raise ModelError(f'entry misfit of the model file is malformed: {fault}') from fault
     if data not in _DATA:
         raise ModelError(f"misfit: 'data' is '{data}', but has to be {' or '.join(_DATA)}")
     if loud is not None and not loud.keys() >= rms.keys():

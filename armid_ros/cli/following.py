@@ -74,7 +74,7 @@ def next_command(then: str, result: Shown) -> str:
 def _subject(
     then: str, result: Shown, given: dict[str, Any]
 ) -> tuple[str | Path, list[Path], list[Any]]:
-    """Return robot, recordings and further options of the next command."""
+    """Return robot, recordings and options of the command that the user is advised to run next."""
     robot, out = given.get('robot_source'), Path(given.get('out') or '')
     bags = list(given.get('bags') or filter(None, [given.get('bag')]))
     more: list[Any] = []

@@ -188,7 +188,7 @@ def with_packages(context: click.Context, source: str | None) -> str | None:
             raise click.BadParameter(f"'{text}' has to be PACKAGE=FOLDER", param_hint='--package')
         if source in (None, '-'):
             raise click.BadParameter(
-                f"'{text}': a package folder needs a description file, --robot FILE",
+                f"'{text}': a package folder is used only with --robot FILE, a description",
                 param_hint='--package',
             )
         written.append(shlex.quote(f'package:{name}:={Path(folder).resolve()}'))

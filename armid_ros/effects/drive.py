@@ -89,7 +89,7 @@ class TorqueRipple(JointLaw):
         return (np.array(orders),)
 
     def plausible(self, values: FloatArray, std: FloatArray, arm: Arm) -> bool:
-        """Return whether gravity and springs cannot explain a ripple of this order."""
+        """Return whether the ripple order is too high for torques of gravity or springs."""
         return bool(np.all(self.shape_values > 1.05 * _MIN_RIPPLE_ORDER))
 
     def law(self, x: JointStates) -> tuple[FloatArray, ...]:

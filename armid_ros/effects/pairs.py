@@ -145,7 +145,7 @@ class JointCoupling(_Pairs):
     """
 
     name = 'joint_coupling'
-    summary = 'elastic coupling of two joints by a cable or tendon'
+    summary = 'cable or tendon along two joints: torque by the position of the other joint'
     quantities = (Quantity('coupling_stiffness', 'N m/rad', typical=(0.1, 50.0)),)
 
     def __post_init__(self) -> None:

@@ -39,7 +39,7 @@ class Hysteresis:
         return np.asarray(np.sign(self.directions @ dq))
 
     def advance(self, state: FloatArray, dq: FloatArray) -> FloatArray:
-        """Return the spring states after a joint displacement without reversal."""
+        """Return the spring states after a joint displacement dq without reversal."""
         travel = self.directions @ dq
         end = np.sign(travel)
         return np.asarray(end - (end - state) * np.exp(-np.abs(travel) / self.distance))

@@ -137,8 +137,8 @@ def rate_of_change(t: FloatArray, x: FloatArray) -> FloatArray:
     """Return the time derivative of samples along the first axis."""
     if len(t) < 2:
         raise ModelError(
-            'delay, lag, elasticity and backlash depend on the rate of the torque: they need a '
-            'motion of two samples or more'
+            'delay, lag, elasticity and backlash depend on how fast the torque changes: they need '
+            'a motion of two samples or more'
         )
     return np.asarray(np.gradient(x, t, axis=0))
 

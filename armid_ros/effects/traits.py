@@ -166,6 +166,7 @@ TRAITS = {
     'gravity_magnitude': Traits(
         shown_by='fast motion and static holds',
         look_at='the gravity in the settings, and the scale of all torques',
+        corrects=True,
     ),
     'base_tilt': Traits(
         shown_by='static holds with the first joint turned around',

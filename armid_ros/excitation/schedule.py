@@ -66,8 +66,8 @@ class Excitation:
             raise TrajectoryError(f'excitation: its run-in, {self.run_in} s, has to be positive')
         if not self.duration <= MAX_DURATION:
             raise TrajectoryError(
-                f'excitation: {self.n_periods} periods of {self.trajectory.period:g} s, run-ins '
-                f'of {self.run_in:g} s last {self.duration:.3g} s; the maximum is one day'
+                f'excitation: {self.n_periods} periods of {self.trajectory.period:g} s with run-'
+                f'ins of {self.run_in:g} s last {self.duration:.3g} s; the maximum is one day'
             )
 
     @property

@@ -177,7 +177,7 @@ class Mechanism:
     def _drift(
         self, q: FloatArray, jacobian: FloatArray, closing: FloatArray, du: FloatArray
     ) -> FloatArray:
-        """Return the accelerations dJ/dt du of the moving joints, shape (m,)."""
+        """Return the accelerations (m,) of moving joints at constant velocity of driven joints."""
         data, world = _SCRATCH.of(self)[0], pin.LOCAL_WORLD_ALIGNED
         pin.forwardKinematics(self.model, data, q, jacobian @ du, np.zeros(len(q)))
         apart = [

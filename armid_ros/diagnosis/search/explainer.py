@@ -116,10 +116,8 @@ class Explainer:
         evidence = Evidence.over_noise(prepared.data, prepared.sigma)
         rows = Rows.over_noise(evidence)
         unknown = with_friction(self.arm, settings.library)[1]
-        comparison, gravity = (
-            self.comparison(rows, grid_without_baseline()),
-            self.arm.robot.gravity,
-        )
+        comparison = self.comparison(rows, grid_without_baseline())
+        gravity = self.arm.robot.gravity
         first = result = comparison.select()
         # Torque is bilinear in gravity and masses. With 2 fits in place of 5, the same number of
         # 20 mountings is within 1 degree and 2 %.

@@ -156,13 +156,14 @@ def explain(
     fitted, steps = known or (None, ())
     named = list(fitted.named) if fitted else []
     steps, small = list(steps), list[CauseResult]()
-    means = result.nuisance.means(result.posterior)
+    rows, means = result.nuisance.rows, result.nuisance.means(result.posterior)
     causes = zip(
         result.accepted, result.nuisance.accepted, result.nuisance.value_slices, strict=True
     )
     for trial, cause, span in causes:
-        torque = np.max(np.abs(means[span]) * cause.torque, axis=1)
-        if not np.any(torque >= material * result.nuisance.rows.torque):
+        columns = [part.columns(result.nuisance.arm, cause.effect) for part in rows.data]
+        made = [x[:, :, list(cause.kept)] @ means[span, np.newaxis] for x in columns]
+        if not np.any(rows.rms_of_diagnosed(made)[:, 0] >= material * rows.torque):
             small.append(trial)
             continue
         named.append(cause.at(means[span], robot))

@@ -263,11 +263,8 @@ class Nuisance:
         squares = np.diagonal(self.column_products[0], axis1=1, axis2=2).sum(axis=0)[: self.rank]
         body = self.prior_precision / np.outer(scale, scale)
         body += _MIN_PRECISION * np.diag(np.where(squares > 0.0, squares, 1.0))
-        size = (
-            max(hyperparameters.shared, _MIN_PRECISION)
-            * unit[:, np.newaxis]
-            * self.unvisited_factor
-        )
+        shared = max(hyperparameters.shared, _MIN_PRECISION)
+        size = shared * unit[:, np.newaxis] * self.unvisited_factor
         of_causes = [one.size * one.unit for one in self.accepted]
         others = np.concatenate([size.ravel(), *of_causes]) ** -2.0
         whole = linalg.block_diag(body, np.diag(others))
@@ -394,7 +391,7 @@ class Nuisance:
         return float(sum(np.sum(self.residual_at(values, k) ** 2) for k in diagnosed))
 
     def noise_at(self, values: FloatArray, hyperparameters: Hyperparameters, k: int) -> FloatArray:
-        """Return the weighted residual (n, M) of recording k, with fitted discrepancy d_k."""
+        """Return the weighted residual (n, M) of recording k, less its fitted discrepancy d_k."""
         residual = self.residual_at(values, k)
         if not hyperparameters.own:
             return residual

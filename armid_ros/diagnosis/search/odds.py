@@ -74,7 +74,7 @@ class CauseFit:
 @dataclass(frozen=True)
 class CauseInformation:
     """
-    Fisher information on the p values of a cause in each of G groups of recordings.
+    Fisher information on the p parameters of a cause, in each of G groups of recordings.
 
     The nuisance parameters are integrated out. Values are in the units of their cause.
 

@@ -185,11 +185,8 @@ class Ranking:
         information = CauseInformation.of([cause], nuisance, posterior)
         spread = np.array([typical_spread * (nuisance.rows.n_baseline > 0)])
         (fit,) = fit_causes([cause], nuisance, information, typical_spread, spread)
-        groups, size, visible = (
-            len(information.diagnosed),
-            information.size,
-            float(information.visible[0]),
-        )
+        groups, size = len(information.diagnosed), information.size
+        visible = float(information.visible[0])
         blocks = information.matrix.reshape(groups, size, groups, size)
         x = fit.values / cause.unit
         gains = [

@@ -66,9 +66,10 @@ def headline(
     Move causes that explain little to the minor causes; return the shares of the others.
 
     Shares are cross-validated, and also measured on held-out recordings if there are any. A cause
-    is minor if its larger share is below `least`, and no joint has a gap without it: a cause may
-    act in some motions only. It is minor as well if it increases one of the prediction errors. The
-    returned shares are those of held-out recordings if there are any.
+    is minor if its larger share is below `least`, or its returned share below `inexact`, and no
+    joint has a gap without it: a cause may act in some motions only. It is minor as well if it
+    increases one of the prediction errors by more than `inexact`. The returned shares are those of
+    held-out recordings if there are any.
 
     Parameters
     ----------
@@ -89,15 +90,16 @@ def headline(
     causes = range(len(explanation.steps))
     measured = [fitted] if held_out is None else [fitted, held_out]
     share = np.array([max(one.share([k]) for one in measured) for k in causes])
+    stated, inexact = [measured[-1].share([k]) for k in causes], settings.thresholds.inexact
     for k in np.argsort(share, kind='stable').tolist():
-        if share[k] >= least:
-            break
+        if share[k] >= least and stated[k] >= min(least, inexact):
+            continue
         fewer = explanation.without(k)
         limits = explanation.evidence.limits(explanation.residual, settings)
         opens = (fewer.chi2_per_row > limits) & (explanation.chi2_per_row <= limits)
         if not np.any(opens):
             return headline(fewer, unseen, least, settings)
-    worse = [k for k in causes if min(one.share([k]) for one in measured) < 0.0]
+    worse = [k for k in causes if min(one.share([k]) for one in measured) < -inexact]
     if worse:
         return headline(explanation.without(*worse), unseen, least, settings)
     return explanation, held_out or fitted

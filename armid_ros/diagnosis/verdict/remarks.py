@@ -90,7 +90,7 @@ def with_doubt(
     """
     if verdict.word != 'consistent':
         listed = [one for one in findings if one.name in CATALOGUE]
-        links = [one for one in listed if CATALOGUE[one.name].traits.corrects]
+        links = [one for one in listed if one.joints and CATALOGUE[one.name].traits.corrects]
         if baseline and links and not doubt:
             doubt = (
                 'The inertia of a link does not change by itself. Unless the link of '

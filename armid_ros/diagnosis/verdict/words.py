@@ -24,6 +24,8 @@ Word = Literal[
 DIFFERENCE = 'the difference between model and measurement'
 #: Largest number of joints in the list of a sentence; further joints are only counted.
 _MAX_JOINTS = 3
+#: Largest ratio of an error to its floor that a sentence does not state.
+_AT_FLOOR = 1.5
 
 
 class Verdict(NamedTuple):
@@ -80,8 +82,11 @@ def decide(
     number = '' if gap is None else f' ({gap.after[largest]:.2g} {units[largest]})'
     error = f'the error of {joints[largest]}{number} {worst.where}'
     size = f'{larger(np.sqrt(worst.ratio.max()))} the limit that follows from {floor}{worst.more}'
-    at_floor = f'is at the level of {floor}'
-    refit = _refit(given_body, arm.robot, floor)
+    refit, known = _refit(given_body, arm.robot, floor), floor not in (NOISE, ESTIMATED)
+    ratio = np.zeros(len(joints)) if gap is None else gap.after / np.maximum(gap.floor, 1e-12)
+    larger_now, at_floor = known and ratio.max() > _AT_FLOOR, f'is at the level of {floor}'
+    if larger_now:
+        at_floor = f'is {ratio.max():.1f} times {floor}, which another motion may cause'
     shown = bool(minor) and minor[0].share >= 0.01
     small = sentence(minor[0], DIFFERENCE if open_gap else 'the remaining error') if shown else ''
     if not findings:
@@ -90,10 +95,10 @@ def decide(
             text += f' Best candidate: {small}' if small else ''
             return Verdict('unknown', f'{text} {refit}'.rstrip())
         if gap is not None:
-            largest = int(np.argmax(gap.after / np.maximum(gap.floor, 1e-12)))
+            largest = int(np.argmax(ratio))
             number = f' ({gap.after[largest]:.2g} {units[largest]} in {joints[largest]})'
-        known = floor not in (NOISE, ESTIMATED) and not refit
-        text = 'Nothing changed: the model' if known else 'The model'
+        changed = 'No change was found' if larger_now else 'Nothing changed'
+        text = f'{changed}: the model' if known and not refit else 'The model'
         text += f' explains the recordings. The remaining error{number} {at_floor}'
         text += f', or too small to matter. {small}' if small else '.'
         return Verdict('consistent', f'{refit}{text}')

@@ -145,7 +145,7 @@ def fit_values(
 
 def is_nonlinear(before: ArmModel, after: ArmModel, motions: Sequence[Motion]) -> bool:
     """
-    Return whether torque is nonlinear in the parameters between the values of two models.
+    Return whether the torque is nonlinear in the parameters, from one model to another.
 
     Parameters
     ----------

@@ -143,10 +143,8 @@ class OnlineIdentifier:
         self._watch = None
         candidates = change_candidates(arm, self.base)
         if settings.false_alarm_time is not None and candidates:
-            watched = NuisanceRows(arm, settings.cutoff), candidates
-            self._watch = ChangeWatch(
-                self._estimator, *watched, settings.false_alarm_time, self._work
-            )
+            watched = self._estimator, NuisanceRows(arm, settings.cutoff), candidates
+            self._watch = ChangeWatch(*watched, settings.false_alarm_time, self._work)
         self._clear_estimate()
         self._data = robot.model.createData()
         held = {joint for e in arm.effects if e.holds_at_rest for joint in e.joints}
@@ -296,7 +294,8 @@ class OnlineIdentifier:
                 raise IdentificationError(
                     f'the setting {setting.name} cannot change now; restart the identification'
                 )
-        if self.settings.false_alarm_time is None and settings.false_alarm_time is not None:
+        off = self._watch is None and self.settings.false_alarm_time is None
+        if off and settings.false_alarm_time is not None:
             raise IdentificationError(
                 'false_alarm_time cannot be set now, as change detection was off at the start; '
                 'restart the identification'

@@ -139,7 +139,7 @@ class PhysicalProgram:
         if str(solution.status) not in ('Solved', 'AlmostSolved'):
             raise IdentificationError(
                 f'no physically consistent links fit: the solver ended with {solution.status}; '
-                'check whether the total mass and the boxes of the links contradict each other'
+                'check whether total mass and --box of the links contradict each other'
             )
         theta = origin + change @ np.array(solution.x[:size])
         theta[rigid:] = np.clip(theta[rigid:], self.lower, self.upper)

@@ -59,8 +59,8 @@ class LiveSettings:
         """Raise an IdentificationError if the window is shorter than a diagnosed motion."""
         if not 0.0 < self.shortest <= self.window:
             raise IdentificationError(
-                f'window is {self.window:g} s and shortest {self.shortest:g} s, but shortest has '
-                'to be positive and at most window'
+                f'the shortest motion to diagnose, {self.shortest:g} s, has to be positive and at '
+                f'most the window, {self.window:g} s'
             )
 
 

@@ -341,7 +341,7 @@ def check_cycle(
 def driving_torque(
     cycle: GaitCycle, joint: str, rate: float, tau: FloatArray | None = None
 ) -> DrivingTorque:
-    """Return a function of time that gives two zero hip forces and a joint's torque, (3,)."""
+    """Return a function of time: the torque of one joint after two hip forces of zero, (3,)."""
     column = [cycle.pair.robot.index(joint)]
     own = (cycle.own.tau if tau is None else tau)[:, column]
     curve = splined(cycle.own.motion.t, own, rate)

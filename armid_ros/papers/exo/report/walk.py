@@ -235,7 +235,7 @@ def _bodies(robot: Robot, motion: Motion, ahead: FloatArray) -> list[Any]:
 
 
 def _placed(points: FloatArray, ahead: FloatArray) -> FloatArray:
-    """Convert points, forward and up [m], to pixels of a drawing that follows the wearer."""
+    """Convert points (forward, up) [m] to pixels of a drawing that follows the wearer."""
     shape = (-1,) + (1,) * (points.ndim - 2)
     x = 300.0 + _SCALE * (points[..., 0] - ahead.reshape(shape))
     return np.stack([x, _GROUND - _SCALE * points[..., 1]], axis=-1)
