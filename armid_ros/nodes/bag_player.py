@@ -65,7 +65,8 @@ class _JumpGuard:
         for message, arrived in self.latest.values():
             known = dict(zip(message.name, message.position, strict=False))
             q = np.array([known.get(joint, np.nan) for joint in joints])
-            measured[np.isfinite(q)], seen[np.isfinite(q)] = q[np.isfinite(q)], arrived
+            new = np.isfinite(q)
+            measured[new], seen[new] = q[new], arrived
         lost = staleness(joints, seen, time.monotonic(), self.timeout)
         if lost:
             return f'trajectory: {self._states.topic_name}: {lost}; arm position unknown'

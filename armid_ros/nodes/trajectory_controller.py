@@ -125,12 +125,12 @@ class TrajectoryController:
         return int(self._publisher.get_subscription_count())
 
     @property
-    def rivals(self) -> str:
-        """Return the names of other nodes that can send trajectories to the topic."""
-        own = self._node.get_fully_qualified_name()
+    def _rivals(self) -> str:
+        """Return a remark on other nodes that can send trajectories to the topic, or ''."""
         found = self._node.get_publishers_info_by_topic(self.topic)
         names = {f'{p.node_namespace.rstrip("/")}/{p.node_name}' for p in found}
-        return ', '.join(sorted(names - {own}))
+        others = ', '.join(sorted(names - {self._node.get_fully_qualified_name()}))
+        return f'; {others} can also move the arm by {self.topic}' if others else ''
 
     @property
     def missing(self) -> str:
@@ -180,13 +180,12 @@ class TrajectoryController:
     def begin(self, trajectory: JointTrajectory) -> str:
         """Send the trajectory of a run; return the name of the receiver."""
         self._by_action = self._ready
-        others = f'; {self.rivals} can also move the arm by {self.topic}' if self.rivals else ''
         if self._by_action:
             names = ('tracking_tolerance', 'goal_tolerance', 'goal_time_tolerance')
             self._send_goal(trajectory, *map(self._node.value, names))
-            return f'the action {self.action}{others}'
+            return f'the action {self.action}{self._rivals}'
         self._publisher.publish(trajectory)
-        return f'{self.readers} subscribers{others}'
+        return f'{self.readers} subscribers{self._rivals}'
 
     def send_stop(self, trajectory: JointTrajectory, again: bool = False) -> None:
         """Send a stop trajectory like that of the run; a repeated one always as a message, too."""
