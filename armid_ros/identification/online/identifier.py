@@ -141,10 +141,10 @@ class OnlineIdentifier:
         window = max(1, round(4.0 / self._row_period))  # 4 s, beyond the correlation of errors
         self._scores = RobustCovariance(window, settings.forgetting, self._work)
         self._watch = None
-        candidates = change_candidates(arm, self.base)
-        if settings.false_alarm_time is not None and candidates:
+        alarm = settings.false_alarm_time
+        if alarm is not None and (candidates := change_candidates(arm, self.base)):
             watched = self._estimator, NuisanceRows(arm, settings.cutoff), candidates
-            self._watch = ChangeWatch(*watched, settings.false_alarm_time, self._work)
+            self._watch = ChangeWatch(*watched, alarm, self._work)
         self._clear_estimate()
         self._data = robot.model.createData()
         held = {joint for e in arm.effects if e.holds_at_rest for joint in e.joints}
