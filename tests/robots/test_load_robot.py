@@ -339,7 +339,7 @@ def test_xacro_arguments_reach_the_file_and_what_it_includes(tmp_path: Path) -> 
 
 
 def tree(n_links: int, kind: str = 'fixed', children: int = 4) -> str:
-    """Return a description of many links, each of which carries so many others."""
+    """Return a description of a tree of links, with a number of children of each link."""
     body = '<inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1"/></inertial>'
     links = ''.join(f'<link name="l{k}">{body}</link>' for k in range(n_links))
     joints = ''.join(

@@ -84,8 +84,8 @@ def decide(
     size = f'{larger(np.sqrt(worst.ratio.max()))} the limit that follows from {floor}{worst.more}'
     refit, known = _refit(given_body, arm.robot, floor), floor not in (NOISE, ESTIMATED)
     ratio = np.zeros(len(joints)) if gap is None else gap.after / np.maximum(gap.floor, 1e-12)
-    larger_now, at_floor = known and ratio.max() > _AT_FLOOR, f'is at the level of {floor}'
-    if larger_now:
+    above, at_floor = known and ratio.max() > _AT_FLOOR, f'is at the level of {floor}'
+    if above:
         at_floor = f'is {ratio.max():.1f} times {floor}, which another motion may cause'
     shown = bool(minor) and minor[0].share >= 0.01
     small = sentence(minor[0], DIFFERENCE if open_gap else 'the remaining error') if shown else ''
@@ -97,7 +97,7 @@ def decide(
         if gap is not None:
             largest = int(np.argmax(ratio))
             number = f' ({gap.after[largest]:.2g} {units[largest]} in {joints[largest]})'
-        changed = 'No change was found' if larger_now else 'Nothing changed'
+        changed = 'No change was found' if above else 'Nothing changed'
         text = f'{changed}: the model' if known and not refit else 'The model'
         text += f' explains the recordings. The remaining error{number} {at_floor}'
         text += f', or too small to matter. {small}' if small else '.'
