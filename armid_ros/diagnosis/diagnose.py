@@ -244,11 +244,12 @@ def _as_diagnosis(
     laws = [] if explanation.measured else unlisted_laws(explanation, settings)
     least = settings.material * evidence.torque_rms
     different = joints_that_do_not_repeat(explainer.prepared.floors, settings.thresholds, least)
+    not_repeating = tuple(arm.robot.joints[k] for k in different)
     explanation = explanation if found else replace(explanation, reference=explanation.fitted)
     gap = Gap.of(explanation, unseen)
     word = decide(
         found,
-        [arm.robot.joints[k] for k in different] if explanation.measured else (),
+        not_repeating if explanation.measured else (),
         [*residual_over_limit, *resting, *laws],
         arm,
         NOISE if explanation.measured else explanation.floor,
@@ -283,6 +284,7 @@ def _as_diagnosis(
         baseline=explanation.floor,
         harmful=bool(found and worse),
         doubt=doubt,
+        not_repeating=not_repeating,
     )
 
 

@@ -310,12 +310,11 @@ def overlay_section(diagnosis: Diagnosis, gap: Gap) -> ContentSection:
 
 
 def _worst(diagnosis: Diagnosis, gap: Gap) -> int:
-    """Return the joint with the largest error in units of its floor, or else of its torque."""
+    """Return the joint with the largest error over its floor, or else of the verdict."""
     if diagnosis.verdict != 'not_repeatable':
         return int(np.argmax(gap.chi2_before))
-    # the floor contains the part of the torque that does not repeat: relative to the torque
-    torque = np.concatenate([one.measured for one in gap.overlays])
-    return int(np.argmax(gap.after / np.maximum(np.sqrt(np.mean(torque**2, axis=0)), 1e-12)))
+    # the floor contains the part of the torque that does not repeat
+    return diagnosis.arm.robot.joints.index(diagnosis.not_repeating[0])
 
 
 def _of_recording(gap: Gap, shown: Overlay, joint: int) -> tuple[FloatArray, ...]:

@@ -235,7 +235,8 @@ def joints_that_do_not_repeat(
     """
     Return the joints whose torque differs between equal periods of a motion, as indices.
 
-    The difference is at low frequency and material, such as that of a contact in one period.
+    The difference is at low frequency and material, such as that of a contact in one period. The
+    joint with the largest difference comes first.
 
     Parameters
     ----------
@@ -255,10 +256,10 @@ def joints_that_do_not_repeat(
     if not ratios:
         return []
     often = np.sum(np.array(ratios) >= thresholds.one_period, axis=0) >= max(1, len(ratios) / 2)
+    mean = np.exp(np.mean(np.log(ratios), axis=0))
     if len(ratios) >= 3:
-        mean = np.exp(np.mean(np.log(ratios), axis=0))
         often |= mean > thresholds.one_period_on_average
-    return np.flatnonzero(often).tolist()
+    return [j for j in np.argsort(-mean).tolist() if often[j]]
 
 
 def _difference(

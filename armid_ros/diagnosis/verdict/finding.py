@@ -304,6 +304,8 @@ class Diagnosis:
         Sentence on the reasons why the given model may be wrong; empty without reasons.
     spans : tuple of Span
         Seconds of each recording in which the findings act; empty if they act throughout.
+    not_repeating : tuple of str
+        Joints whose torque differs between equal periods, the largest difference first.
 
     """
 
@@ -324,6 +326,7 @@ class Diagnosis:
     harmful: bool = False
     doubt: str = ''
     spans: tuple[Span, ...] = ()
+    not_repeating: tuple[str, ...] = ()
 
     @property
     def estimate(self) -> Estimate | None:
