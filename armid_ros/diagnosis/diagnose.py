@@ -309,14 +309,14 @@ def _with_shares(
         noise = tuple(noise_floor(part, explanation.fitted.arm).sigma for part in data)
         sigma = tuple(np.maximum(one, explanation.misfit) for one in noise)
         unseen = Evidence(tuple(data), sigma, noise, explanation.evidence.varies)
-    every = explanation.measured or settings.everything
+    every, rng = explanation.measured or settings.everything, explainer.rng.spawn(1)[0]
     least = 0.0 if every else settings.thresholds.headline
-    explanation, shares = headline(explanation, unseen, least, settings)
+    explanation, shares = headline(explanation, unseen, least, settings, rng)
     untested = explainer.baseline is not None and bool(explanation.untested)
     whole = shares.share(range(len(explanation.steps)))
     if untested and whole <= settings.thresholds.open_share:
         nothing = explanation.without(*range(len(explanation.steps)))
-        explanation, shares = headline(nothing, unseen, least, settings)
+        explanation, shares = headline(nothing, unseen, least, settings, rng)
     return explanation, shares, unseen
 
 

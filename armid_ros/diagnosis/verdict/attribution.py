@@ -60,7 +60,11 @@ class Attribution:
 
 
 def headline(
-    explanation: Explanation, unseen: Evidence | None, least: float, settings: DiagnosisSettings
+    explanation: Explanation,
+    unseen: Evidence | None,
+    least: float,
+    settings: DiagnosisSettings,
+    rng: np.random.Generator,
 ) -> tuple[Explanation, Attribution]:
     """
     Move causes that explain little to the minor causes; return the shares of the others.
@@ -68,8 +72,8 @@ def headline(
     Shares are cross-validated, and also measured on held-out recordings if there are any. A cause
     is minor if its larger share is below `least`, or its returned share below `inexact`, and no
     joint has a gap without it: a cause may act in some motions only. It is minor as well if it
-    increases one of the prediction errors by more than `inexact`. The returned shares are those of
-    held-out recordings if there are any.
+    increases one of the prediction errors significantly: the 95 % interval of its share is below
+    zero. The returned shares are those of held-out recordings if there are any.
 
     Parameters
     ----------
@@ -81,6 +85,8 @@ def headline(
         Smallest share of a cause in the headline.
     settings : DiagnosisSettings
         Limits of a residual without gap.
+    rng : numpy.random.Generator
+        Resamples the time blocks.
 
     """
     if not explanation.steps:
@@ -98,10 +104,10 @@ def headline(
         limits = explanation.evidence.limits(explanation.residual, settings)
         opens = (fewer.chi2_per_row > limits) & (explanation.chi2_per_row <= limits)
         if not np.any(opens):
-            return headline(fewer, unseen, least, settings)
-    worse = [k for k in causes if min(one.share([k]) for one in measured) < -inexact]
+            return headline(fewer, unseen, least, settings, rng)
+    worse = [k for k in causes if any(one.interval([k], rng)[1] < 0.0 for one in measured)]
     if worse:
-        return headline(explanation.without(*worse), unseen, least, settings)
+        return headline(explanation.without(*worse), unseen, least, settings, rng)
     return explanation, held_out or fitted
 
 
