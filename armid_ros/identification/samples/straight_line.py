@@ -248,7 +248,9 @@ class NoiseLevel:
         self._min_steps, self._max_error = np.full((3, count), np.inf), np.zeros(count)
         self._sizes, self._shares = np.zeros((2, 600, count))  # windows of a minute at 1 kHz
         self._seen = 0
-        self._window: list[tuple[Innovation, FloatArray]] = []
+        # errors, changes and growth factors of the samples in the window; several samples may
+        # follow a full window before `settle`
+        self._window, self._count = np.empty((WINDOW + 2 * MAX_GAP, 2 * count + 2)), 0
 
     def set(self, model: ErrorModel) -> None:
         """Use the typical prediction errors of a given error model."""
@@ -279,20 +281,22 @@ class NoiseLevel:
 
     def learn(self, innovation: Innovation, move: FloatArray) -> None:
         """Add the prediction error of an undamaged sample, and the change of its signals (m,)."""
-        self._window.append((innovation, move))
+        row, count = self._window[self._count], len(move)
+        row[:count], row[count : 2 * count] = innovation.error, move
+        row[-2], row[-1] = innovation.noise, innovation.acceleration
+        self._count += 1
 
     def settle(self, period: float, count: int = WINDOW) -> bool:
         """Update the typical prediction errors once a window is full; return whether it was."""
-        if len(self._window) < count:
+        if self._count < count:
             return False
-        innovations, moves = zip(*self._window, strict=True)
-        self._window = []
-        errors, noise, acceleration = map(np.array, zip(*innovations, strict=True))
-        errors /= self.model.growth(noise[:, np.newaxis], acceleration[:, np.newaxis])
+        window, self._count = self._window[: self._count], 0
+        errors, moves = np.split(window[:, :-2], 2, axis=1)
+        errors = errors / self.model.growth(window[:, -2:-1], window[:, -1:])
         self._max_error = np.maximum(self._max_error, np.abs(errors).max(axis=0))
         size = robust_scale(errors)
         self._remember(size, share_of_noise(errors, size))
-        self.add_steps(np.array(moves))
+        self.add_steps(moves)
         loudest = np.argmax(self._sizes, axis=0), np.arange(len(size))
         self._use(period, self._sizes[loudest], self._shares[loudest])
         return True
