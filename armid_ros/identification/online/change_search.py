@@ -269,7 +269,6 @@ class ChangeSearch:
             if self._chance > 0.0:
                 excess = self._calibrations[m].excess(*statistics[m], self._chance)
                 positive = positive or bool(np.any(excess > 1.0))
-            yield
         if positive:
             found = yield from self._find_onset(residual_scale)
             if found is not None:

@@ -280,8 +280,8 @@ class ChangeWatch:
 
     @property
     def _samples_per_update(self) -> int:
-        # with forgetting, samples are learned one by one
-        return 4 if self._estimator.forgetting < 1.0 else _SAMPLES_PER_PIECE
+        # with forgetting, samples are learned one by one; otherwise, this is the longest piece
+        return 4 if self._estimator.forgetting < 1.0 else 8
 
     def _widened(self, rows: Sequence[Row]) -> Pieces[list[WeightedSample]]:
         """Return samples whose regressor rows include the columns of nuisance parameters."""
@@ -324,7 +324,6 @@ class ChangeWatch:
             self._fit_ratios.append(squares / float(np.sum(weights)))
         yield
         moved = information @ self._search.directions
-        yield
         known = before.root.T @ before.root
         yield
         return Block(

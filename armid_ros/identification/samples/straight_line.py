@@ -248,8 +248,7 @@ class NoiseLevel:
         self._min_steps, self._max_error = np.full((3, count), np.inf), np.zeros(count)
         self._sizes, self._shares = np.zeros((2, 600, count))  # windows of a minute at 1 kHz
         self._seen = 0
-        # errors, changes and growth factors of the samples in the window; several samples may
-        # follow a full window before `settle`
+        # errors, changes and growth factors of each sample; more may follow before `settle`
         self._window, self._count = np.empty((WINDOW + 2 * MAX_GAP, 2 * count + 2)), 0
 
     def set(self, model: ErrorModel) -> None:
@@ -291,8 +290,8 @@ class NoiseLevel:
         if self._count < count:
             return False
         window, self._count = self._window[: self._count], 0
-        errors, moves = np.split(window[:, :-2], 2, axis=1)
-        errors = errors / self.model.growth(window[:, -2:-1], window[:, -1:])
+        growth = self.model.growth(window[:, -2:-1], window[:, -1:])
+        errors, moves = window[:, : len(self._finest)] / growth, window[:, len(self._finest) : -2]
         self._max_error = np.maximum(self._max_error, np.abs(errors).max(axis=0))
         size = robust_scale(errors)
         self._remember(size, share_of_noise(errors, size))
