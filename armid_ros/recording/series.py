@@ -301,9 +301,10 @@ def unwrapped(q: FloatArray) -> tuple[FloatArray, list[int]]:
     """
     turns = (2.0 * np.pi, 360.0)  # a turn in each unit of positions [rad, degrees]
     off_a_turn = 0.15  # largest deviation of a jump from a full turn, as a share of the turn
+    least = (1.0 - off_a_turn) * turns[0]
     found: list[int] = []
-    for joint in range(q.shape[1]):
-        if np.ptp(q[:, joint]) < (1.0 - off_a_turn) * turns[0]:
+    for joint in range(q.shape[1]) if np.ptp(q) >= least else ():  # usually less, and fast
+        if np.ptp(q[:, joint]) < least:
             continue
         step = np.diff(q[:, joint])
         for turn in turns:

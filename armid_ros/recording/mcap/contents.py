@@ -50,7 +50,7 @@ def read_chunks(
     packed = any(chunk.compression for chunk in chunks)
     # Small groups are slow in array code. Decompressed contents are copied into one buffer, which
     # should fit into the processor cache. [bytes]
-    most = 1 << 20 if packed else 4 << 20
+    most = 2 << 20 if packed else 4 << 20
     groups: list[list[Chunk]] = [[]]
     size = 0
     for chunk in chunks:
@@ -75,13 +75,12 @@ def _read_ahead(
 ) -> Iterator[tuple[Contents, list[str]]]:
     """Yield contents and damage of groups of chunks; threads read the next groups in advance."""
     begun: deque[tuple[int, Future[tuple[Contents, list[str]]]]] = deque()
-    # Decompression and checksums release the GIL.
-    count = min(2, os.cpu_count() or 1)
     most = 16 << 20  # largest size of data read ahead [bytes]; a larger group is read alone
-    with ThreadPoolExecutor(count) as threads:
+    # decompression and checksums release the GIL
+    with ThreadPoolExecutor(min(2, os.cpu_count() or 1)) as threads:
         for group in groups:
             size = sum(chunk.size for chunk in group)
-            while begun and (sum(s for s, _ in begun) + size > most or len(begun) > count):
+            while begun and sum(s for s, _ in begun) + size > most:
                 yield begun.popleft()[1].result()
             begun.append((size, threads.submit(_read_group, found, group, settings)))
         while begun:
