@@ -164,7 +164,7 @@ class ClearanceModel:
         """Return all pairs of bodies closer than ``reach`` [m] in poses of shape (N, n)."""
         frames = LinkFrames.of(self.collision.robot, q)
         sample, pair = np.nonzero(self._bound(frames) < reach)
-        distance, normal, point = self._measure(q, sample, pair)
+        distance, normal, point = self._measure(q, sample, pair, reach)
         keep = distance < reach
         sample, pair, distance = sample[keep], pair[keep], distance[keep]
         normal, point = normal[keep], point[keep, np.newaxis]
@@ -283,21 +283,23 @@ class ClearanceModel:
         return np.asarray(apart - self.spheres[first, 3] - self.spheres[second, 3])
 
     def _measure(
-        self, q: FloatArray, sample: IntArray, pair: IntArray
+        self, q: FloatArray, sample: IntArray, pair: IntArray, reach: float = -np.inf
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return distances of body pairs, normals, and nearest points on the first bodies."""
+        """Return distances of pairs; normals, and nearest points on the first bodies, in reach."""
         model, geometry = self.collision.robot.model, self.collision.geometry
         data, placed = model.createData(), geometry.createData()
         q, distance = self.collision.robot.positions(q), np.empty(len(sample))
         normal, point = np.empty((2, len(sample), 3))
-        current = -1
-        for row in np.argsort(sample, kind='stable'):
-            if sample[row] != current:
-                current = int(sample[row])
+        current, order = -1, np.argsort(sample, kind='stable')
+        rows = order.tolist(), sample[order].tolist(), self.numbers[pair[order]].tolist()
+        for row, pose, number in zip(*rows, strict=True):
+            if pose != current:
+                current = pose
                 pin.updateGeometryPlacements(model, data, geometry, placed, q[current])
-            result = pin.computeDistance(geometry, placed, int(self.numbers[pair[row]]))
-            distance[row], normal[row] = result.min_distance, result.normal
-            point[row] = result.getNearestPoint1()
+            result = pin.computeDistance(geometry, placed, number)
+            distance[row] = result.min_distance
+            if distance[row] < reach:
+                normal[row], point[row] = result.normal, result.getNearestPoint1()
         return distance, normal, point
 
     def _approach(self, pair: int, time: float, distance: float) -> Approach:

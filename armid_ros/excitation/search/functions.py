@@ -313,17 +313,15 @@ class Constraints:
     ) -> tuple[npt.NDArray[np.intp], FloatArray, FloatArray]:
         """Return the limited joints, soft maxima of their limit violations, and derivatives."""
         limited = np.flatnonzero(np.isfinite(lower) | np.isfinite(upper))
-        signed = np.empty((len(limited), len(values)))
-        totals = np.empty(len(limited))
-        for row, j in enumerate(limited):
-            over, under = values[:, j] - upper[j], lower[j] - values[:, j]
-            excess = np.concatenate([over, under]) / unit[j] + self.reserve
-            totals[row], weights = self._soft_maximum(excess)
-            signed[row] = (weights[: len(values)] - weights[len(values) :]) / unit[j]
-        return limited, totals, signed
+        lower, upper, unit = (one[limited, np.newaxis] for one in (lower, upper, unit))
+        over, under = values.T[limited] - upper, lower - values.T[limited]
+        excess = np.concatenate([over, under], axis=1) / unit + self.reserve
+        totals, weights = self._soft_maximum(excess)
+        return limited, totals, (weights[:, : len(values)] - weights[:, len(values) :]) / unit
 
-    def _soft_maximum(self, excess: FloatArray) -> tuple[float, FloatArray]:
-        largest = excess.max()
+    def _soft_maximum(self, excess: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return the soft maximum along the last axis, and its derivatives."""
+        largest = excess.max(axis=-1, keepdims=True)
         weights = np.exp(self.sharpness * (excess - largest))
-        total = weights.sum()
-        return float(largest + np.log(total) / self.sharpness), weights / total
+        total = weights.sum(axis=-1, keepdims=True)
+        return (largest + np.log(total) / self.sharpness)[..., 0], weights / total
