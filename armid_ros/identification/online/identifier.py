@@ -113,6 +113,7 @@ class OnlineIdentifier:
             )
         self.arm, self.settings = arm, settings
         self.base: BaseParameters = arm.base_parameters(rng)
+        self._kept = np.array([-1, *self.base.independent]) + 1  # torque and base columns
         self._filter = CausalFilter(
             robot.n_joints,
             settings.cutoff,
@@ -391,8 +392,8 @@ class OnlineIdentifier:
         else:
             rigid = regressor(robot, one)
         rigid = rigid.reshape(robot.n_joints, -1)  # one joint has a vector
-        columns = np.concatenate([rigid, self.arm.effect_columns(one)[0]], axis=1)
-        stacked = np.column_stack([motion.tau, columns.take(self.base.independent, axis=1)])
+        columns = [motion.tau[:, np.newaxis], rigid, self.arm.effect_columns(one)[0]]
+        stacked = np.concatenate(columns, axis=1).take(self._kept, axis=1)
         filtered = self._row_filter.update(step, stacked.reshape(-1))[2].reshape(stacked.shape)
         measured, rows = filtered[:, 0], filtered[:, 1:]
         noise = self._row_noise()
