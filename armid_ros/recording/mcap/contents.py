@@ -76,9 +76,10 @@ def _read_ahead(
     """Yield contents and damage of groups of chunks; threads read the next groups in advance."""
     begun: deque[tuple[int, Future[tuple[Contents, list[str]]]]] = deque()
     most = 16 << 20  # largest size of data read ahead [bytes]; a larger group is read alone
+    yield _read_group(found, groups[0], settings)  # often all that is needed
     # decompression and checksums release the GIL
     with ThreadPoolExecutor(min(2, os.cpu_count() or 1)) as threads:
-        for group in groups:
+        for group in groups[1:]:
             size = sum(chunk.size for chunk in group)
             while begun and sum(s for s, _ in begun) + size > most:
                 yield begun.popleft()[1].result()
