@@ -6,8 +6,8 @@ Least squares by Gauss-Newton for an arm whose torque may be nonlinear in its pa
 Friction in proportion to the load, gains of torque sensors, zeros of encoders, gravity and
 elasticity change the columns of all other parameters. A fit with the columns of the description
 is therefore only the first step. The model of the arm is linearised again at the fitted values
-until the linear and the nonlinear model have the same torque. Steps that worsen the fit are damped
-(Marquardt 1963).
+until the linear and the nonlinear model have the same torque. Steps that worsen the fit are
+halved.
 
 """
 
@@ -24,7 +24,6 @@ from armid_ros.identification.rows.regression import (
     predictions,
     Regression,
     regressions,
-    weighted_rows,
 )
 from armid_ros.identification.rows.signals import Conditioning
 from armid_ros.model import BaseParameters, LINK_PARAMETERS
@@ -267,38 +266,27 @@ def _iterate(
     method: Method,
     free: FloatArray,
 ) -> FittedValues:
-    """Take damped Gauss-Newton steps until the linear and the nonlinear model agree."""
-    # damping factors of a step, relative to the squared columns
-    dampings = tuple(10.0 ** np.arange(-8.0, 3.0))
+    """Take Gauss-Newton steps until the linear and the nonlinear model agree."""
     limits = bounds(arm, base)
     now = _State(arm, base.values(arm.theta), problem)
-    passes, converged = 0, True
-    while True:
-        passes += 1
+    for passes in range(1, _MAX_PASSES + 1):
         solution = solve(now.problem, method, limits)
         linear = tuple(part.torque(solution.values) for part in now.problem)
         # decrease of the cost that corresponds to one standard deviation of one parameter
-        if passes > 1 and abs(now.gain(linear)) < 1.0:
+        converged = passes > 1 and abs(now.gain(linear)) < 1.0
+        if converged:
             break
         trial: _State | None = None
-        unattained = 0.0  # largest decrease of the cost that a linear model predicts
-        # the undamped step if its cost is near the predicted one, otherwise the best damped step
-        for damping in (0.0, *dampings):
-            values = now.damped(damping, limits) if damping else solution.values
-            if damping:
-                expected = tuple(part.torque(values) for part in now.problem)
-                unattained = max(unattained, now.gain(expected))
+        for share in 0.5 ** np.arange(24):  # of the step
+            values = now.values + share * (solution.values - now.values)
             stepped = with_base_values(now.arm, base, values, free)
             predicted = torques(stepped, recordings, used)
-            if now.cost(predicted) <= now.cost(None if trial is None else trial.predicted):
+            if now.cost(predicted) <= now.cost():
                 trial = _State(stepped, values, exact_at(now.problem, predicted, values))
-            # largest ratio of the cost of an undamped step to the cost that the linear model
-            # predicts
-            if not damping and now.cost(predicted) <= 2.0 * now.cost(linear):
                 break
         if trial is None:
             # largest unattained decrease, as a share of the cost, of a fit that has converged
-            converged = unattained < 0.5 * now.cost()
+            converged = now.gain(linear) < 0.5 * now.cost()
             break
         converged = agree(now.problem, solution.weights, linear, trial.predicted)
         # decrease of the cost by a step below which the iteration ends
@@ -334,15 +322,6 @@ class _State:
         ):
             return 0.0
         return self.cost() - self.cost(predicted)
-
-    def damped(self, damping: float, limits: tuple[FloatArray, FloatArray]) -> FloatArray:
-        """Return the parameters after a Levenberg-Marquardt step, kept within their limits."""
-        w, _ = weighted_rows(self.problem, self._weights)
-        size = np.linalg.norm(w, axis=0)
-        scaled = w / np.where(size > 0.0, size, 1.0)
-        normal = scaled.T @ scaled + damping * np.eye(len(size))
-        step = np.linalg.solve(normal, scaled.T @ (self._weights * self._residual).ravel())
-        return np.clip(self.values + step / np.where(size > 0.0, size, np.inf), *limits)
 
     def cost(self, predicted: Torques | None = None) -> float:
         """Return the sum of squared residuals, in units of the present rms error of each joint."""

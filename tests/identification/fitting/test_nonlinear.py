@@ -71,6 +71,7 @@ def agrees(robot, names, seed=0):
     truth, recording, result = fitted(robot, names, seed)
     training = error(result.training)
     assert error(result.predict([recording])) == pytest.approx(training, rel=1e-3)
+    assert not any('has not converged' in note for note in result.notes)
     np.testing.assert_allclose(
         result.joint_std, NOISE * np.linalg.norm(result.used.taps), rtol=0.3
     )
