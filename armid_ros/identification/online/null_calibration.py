@@ -12,6 +12,7 @@ Fisher's F distribution, whose second degrees of freedom increase with the numbe
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Iterator, Sequence
 
 from armid_ros.changes.statistic import limits, MEDIAN_SQUARE
@@ -24,42 +25,6 @@ from scipy import stats
 _TAIL_PROBABILITY = 0.01
 #: Number of blocks kept: one minute at four blocks per second.
 MAX_BLOCKS = 240
-
-
-class History:
-    """
-    Buffer of the latest rows of numbers, limited to a number of rows.
-
-    Parameters
-    ----------
-    width : int
-        Number of columns.
-    most : int
-        Largest number of rows kept.
-
-    """
-
-    def __init__(self, width: int, most: int) -> None:
-        self._rows = np.empty((2 * most, width))  # the latest rows move to the front when full
-        self._max_rows = most
-        self._end = 0
-
-    def __len__(self) -> int:
-        """Return the number of rows."""
-        return min(self._end, self._max_rows)
-
-    def append(self, row: FloatArray) -> None:
-        """Append a row, and drop the oldest row of a full buffer."""
-        if self._end == len(self._rows):
-            kept, self._rows = self.values, np.empty_like(self._rows)
-            self._rows[: self._max_rows], self._end = kept, self._max_rows
-        self._rows[self._end] = row
-        self._end += 1
-
-    @property
-    def values(self) -> FloatArray:
-        """Return the rows, oldest first, as a view that later appends do not change."""
-        return self._rows[self._end - len(self) : self._end]
 
 
 class NullCalibration:
@@ -94,8 +59,8 @@ class NullCalibration:
         shared = np.arange(1, overlap) / overlap
         self._overlap = 1.0 + 2.0 * float(np.sum(shared**2))  # windows per independent window
         self._sources = sources
-        self._ratios = History(len(sizes), memory)
-        self._strengths = History(int(np.sum(sizes)), memory)
+        self._ratios: deque[FloatArray] = deque(maxlen=memory)
+        self._strengths: deque[FloatArray] = deque(maxlen=memory)
         self._first = np.cumsum([0, *sizes[:-1]])
         self._strength = np.zeros(int(np.sum(sizes)))
         self._clip = stats.chi2.isf(tail_share, self._sizes)
@@ -132,12 +97,12 @@ class NullCalibration:
             return
         self._n_new = 0
         yield
-        strengths = self._strengths.values
+        strengths = np.array(self._strengths)
         for columns in _in_pieces(strengths):
             some = strengths[:, columns]
             self._strength[columns] = np.quantile(some, 0.9, axis=0)
             yield
-        yield from self._fit_factors(self._ratios.values[len(self._ratios) // 4 :])
+        yield from self._fit_factors(np.array(self._ratios)[len(self._ratios) // 4 :])
 
     def _fit_factors(self, later: FloatArray) -> Job:
         """Compute the factors of the test statistics from earlier windows; 0 if there are none."""
@@ -229,7 +194,7 @@ class ResidualScale:
 
     def __init__(self, least: float) -> None:
         self._least = least
-        self._blocks: History | None = None
+        self._blocks: deque[FloatArray] = deque(maxlen=MAX_BLOCKS)
         self._value: FloatArray | None = None
 
     @property
@@ -243,12 +208,10 @@ class ResidualScale:
         if not used.any():
             return  # residuals during motion are kept while the arm is at rest
         squares = np.sum(residual, axis=0) ** 2
-        if self._blocks is None:
-            self._blocks = History(len(squares), MAX_BLOCKS)
         self._blocks.append(np.where(used > 0, squares / np.maximum(used, 1), np.nan))
         if len(self._blocks) < 16:  # with fewer blocks, the assumed noise is used
             return
-        later = self._blocks.values[len(self._blocks) // 2 :]
+        later = np.array(self._blocks)[len(self._blocks) // 2 :]
         known = np.any(later > 0.0, axis=0)
         value = np.ones(later.shape[1]) if self._value is None else self._value.copy()
         # medians of the columns without NaN; numpy's nanmedian takes ten times as long
