@@ -5,8 +5,7 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
 
 from armid_ros.arm import ArmModel
 from armid_ros.estimate import Estimate, name_in_words, ParameterName
@@ -20,38 +19,6 @@ _OF_BODY = {
     'kg m': ('balance', 'move it through more of its range'),
     'kg': ('mass', 'move it through more of its range'),
 }
-
-
-@dataclass(frozen=True)
-class Unlearned:
-    """
-    Parameters of one joint that the motion does not make identifiable.
-
-    Attributes
-    ----------
-    joint : str
-        The joint; empty for parameters of the entire arm.
-    parameters : tuple of ParameterName
-        Unidentified parameters, the most uncertain first.
-
-    """
-
-    joint: str
-    parameters: tuple[ParameterName, ...]
-
-    def __str__(self) -> str:
-        """Return the unidentified quantities as text, with the motion that would identify them."""
-        friction = {
-            'viscous_coefficient': 'viscous friction',
-            'coulomb_torque': 'Coulomb friction',
-        }
-        found = []
-        for one in self.parameters:
-            rigid = _OF_BODY.get(one.unit) if one.name[:1] in 'Im' else None
-            word = friction.get(one.name, name_in_words(one.name))
-            found.append(rigid or (word, 'move it both ways at several speeds'))
-        words, advice = (list(dict.fromkeys(part)) for part in zip(*found, strict=True))
-        return f'{self.joint or "the arm"} ({", ".join(words)}): {" and ".join(advice)}'
 
 
 class LearningProgress:
@@ -81,9 +48,12 @@ class LearningProgress:
         """Forget all earlier estimates."""
         self._past.clear()
 
-    def unidentified(self, t: float, estimate: Estimate) -> tuple[Unlearned, ...]:
+    def unidentified(self, t: float, estimate: Estimate) -> Mapping[str, list[ParameterName]]:
         """
         Return parameters whose standard deviations have hardly fallen in ten seconds, by joint.
+
+        The joint is empty for parameters of the entire arm. The most uncertain parameters are
+        first.
 
         Parameters
         ----------
@@ -101,7 +71,7 @@ class LearningProgress:
         while len(self._past) > 1 and self._past[1][0] <= t - wait:
             self._past.popleft()
         if self._past[0][0] > t - wait:
-            return ()
+            return {}
         # the usual torque of a joint is that of the described links and of the effects (mainly
         # friction) whose estimates exceed two standard deviations
         known = np.maximum(np.abs(estimate.values) - 2.0 * estimate.std, 0.0)
@@ -115,21 +85,29 @@ class LearningProgress:
         # to 0.5.
         progress = np.where(unknown > 100.0, 0.5, 0.9)
         stuck = (unknown > 0.1) & (estimate.std > progress * self._past[0][1])
-        by_joint: dict[str, list[int]] = {}
+        by_joint: dict[str, list[ParameterName]] = {}
         for k in sorted(np.flatnonzero(stuck).tolist(), key=lambda k: -float(unknown[k])):
-            by_joint.setdefault(estimate.parameters[k].joint, []).append(k)
-        return tuple(
-            Unlearned(joint, tuple(estimate.parameters[k] for k in some))
-            for joint, some in by_joint.items()
-        )
+            name = estimate.parameters[k]
+            by_joint.setdefault(name.joint, []).append(name)
+        return by_joint
 
 
-def too_little_motion(unlearned: Sequence[Unlearned]) -> str:
+def too_little_motion(unidentified: Mapping[str, Sequence[ParameterName]]) -> str:
     """Return a message on parameters that the motion does not identify; empty if none."""
     # largest number of joints in the message
     most = 3
-    if not unlearned:
+    friction = {'viscous_coefficient': 'viscous friction', 'coulomb_torque': 'Coulomb friction'}
+    texts = []
+    for joint, parameters in list(unidentified.items())[:most]:
+        found = []
+        for one in parameters:
+            rigid = _OF_BODY.get(one.unit) if one.name[:1] in 'Im' else None
+            word = friction.get(one.name, name_in_words(one.name))
+            found.append(rigid or (word, 'move it both ways at several speeds'))
+        words, advice = (list(dict.fromkeys(part)) for part in zip(*found, strict=True))
+        texts.append(f'{joint or "the arm"} ({", ".join(words)}): {" and ".join(advice)}')
+    if not texts:
         return ''
-    rest = len(unlearned) - most
+    rest = len(unidentified) - most
     more = f'; and {rest} more joint{"s" if rest > 1 else ""}' if rest > 0 else ''
-    return f'too little motion to learn from: {"; ".join(map(str, unlearned[:most]))}{more}'
+    return f'too little motion to learn from: {"; ".join(texts)}{more}'
