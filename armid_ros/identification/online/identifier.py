@@ -218,9 +218,8 @@ class OnlineIdentifier:
             busy = added and 4.0 * period <= self._row_period
         if not busy:
             self._add_pending_row()
-            if not self._gate.settle():
-                # smallest number of pieces per second
-                self._work.advance(max(1, round(400.0 * period)))
+            # smallest number of pieces per second
+            self._work.advance(max(1, round(400.0 * period)))
         self._had_row = bool(self.latest)
         return self.latest[-1] if self.latest else None
 

@@ -44,7 +44,6 @@ from armid_ros.identification.samples.straight_line import (
     NoiseLevel,
     StreamSample,
     unwrapped,
-    WINDOW,
 )
 from armid_ros.motion import FloatArray
 import numpy as np
@@ -174,16 +173,6 @@ class SpikeGate:
             return self._classify(sample)
         self._first.append(sample)
         return self._begin() if len(self._first) == N_FIRST else []
-
-    def settle(self) -> bool:
-        """
-        Update the typical prediction errors once a window is nearly full; return whether it was.
-
-        Otherwise `take` updates them with the sample that completes the window. A stream calls
-        `settle` after a sample that needs little other work.
-
-        """
-        return self._level.settle(self._period, WINDOW - 4)
 
     def begin(
         self,

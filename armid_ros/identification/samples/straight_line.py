@@ -285,20 +285,20 @@ class NoiseLevel:
         row[-2], row[-1] = innovation.noise, innovation.acceleration
         self._count += 1
 
-    def settle(self, period: float, count: int = WINDOW) -> bool:
-        """Update the typical prediction errors once a window is full; return whether it was."""
-        if self._count < count:
-            return False
-        window, self._count = self._window[: self._count], 0
-        growth = self.model.growth(window[:, -2:-1], window[:, -1:])
-        errors, moves = window[:, : len(self._finest)] / growth, window[:, len(self._finest) : -2]
+    def settle(self, period: float) -> None:
+        """Update the typical prediction errors once a window is full."""
+        if len(self._window) < WINDOW:
+            return
+        innovations, moves = zip(*self._window, strict=True)
+        self._window = []
+        errors, noise, acceleration = map(np.array, zip(*innovations, strict=True))
+        errors /= self.model.growth(noise[:, np.newaxis], acceleration[:, np.newaxis])
         self._max_error = np.maximum(self._max_error, np.abs(errors).max(axis=0))
         size = robust_scale(errors)
         self._remember(size, share_of_noise(errors, size))
         self.add_steps(moves)
         loudest = np.argmax(self._sizes, axis=0), np.arange(len(size))
         self._use(period, self._sizes[loudest], self._shares[loudest])
-        return True
 
     def _use(self, period: float, size: FloatArray, white: FloatArray) -> None:
         """Set the typical prediction errors to those of a window, but at least the resolution."""
