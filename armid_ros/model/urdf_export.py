@@ -57,19 +57,10 @@ def export_urdf(
 
     """
     require_consistent(robot.links, robot.rigid_parameters)
-    body = robot.rigid_parameters.reshape(-1, PER_LINK)
-    others = _parameters(robot, _without_inertials(robot.urdf, robot.links))
-    shares = np.array([_share(*pair) for pair in zip(body, others, strict=True)])
-    text = robot.urdf
-    if np.any(shares < 1.0):
-        text = _scaled(robot, shares)
-        others = _parameters(robot, _without_inertials(text, robot.links))
-    own = dict(zip(robot.links, body - others, strict=True))
-
-    document, root = _parsed(text)
-    links = {link.getAttribute('name'): link for link in _children(root, 'link')}
-    for name, parameters in own.items():
-        _set_inertial(links[name], parameters)
+    document = expatbuilder.parseString(robot.urdf, namespaces=False)
+    root = document.documentElement
+    assert root is not None
+    _set_inertials(root, robot)
     for joint in _children(root, 'joint'):
         for key, table in values.items():
             if joint.getAttribute('name') in table:
@@ -84,22 +75,28 @@ def export_urdf(
     if remarks:
         lines = ''.join(f'\n    {line.replace("--", "- -")}' for line in remarks)
         root.appendChild(document.createComment(f'{lines}\n  '))
-    result = _text(document)
+    nodes = (node.toxml() for node in document.childNodes)
+    result = '\n'.join(['<?xml version="1.0"?>', *nodes, ''])
     _check(robot, result)
     return result
 
 
-def _parsed(urdf: str) -> tuple[minidom.Document, minidom.Element]:
-    """Parse a URDF, keeping comments and namespaces; return document and root element."""
-    document = expatbuilder.parseString(urdf, namespaces=False)
-    assert document.documentElement is not None
-    return document, document.documentElement
+def _frame(robot: Robot, link: str) -> pin.Frame:
+    """Return the frame of a link in the model."""
+    return robot.model.frames[robot.model.getFrameId(link, pin.FrameType.BODY)]
 
 
-def _text(document: minidom.Document) -> str:
-    return '\n'.join(
-        ['<?xml version="1.0"?>', *(node.toxml() for node in document.childNodes), '']
-    )
+def _attached(robot: Robot) -> FloatArray:
+    """Return the described parameters of the links attached to each child link, (m, 10)."""
+    parameters = np.zeros((len(robot.links), PER_LINK))
+    for name, inertial in robot.description.links.items():
+        frame = _frame(robot, name)
+        if inertial is not None and frame.parentJoint and name not in robot.links:
+            axes = pin.rpy.rpyToMatrix(*inertial.rpy)
+            tensor = axes @ inertial.tensor @ axes.T
+            link = pin.Inertia(inertial.mass, np.array(inertial.xyz), tensor)
+            parameters[frame.parentJoint - 1] += frame.placement.act(link).toDynamicParameters()
+    return parameters
 
 
 def _children(parent: minidom.Element, name: str) -> Iterator[minidom.Element]:
@@ -129,52 +126,30 @@ def _child(parent: minidom.Element, name: str) -> minidom.Element:
     return found
 
 
-def _parameters(robot: Robot, urdf: str) -> FloatArray:
-    """Return the inertial parameters of each driven joint's body in a URDF, shape (n, 10)."""
-    read = robot_from_urdf(urdf, joints=robot.joints, source=robot.name)
-    return read.rigid_parameters.reshape(-1, PER_LINK)
-
-
-def _without_inertials(urdf: str, links: Sequence[str]) -> str:
-    """Return a URDF in which the masses and inertias of some links are zero."""
-    document, root = _parsed(urdf)
+def _set_inertials(root: minidom.Element, robot: Robot) -> None:
+    """Write the inertial parameters of a robot to the links of its URDF."""
+    body, attached = robot.rigid_parameters.reshape(-1, PER_LINK), _attached(robot)
+    shares = [_share(*pair) for pair in zip(body, attached, strict=True)]
     for link in _children(root, 'link'):
-        for inertial in _children(link, 'inertial'):
-            for element in (_child(inertial, 'mass'), _child(inertial, 'inertia')):
-                for key in element.attributes.keys() if link.getAttribute('name') in links else ():
-                    element.setAttribute(key, '0')
-    return _text(document)
+        name = link.getAttribute('name')
+        carrier = _frame(robot, name).parentJoint - 1
+        if name in robot.links:
+            _set_inertial(link, body[carrier] - shares[carrier] * attached[carrier])
+        elif carrier >= 0 and shares[carrier] < 1.0:
+            for inertial in _children(link, 'inertial'):
+                for element in (_child(inertial, 'mass'), _child(inertial, 'inertia')):
+                    for key, value in element.attributes.items():
+                        element.setAttribute(key, repr(shares[carrier] * float(value)))
 
 
-def _share(body: FloatArray, others: FloatArray) -> float:
+def _share(body: FloatArray, attached: FloatArray) -> float:
     """Return a factor on the inertias of attached links that keeps the child link consistent."""
-    if not np.any(others):
+    if not np.any(attached):
         return 1.0
-    if not Consistency.of('', others).eigenvalues[0] > -1e-12:
+    if not Consistency.of('', attached).eigenvalues[0] > -1e-12:
         return 0.0
-    largest = float(scipy.linalg.eigh(pseudo_inertia(others), pseudo_inertia(body))[0][-1])
+    largest = float(scipy.linalg.eigh(pseudo_inertia(attached), pseudo_inertia(body))[0][-1])
     return 1.0 if largest <= 1.0 - _MIN_SHARE else 0.5 / largest
-
-
-def _scaled(robot: Robot, shares: FloatArray) -> str:
-    """Return a URDF with scaled masses and inertias of links attached to moving links."""
-    document, root = _parsed(robot.urdf)
-    carriers = {joint.child: joint for joint in robot.description.joints}
-    for link in _children(root, 'link'):
-        name, inertial = link.getAttribute('name'), next(_children(link, 'inertial'), None)
-        if inertial is None or name in robot.links:
-            continue
-        # go up to the nearest driven joint
-        carrier = carriers.get(name)
-        while carrier is not None and carrier.name not in robot.joints:
-            carrier = carriers.get(carrier.parent)
-        if carrier is None:
-            continue
-        share = float(shares[robot.joints.index(carrier.name)])
-        for element in (_child(inertial, 'mass'), _child(inertial, 'inertia')):
-            for key, value in element.attributes.items() if share < 1.0 else ():
-                element.setAttribute(key, repr(share * float(value)))
-    return _text(document)
 
 
 def _set_inertial(link: minidom.Element, parameters: FloatArray) -> None:
@@ -197,8 +172,9 @@ def _set_inertial(link: minidom.Element, parameters: FloatArray) -> None:
 
 def _check(robot: Robot, urdf: str) -> None:
     """Raise ModelError if a written URDF has other inertial parameters than the robot."""
-    found, wanted = _parameters(robot, urdf), robot.rigid_parameters.reshape(-1, PER_LINK)
-    worst = np.max(np.abs(found - wanted), axis=1)
+    read = robot_from_urdf(urdf, joints=robot.joints, source=robot.name)
+    wanted = robot.rigid_parameters
+    worst = np.max(np.abs(read.rigid_parameters - wanted).reshape(-1, PER_LINK), axis=1)
     scale = float(np.max(np.abs(wanted)))
     if np.any(worst > 1e-11 * scale):
         link = robot.links[int(np.argmax(worst))]

@@ -15,6 +15,7 @@ from xml.parsers import expat
 from armid_ros.errors import RobotError
 from armid_ros.files.documents import LARGEST
 from armid_ros.files.regular import TEXT_LIMIT
+from armid_ros.motion import FloatArray
 import numpy as np
 
 MOVABLE = ('revolute', 'continuous', 'prismatic')
@@ -34,11 +35,15 @@ class Inertial:
     rpy: Vector
     inertia: tuple[float, ...]
 
+    @property
+    def tensor(self) -> FloatArray:
+        """Inertia about the centre of mass, along the axes of `rpy`, shape (3, 3) [kg m^2]."""
+        ixx, ixy, ixz, iyy, iyz, izz = self.inertia
+        return np.array([[ixx, ixy, ixz], [ixy, iyy, iyz], [ixz, iyz, izz]])
+
     def doubt(self) -> str | None:
         """Return the reason why no body can have this inertia; None if the inertia is possible."""
-        ixx, ixy, ixz, iyy, iyz, izz = self.inertia
-        tensor = np.array([[ixx, ixy, ixz], [ixy, iyy, iyz], [ixz, iyz, izz]])
-        moments = np.linalg.eigvalsh(tensor)
+        moments = np.linalg.eigvalsh(self.tensor)
         # descriptions have six digits; moments below 1e-12 kg m^2 are negligible
         tolerance = max(1e-6 * float(np.abs(moments).max()), 1e-12)
         shown = ', '.join(f'{moment:.3g}' for moment in moments)
