@@ -13,12 +13,13 @@ import os
 from pathlib import Path
 import re
 import tempfile
-from typing import Self
+from typing import Any, Self
 
 from armid_ros.errors import RecordingError
 from armid_ros.files import open_regular, reading
 from armid_ros.recording.compression import unpacked, ZSTD
 from armid_ros.recording.mcap.source import McapSource
+from armid_ros.recording.message_types import store_for
 from armid_ros.recording.metadata import BagMetadata, FILE_NAME, read_metadata
 from armid_ros.recording.source import (
     Damage,
@@ -158,6 +159,16 @@ class Bag(Source):
             self._damage.add(
                 f'{FILE_NAME} states {expected} messages of {topic}, but the files have {count}'
             )
+
+    def decoded(self, topic: Topic, cdr: bytes) -> Any:
+        """Return a message of a topic as an object; RecordingError if it is damaged."""
+        store = store_for(topic.message_type)
+        try:
+            return store.deserialize_cdr(cdr, topic.type_name)
+        except Exception as error:  # damaged messages cause exceptions of any class
+            raise RecordingError(
+                f'{self.path}: {topic.name}: a message cannot be decoded: {error}'
+            ) from error
 
     def messages(self) -> Iterator[RawMessage]:
         """Yield the messages of all topics in the order of their log times."""

@@ -11,6 +11,7 @@ share/PACKAGE/msg/TYPE.msg below AMENT_PREFIX_PATH and below the prefix of this 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 import os
 from pathlib import Path
 import struct
@@ -86,6 +87,7 @@ def message_type(name: str, definition: str | None = None) -> MessageType:
     return MessageType(name, text, 'ros2msg', store.hash_rihs01(name))
 
 
+@cache
 def store_for(described: MessageType) -> Typestore:
     """Return a type store that decodes messages as the definition in their bag states."""
     if not described.definition:

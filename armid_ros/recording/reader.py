@@ -9,7 +9,6 @@ from dataclasses import replace
 from importlib.util import find_spec
 from itertools import chain
 from pathlib import Path
-import struct
 from typing import TYPE_CHECKING
 
 from armid_ros.errors import nearest, RecordingError
@@ -25,7 +24,7 @@ from armid_ros.recording.columns import (
 )
 from armid_ros.recording.joint_state.conversion import holds_joint_state, joint_state_blocks
 from armid_ros.recording.joint_state.decoder import JointSamples, JointStateDecoder
-from armid_ros.recording.message_types import BYTE_ORDERS, JOINT_STATE, STRING
+from armid_ros.recording.message_types import JOINT_STATE, STRING
 from armid_ros.recording.recording import PositionRange, Recording
 from armid_ros.recording.series import assemble
 from armid_ros.recording.source import DEFAULT, ReadSettings, Topic
@@ -394,13 +393,8 @@ def read_robot_description(path: str | Path, settings: ReadSettings = DEFAULT) -
             if topic.type_name != STRING or not topic.name.endswith('robot_description'):
                 continue
             for block in bag.blocks(topic.name):
-                cdr = block.message(len(block) - 1)
-                order = BYTE_ORDERS.get(cdr[:2])
-                if order is None or len(cdr) < 8:
-                    continue
-                (length,) = struct.unpack_from(order + 'I', cdr, 4)
-                text = cdr[8 : 8 + length].rstrip(b'\0').decode('utf-8', 'replace')
-                if text and length <= len(cdr) - 8:
+                text = bag.decoded(topic, block.message(len(block) - 1)).data
+                if text:
                     texts[topic.name] = text
     if len(set(texts.values())) > 1:
         raise RecordingError(

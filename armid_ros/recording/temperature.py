@@ -17,7 +17,6 @@ from typing import Any
 from armid_ros.errors import RecordingError
 from armid_ros.motion import FloatArray, Temperatures
 from armid_ros.recording.bag import Bag
-from armid_ros.recording.message_types import store_for
 from armid_ros.recording.recording import Recording
 from armid_ros.recording.source import Topic
 from armid_ros.recording.writer import BagWriter
@@ -117,7 +116,7 @@ def read_temperatures(bag: Bag, recording: Recording) -> Temperatures | None:
 
 def _readings(bag: Bag, topic: Topic, recording: Recording) -> Iterator[tuple[str, int, float]]:
     """Yield joint, stamp [ns] and temperature [degC] from a topic, at most ten per second."""
-    store, last = store_for(topic.message_type), dict[bytes, int]()
+    last: dict[bytes, int] = {}
     for block in bag.blocks(topic.name):
         for index, received in enumerate(block.log_time.tolist()):
             cdr = block.message(index)
@@ -126,12 +125,7 @@ def _readings(bag: Bag, topic: Topic, recording: Recording) -> Iterator[tuple[st
             if received - last.get(frame, -(10**18)) < 1e9 * _MIN_INTERVAL:
                 continue
             last[frame] = received
-            try:
-                message: Any = store.deserialize_cdr(cdr, topic.type_name)
-            except Exception as error:  # damaged messages cause exceptions of any class
-                raise RecordingError(
-                    f'{bag.path}: {topic.name}: message {index} cannot be decoded: {error}'
-                ) from error
+            message = bag.decoded(topic, cdr)
             stamp = message.header.stamp.sec * 10**9 + message.header.stamp.nanosec
             stamp = stamp if stamp and recording.clock == 'header' else received
             for name, value in _named(message, topic, recording.joints):

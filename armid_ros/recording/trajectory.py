@@ -12,13 +12,12 @@ from armid_ros.errors import RecordingError, TrajectoryError
 from armid_ros.files import reading
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.recording.bag import Bag
-from armid_ros.recording.message_types import JOINT_TRAJECTORY, store_for
+from armid_ros.recording.message_types import JOINT_TRAJECTORY
 from armid_ros.recording.metadata import LATCHED
 from armid_ros.recording.source import DEFAULT, ReadSettings
 from armid_ros.recording.writer import atomic_bag
 from armid_ros.robots.reference import Reference
 import numpy as np
-from rosbags.serde import SerdeError
 from rosbags.typesys import get_typestore, Stores
 
 
@@ -129,11 +128,7 @@ def read_waypoints(
     if not cdr:
         raise RecordingError(f'{where}: the topic has no messages')
     with reading(where, RecordingError):
-        try:
-            message: Any = store_for(chosen.message_type).deserialize_cdr(cdr, JOINT_TRAJECTORY)
-        except SerdeError as error:
-            raise RecordingError(f'the message cannot be decoded: {error}') from error
-        found = waypoints_of(message)
+        found = waypoints_of(bag.decoded(chosen, cdr))
     missing = [joint for joint in joints if joint not in found.joints]
     if missing:
         raise RecordingError(

@@ -45,17 +45,15 @@ def joint_state_blocks(bag: Bag, topic: Topic) -> Iterator[MessageBlock]:
     if topic.type_name == JOINT_STATE:
         yield from bag.blocks(topic.name)
         return
-    described, inside = topic.message_type, _inside(topic.message_type)
-    store = store_for(described)
+    inside, store = _inside(topic.message_type), store_for(topic.message_type)
     for block in bag.blocks(topic.name):
         messages = []
         for at in range(len(block)):
             try:
-                message = store.deserialize_cdr(block.message(at), described.name)
-                state = getattr(message, inside)
+                state = getattr(bag.decoded(topic, block.message(at)), inside)
                 messages.append(bytes(store.serialize_cdr(state, JOINT_STATE)))
-            except Exception:  # the decoder counts such messages as malformed
-                messages.append(bytes(4))
+            except RecordingError:
+                messages.append(bytes(4))  # the decoder counts such messages as malformed
         yield MessageBlock.joined(messages, block.log_time, block.publish_time)
 
 
