@@ -360,12 +360,11 @@ class ExcitationPublisherNode(ArmidNode):
     def _stop_run(self, reason: str, blocked: bool = False) -> None:
         """Send the motion that stops the arm on its path, or holds an arm that is at rest."""
         gate, monitor, now = self._gate, self._arm.monitor, self._arm.now()
-        self._gate = self._rehearsal = None
-        self._outcome = 'stopped'
-        self._ending = Ending(gate, self._begun, None, now, reason, blocked)
         deviation = gate.deviation(monitor, self._begun)
         motion = gate.stop(now - self._begun, self.value('stopping'), *deviation)
-        self._ending = replace(self._ending, last=motion)
+        self._gate = self._rehearsal = None
+        self._outcome = 'stopped'
+        self._ending = Ending(gate, self._begun, motion, now, reason, blocked)
         ending, held, refused = self._ending.updated(monitor, now, *map(self.value, _LIMITS))
         # positions alone may be frozen while the arm moves
         if held is not None and not refused and monitor.has_velocity:
