@@ -187,8 +187,7 @@ class ExcitationPublisherNode(ArmidNode):
     def _start(self, speed: float) -> str:
         """Plan a run at a share of the excitation's speed; send it to the controller."""
         self._waiting = False
-        if self.elapsed is not None:
-            raise TrajectoryError('an excitation is under way; ~/stop ends it')
+        self._require_no_run()
         fault = self._arm.fault_at_start(self._simulated)
         begin, behind = self._arm.monitor.q, self._arm.behind
         if fault:
@@ -286,10 +285,14 @@ class ExcitationPublisherNode(ArmidNode):
         if 'file' in names:
             self._excitation, self._rehearsed = self._loaded(self.value('file')), ''
 
-    def _require_rest(self) -> None:
-        """Raise a TrajectoryError if the arm may move: checks of a path would block the node."""
+    def _require_no_run(self) -> None:
+        """Raise a TrajectoryError during a run."""
         if self.elapsed is not None:
             raise TrajectoryError('an excitation is under way; ~/stop ends it')
+
+    def _require_rest(self) -> None:
+        """Raise a TrajectoryError if the arm may move: checks of a path would block the node."""
+        self._require_no_run()
         if self._ending is not None and self._ending.reason:
             raise TrajectoryError('whether the arm is at rest after its stop is not yet known')
 
