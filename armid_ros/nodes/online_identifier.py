@@ -248,38 +248,30 @@ class OnlineIdentifierNode(ListeningNode):
             self._timer.timer_period_ns = round(1e9 / self.value('estimate_rate'))
             self._timer.reset()  # otherwise the old period has to pass first
         if self.identifier is not None:
-            self.identifier.use(self._settings({}))
+            self.identifier.use(self._settings({name: self.value(name) for name in names}))
 
     def _settings(self, values: Mapping[str, Any]) -> OnlineSettings:
         """Return the identifier's settings, updated by new parameter values."""
-        identifier = self._require()
-        described = self._online_settings(identifier.arm, values)
-        can_change = {name: getattr(described, name) for name in OnlineIdentifier.CHANGEABLE}
-        return replace(identifier.settings, **can_change)
+        new = {name: x for name, x in values.items() if name in OnlineIdentifier.CHANGEABLE}
+        if 'false_alarm_time' in new:
+            new['false_alarm_time'] = new['false_alarm_time'] or None
+        return replace(self._require().settings, **new)
 
     def _described(self, description: str | None = None) -> OnlineIdentifier:
         """Return an identifier for a URDF text, or for the robot parameter."""
         arm = ArmModel.of(self.described_robot(description), effects=self.value('effects'))
-        settings = self._online_settings(arm, {})
-        return OnlineIdentifier(arm, settings, rng=np.random.default_rng(0))
-
-    def _online_settings(self, arm: ArmModel, values: Mapping[str, Any]) -> OnlineSettings:
-        """Return the settings in the ROS parameters, updated by new parameter values."""
-
-        def value(name: str) -> Any:
-            return values.get(name, self.value(name))
-
-        noise = tuple(value('torque_noise'))
+        noise = tuple(self.value('torque_noise'))
         if len(noise) == 1:
             noise = noise * arm.robot.n_joints
-        return OnlineSettings(
-            cutoff=value('cutoff'),
-            forgetting=value('forgetting'),
+        settings = OnlineSettings(
+            cutoff=self.value('cutoff'),
+            forgetting=self.value('forgetting'),
             torque_noise=noise if any(noise) else None,
-            max_gap=value('max_gap'),
-            measured_velocity=value('measured_velocity'),
-            false_alarm_time=value('false_alarm_time') or None,
+            max_gap=self.value('max_gap'),
+            measured_velocity=self.value('measured_velocity'),
+            false_alarm_time=self.value('false_alarm_time') or None,
         )
+        return OnlineIdentifier(arm, settings, rng=np.random.default_rng(0))
 
     def level(self, troubled: bool) -> bytes:
         """Return the level on /diagnostics: STALE without joint states, ERROR if unusable."""

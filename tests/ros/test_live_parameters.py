@@ -5,7 +5,7 @@
 from unittest.mock import Mock
 
 from armid_ros.arm import ArmModel
-from armid_ros.identification.online.identifier import OnlineIdentifier
+from armid_ros.identification.online.identifier import OnlineIdentifier, OnlineSettings
 from armid_ros.nodes.bag_player import BagPlayerNode
 from armid_ros.nodes.base import ArmidNode
 from armid_ros.nodes.live_diagnosis import LiveDiagnosisNode
@@ -88,8 +88,10 @@ def test_a_rate_is_followed_from_the_moment_it_is_set(bench):
 
 def test_the_identifier_goes_on_with_other_forgetting_and_thresholds(bench):
     arm = ArmModel.of('humanoid_arm', effects='viscous_friction')
-    core = OnlineIdentifier(arm, rng=np.random.default_rng(0))
+    core = OnlineIdentifier(arm, OnlineSettings(max_gap=7), rng=np.random.default_rng(0))
     node = bench.add(OnlineIdentifierNode, core)
+    node.set_parameters([Parameter('estimate_rate', value=5.0)])
+    assert core.settings.max_gap == 7
     for name, value in (('forgetting', 0.999), ('max_gap', 20), ('false_alarm_time', 0.0)):
         (result,) = node.set_parameters([Parameter(name, value=value)])
         assert result.successful, result.reason
