@@ -10,8 +10,9 @@ from dataclasses import replace
 from pathlib import Path
 
 from armid_ros.arm import ArmModel, load_model
-from armid_ros.effects import USUAL_EFFECTS
+from armid_ros.effects import make_effect, USUAL_EFFECTS
 from armid_ros.errors import RecordingError, RobotError, TrajectoryError
+from armid_ros.files.cells import parted
 from armid_ros.identification import SignalSettings
 from armid_ros.identification.rows.signals import conditioning, no_stretch, segments
 from armid_ros.motion import Motion
@@ -72,6 +73,15 @@ def arm_of(arm: RobotLike, effects: str = USUAL) -> ArmModel:
     if not isinstance(arm, Robot) and is_model(arm):
         return load_model(arm)
     return ArmModel.of(arm if isinstance(arm, Robot) else str(arm), effects=effects)
+
+
+def with_effects(arm: ArmModel, names: str) -> ArmModel:
+    """Add those of the named effects, separated by commas, that the arm does not have yet."""
+    for name in filter(None, parted(names)):
+        effect = make_effect(name, arm.robot)
+        if (effect.name, effect.joints) not in [(own.name, own.joints) for own in arm.effects]:
+            arm = arm.with_effect(effect)
+    return arm
 
 
 def drivable(arm: RobotLike) -> ArmModel:

@@ -157,6 +157,7 @@ def diagnose(
         raise click.UsageError('--baseline and --no-baseline were both given; give only one')
     if against and (model or baseline):
         raise click.UsageError('--against cannot be used together with --model or --baseline')
+    from armid_ros.api.arguments import with_effects
     from armid_ros.api.diagnosis import diagnose as run
     from armid_ros.api.diagnosis import DiagnosisResult, require_residual
     from armid_ros.arm import ArmModel
@@ -168,7 +169,7 @@ def diagnose(
     staged = options.stage(out, DiagnosisResult.schema, robot_source)
     robot = options.open_robot(robot_source, gravity, joints, bags)
     arm = ArmModel(robot) if model is None else _model_of(model, robot)
-    arm = options.with_effects(arm, effects)
+    arm = with_effects(arm, effects)
     other = open_partner(partner, ties, robot, gravity)
     misfit = None if model is None else read_misfit(model, arm)
     if model is not None and other is None and not (baseline or no_baseline):

@@ -220,6 +220,7 @@ def excite(
     **settings: Any,
 ) -> None:
     """Design a trajectory that excites the parameters, inside all limits, free of collisions."""
+    from armid_ros.api.arguments import with_effects
     from armid_ros.api.design import design_excitation
     from armid_ros.api.excitation import ExcitationResult
     from armid_ros.arm import ArmModel
@@ -238,9 +239,9 @@ def excite(
         write_course(kind, scene, duration, share, seed, out)
         return
     arm = ArmModel(robot) if model is None else options.model_of(model, robot)
-    arm = options.with_effects(arm, effects)
-    other = None if rival is None else options.with_effects(arm, rival.removesuffix('none'))
-    arm = options.with_effects(arm, focus)
+    arm = with_effects(arm, effects)
+    other = None if rival is None else with_effects(arm, rival.removesuffix('none'))
+    arm = with_effects(arm, focus)
     for text in texts:
         arm = arm.with_effect(*parse_effect(text, robot))
     require_free(out)

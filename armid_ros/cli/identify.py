@@ -89,6 +89,7 @@ def identify(
     **settings: Any,
 ) -> None:
     """Identify an arm model with uncertainties from recordings."""
+    from armid_ros.api.arguments import with_effects
     from armid_ros.api.identification import IdentificationResult
     from armid_ros.api.identification import identify as run
     from armid_ros.arm import ArmModel
@@ -98,7 +99,7 @@ def identify(
 
     staged = options.stage(out, IdentificationResult.schema, robot_source)
     robot = options.open_robot(robot_source, gravity, joints, bags, tell=False)
-    arm = options.with_effects(ArmModel(robot, quasi_static=quasi_static), effects)
+    arm = with_effects(ArmModel(robot, quasi_static=quasi_static), effects)
     if not physical and (total_mass is not None or mass_range is not None or boxes):
         raise IdentificationError('--total-mass, --mass-range and --box need --physical')
     corners = dict(options.box(text, robot) for text in boxes)

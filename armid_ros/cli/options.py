@@ -19,7 +19,6 @@ from armid_ros.cli.commands import NOTES
 from armid_ros.cli.following import next_command
 from armid_ros.cli.parameters import CRC, FORCE, MEMORY
 from armid_ros.cli.terminal import say
-from armid_ros.effects import make_effect
 from armid_ros.errors import ModelError, RobotError, visible
 from armid_ros.files import (
     default_memory_limit,
@@ -30,7 +29,7 @@ from armid_ros.files import (
     staged,
     write_file,
 )
-from armid_ros.files.cells import listed, parted
+from armid_ros.files.cells import listed
 from armid_ros.files.output import hash_files, WRITES
 from armid_ros.identification import write_document
 from armid_ros.motion import FloatArray
@@ -261,15 +260,6 @@ def model_of(path: Path, robot: Robot | None) -> ArmModel:
             f'{path}: its gravity is {known}, but --gravity is {typed}: leave out --gravity, or '
             'write the other gravity into the file if the mounting of the arm has changed'
         )
-    return arm
-
-
-def with_effects(arm: ArmModel, names: str) -> ArmModel:
-    """Add those effects of --effects that the arm does not have yet."""
-    for name in filter(None, parted(names)):
-        effect = make_effect(name, arm.robot)
-        if (effect.name, effect.joints) not in [(own.name, own.joints) for own in arm.effects]:
-            arm = arm.with_effect(effect)
     return arm
 
 

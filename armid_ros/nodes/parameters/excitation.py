@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from armid_ros.api.arguments import USUAL
+from armid_ros.api.arguments import USUAL, with_effects
 from armid_ros.arm import ArmModel, load_model
 from armid_ros.errors import TrajectoryError
 from armid_ros.excitation import (
@@ -22,7 +22,6 @@ from armid_ros.excitation import (
 )
 from armid_ros.excitation.feasibility import excitation_faults
 from armid_ros.files import reading
-from armid_ros.nodes.parameters.arm import with_effects
 from armid_ros.nodes.parameters.table import NodeParameter, setting, Values
 from armid_ros.robots import load_arms, load_robot
 import numpy as np
@@ -243,9 +242,7 @@ def make_excitation(value: Values, rate: float, planner: TransferPlanner) -> Exc
     """
     if value('file'):
         return checked(load_excitation(value('file')), planner, value('file'))
-    arm = planner.arm
-    own = {effect.name for effect in arm.effects}
-    arm = with_effects(arm, [name for name in value('effects') if name not in own])
+    arm = with_effects(planner.arm, ','.join(value('effects')))
     periods, run_in = value('n_periods'), value('run_in')
     settings = DesignSettings(
         period=whole_period(value('duration'), periods, run_in, rate),
