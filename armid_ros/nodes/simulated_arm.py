@@ -14,21 +14,15 @@ from armid_ros.arm.model_file import load_model, read_model
 from armid_ros.errors import ArmidError, ModelError, RobotError, TrajectoryError
 from armid_ros.files import reading
 from armid_ros.nodes.base import ArmidNode
-from armid_ros.nodes.parameters.arm import (
-    ARM_PARAMETERS,
-    SENSOR_PARAMETERS,
-    sensors_of,
-    with_effects,
-)
-from armid_ros.nodes.parameters.table import setting
+from armid_ros.nodes.parameters.table import NodeParameter, setting
 from armid_ros.nodes.qos import LATCHED, SAMPLES, STREAM
 from armid_ros.nodes.running.process import run
 from armid_ros.nodes.running.real_time import RealTime
-from armid_ros.recording.columns import numbers
+from armid_ros.recording.columns import numbers, per_joint
 from armid_ros.recording.elastic import imu_topic, LINK, REFERENCE
 from armid_ros.recording.trajectory import waypoints_of
 from armid_ros.robots import load_robot, parse_gravity
-from armid_ros.simulation import Reference, SimulatedArm
+from armid_ros.simulation import Reference, Sensors, SimulatedArm
 from armid_ros.simulation.elastic import make_simulated_arm, shipped_arm
 from armid_ros.simulation.run import whole_steps
 from armid_ros.simulation.simulated_arm import LinkSample
@@ -46,6 +40,8 @@ from trajectory_msgs.msg import JointTrajectory
 
 #: Longest accepted trajectory [s]; its waypoints are checked against the limits before its start.
 MAX_DURATION = 3600.0
+#: Parameters of the sensors that can be set while the arm moves, one number or one per joint.
+_SENSORS = ('torque_noise', 'position_noise', 'velocity_noise', 'resolution')
 
 
 def _measurement_publisher(node: Node, kind: type, topic: str) -> Publisher:
@@ -106,7 +102,44 @@ class SimulatedArmNode(ArmidNode):
     """
 
     table = (
-        *ARM_PARAMETERS,
+        NodeParameter('robot', 'humanoid_arm', 'A shipped robot, or the path of a URDF or xacro.'),
+        NodeParameter(
+            'gravity',
+            '',
+            'earth, moon, or x,y,z in the base frame; empty: that of the model, or earth [m/s^2].',
+            check=lambda text: text and parse_gravity(text),
+        ),
+        NodeParameter(
+            'model', '', 'Path of a model.yaml; empty: the description and the effects.'
+        ),
+        setting(
+            'effects',
+            [''],
+            'Effects, each as NAME[@joint+joint]:quantity=value,quantity=value; a change applies '
+            'to the moving arm.',
+        ),
+        NodeParameter(
+            'start', '', 'Initial position q1,q2,...; empty: middle of the limits [rad or m].'
+        ),
+        *(
+            setting(name, [0.0], f'{text}, one number or one per joint; 0: none.', unit)
+            for name, text, unit in (
+                ('torque_noise', 'Standard deviation of measured torques', 'N m or N'),
+                ('position_noise', 'Standard deviation of measured positions', 'rad or m'),
+                ('velocity_noise', 'Standard deviation of measured velocities', 'rad/s'),
+                ('resolution', 'Step of the encoders', 'rad or m'),
+            )
+        ),
+        NodeParameter(
+            'torque_delay', 0, 'Delay of the torque measurement [time steps].', limits=(0, 100000)
+        ),
+        NodeParameter(
+            'loop_gain', 1.0, 'Factor on the loop gains of elastic joints.', limits=(0.0, 10.0)
+        ),
+        NodeParameter('seed', 0, 'Random seed of the noise.', limits=(0, 2**62)),
+        NodeParameter(
+            'time_step', 0.001, 'Time step of the integration.', 's', limits=(1e-5, 0.01)
+        ),
         setting('rate', 1000.0, 'Publishing rate of joint_states.', 'Hz', limits=(0.1, 100000.0)),
         setting(
             'real_time_factor',
@@ -184,13 +217,13 @@ class SimulatedArmNode(ArmidNode):
             if start and len(start) != n:
                 raise RobotError(f'the start pose has {len(start)} numbers, the arm {n} joints')
         return make_simulated_arm(
-            with_effects(arm, self.value('effects')),
+            self._with_effects(self.value('effects')),
             rng=np.random.default_rng(self.value('seed')),
             warn=self.get_logger().warn,
             drives=drives,
             gain=self.value('loop_gain'),
             dt=self.value('time_step'),
-            sensors=sensors_of(self.value, arm.robot.joints),
+            sensors=self._sensors(arm.robot.joints, {}),
             start=start or None,
         )
 
@@ -312,7 +345,7 @@ class SimulatedArmNode(ArmidNode):
     def check(self, values: Mapping[str, Any]) -> None:
         """Raise an ArmidError if the arm cannot have new effects, noise or rates."""
         with reading(f'parameter {", ".join(map(repr, values))}', ArmidError):
-            sensors_of(lambda name: values.get(name, self.value(name)), self._arm.joints)
+            self._sensors(self._arm.joints, values)
             self._steps_at(values.get('rate', self.value('rate')))
             if 'effects' in values:
                 self._arm.successor(self._with_effects(values['effects']))
@@ -324,8 +357,8 @@ class SimulatedArmNode(ArmidNode):
         if names & {'rate', 'real_time_factor', 'clock_rate'}:
             self.real_time.given_up = 0.0
             self._set_rates()
-        described = sensors_of(self.value, self._arm.joints)
-        known = {name: getattr(described, name) for name in names & set(SENSOR_PARAMETERS)}
+        described = self._sensors(self._arm.joints, {})
+        known = {name: getattr(described, name) for name in names & set(_SENSORS)}
         self._arm.sensors = replace(self._arm.sensors, **known)
 
     def _with_effects(self, texts: Sequence[str]) -> ArmModel:
@@ -333,7 +366,17 @@ class SimulatedArmNode(ArmidNode):
             raise ModelError(
                 "the parameter 'effects' cannot change an arm that was given to the node in Python"
             )
-        return with_effects(self._without_effects, texts)
+        arm = self._without_effects
+        more = ArmModel.of(arm.robot, effects=tuple(filter(None, texts)))
+        return replace(arm, effects=arm.effects + more.effects, values=arm.values + more.values)
+
+    def _sensors(self, joints: Sequence[str], values: Mapping[str, Any]) -> Sensors:
+        """Return the sensors of the ROS parameters, updated by new parameter values."""
+        noise = {
+            name: per_joint(values.get(name, self.value(name)), joints, f"parameter '{name}'")
+            for name in _SENSORS
+        }
+        return Sensors(**noise, torque_delay=self.value('torque_delay'))
 
     def _replace_model(self, arm: ArmModel) -> None:
         self._arm.become(arm)
