@@ -332,8 +332,11 @@ class ArmidNode(Node):
         self.complaints.fresh = False
 
     def _validate(self, parameters: list[Parameter]) -> SetParametersResult:
+        values = {p.name: p.value for p in parameters}
         try:
-            self.check({p.name: p.value for p in parameters})
+            for name in values.keys() & self._entries.keys():
+                self._entries[name].require(values[name])
+            self.check(values)
         except ArmidError as error:
             return SetParametersResult(successful=False, reason=str(error))
         return SetParametersResult(successful=True)

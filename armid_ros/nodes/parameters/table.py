@@ -11,12 +11,7 @@ import math
 from typing import Any
 
 from armid_ros.errors import ArmidError
-from rcl_interfaces.msg import (
-    FloatingPointRange,
-    IntegerRange,
-    ParameterDescriptor,
-    SetParametersResult,
-)
+from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
@@ -105,26 +100,26 @@ class NodeParameter:
             instead = f'use a text; quote other values twice: -p {self.name}:="\'{value}\'"'
         raise ParameterError(f"the parameter '{self.name}' cannot be {value}; {instead}")
 
-    def objection(self, value: object) -> str:
-        """Return why a value is not allowed; empty if it is allowed."""
+    def require(self, value: object) -> None:
+        """Raise a ParameterError if a value is not allowed."""
         if isinstance(value, float) and not math.isfinite(value):
-            return f"parameter '{self.name}' is {value}, not a finite number"
+            raise ParameterError(f"parameter '{self.name}' is {value}, not a finite number")
         if isinstance(value, int | float) and self.limits is not None:
             lower, upper = self.limits
             if not lower <= value <= upper:
                 unit = f' {self.unit}' if self.unit else ''
-                return (
+                raise ParameterError(
                     f"parameter '{self.name}' is {value}, outside its range "
                     f'{lower:g} to {upper:g}{unit}'
                 )
         if self.choices and value not in self.choices:
-            return f"parameter '{self.name}' is '{value}', not one of {', '.join(self.choices)}"
+            known = ', '.join(self.choices)
+            raise ParameterError(f"parameter '{self.name}' is '{value}', not one of {known}")
         if self.check is not None:
             try:
                 self.check(value)
             except ArmidError as error:
-                return f"parameter '{self.name}': {error}"
-        return ''
+                raise ParameterError(f"parameter '{self.name}': {error}") from error
 
 
 #: Parameter that can be set while the node runs, with the arguments of `NodeParameter`.
@@ -142,29 +137,17 @@ def declare(node: Node, table: Iterable[NodeParameter]) -> dict[str, NodeParamet
     Raises
     ------
     ParameterError
-        If a given value has the wrong type, or is not permitted. Later changes are checked too.
+        If a given value has the wrong type, or is not permitted.
 
     """
     entries = {entry.name: entry for entry in table}
-
-    def validate(parameters: list[Parameter]) -> SetParametersResult:
-        for parameter in parameters:
-            if parameter.name in entries:
-                reason = entries[parameter.name].objection(parameter.value)
-                if reason:
-                    return SetParametersResult(successful=False, reason=reason)
-        return SetParametersResult(successful=True)
-
     given = overrides(node)
     for name, entry in entries.items():
         value = entry.default
         if name in given:
             value = entry.converted(given[name].value)
-            reason = entry.objection(value)
-            if reason:
-                raise ParameterError(reason)
+            entry.require(value)
         node.declare_parameter(name, value, entry.descriptor(), ignore_override=True)
-    node.add_on_set_parameters_callback(validate)
     return entries
 
 
