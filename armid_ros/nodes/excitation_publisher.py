@@ -146,7 +146,6 @@ class ExcitationPublisherNode(ArmidNode):
 
     def poll(self) -> None:
         """Start a run once controller and joint states exist; stop it if one of them is lost."""
-        self._controller.poll()
         now, patience = self._arm.now(), self.value('state_timeout')
         if self.elapsed is not None:
             # no joint states were processed while the path was planned

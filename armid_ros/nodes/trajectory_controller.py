@@ -74,8 +74,7 @@ class TrajectoryController:
     action : str
         Full name of the action.
     client : ActionClient or None
-        None if only the topic is used, no controller has offered the action so far, or
-        control_msgs is not installed.
+        None if only the topic is used, or control_msgs is not installed.
     taken : bool
         Whether another client has sent a goal since the last one of this node.
 
@@ -105,19 +104,19 @@ class TrajectoryController:
         self.client: ActionClient | None = None
         self._node, self._on_end = node, on_end
         self._kind = node.value('interface')
-        self._by_action, self._possible = False, self._kind != 'topic'
+        self._by_action = False
         self._goal: _Goal | None = None
         self.taken = False
         self._error, self._seen = math.nan, -math.inf
         self._known: set[bytes] = set()
         self._requests: list[Future] = []
-        if self._kind == 'action':
+        if self._kind != 'topic':
             self._make_client()
-            if self.client is None:
-                raise TrajectoryError(
-                    "the parameter 'interface' is action, but the package control_msgs is not "
-                    'installed: apt install ros-jazzy-control-msgs, or use interface:=topic'
-                )
+        if self._kind == 'action' and self.client is None:
+            raise TrajectoryError(
+                "the parameter 'interface' is action, but the package control_msgs is not "
+                'installed: apt install ros-jazzy-control-msgs, or use interface:=topic'
+            )
 
     @property
     def readers(self) -> int:
@@ -154,11 +153,6 @@ class TrajectoryController:
         """Largest joint error that the controller reported [rad or m], or NaN."""
         return self._error if self.under_way else math.nan
 
-    def poll(self) -> None:
-        """Make an action client as soon as a controller offers the action."""
-        if self._possible and self.client is None and self._servers:
-            self._make_client()
-
     def discover(self) -> None:
         """
         Wait for a controller that accepts goals, at most one second.
@@ -169,7 +163,6 @@ class TrajectoryController:
             If no controller can receive a trajectory.
 
         """
-        self.poll()
         if self.client is not None and self._servers:
             deadline = time.monotonic() + 1.0  # the discovery of an action takes at most this long
             while not self._ready and time.monotonic() < deadline:
@@ -244,7 +237,6 @@ class TrajectoryController:
             from control_msgs.action import FollowJointTrajectory
             from control_msgs.msg import JointTolerance
         except ImportError:
-            self._possible = False
             return
         self._kind_of_goal, self._tolerance = FollowJointTrajectory.Goal, JointTolerance
         self.client = ActionClient(self._node, FollowJointTrajectory, self.action)
