@@ -37,7 +37,7 @@ from armid_ros.diagnosis.verdict.document import SCHEMA
 from armid_ros.effects.tied import Partner
 from armid_ros.errors import IdentificationError
 from armid_ros.excitation import save_excitation
-from armid_ros.files import json_text, write_file
+from armid_ros.files import write_file
 from armid_ros.files.cells import csv_text
 from armid_ros.identification import SignalSettings
 from armid_ros.identification.assess.verification import ForwardValidation, simulate_held_out
@@ -194,15 +194,13 @@ class DiagnosisResult(ShownModel):
 
     def fill(self, folder: Path, origin: ResultOrigin = DEFAULT_ORIGIN) -> dict[str, Any]:
         """Write diagnosis.json, model.yaml and report.html into a folder."""
-        source, document = origin.of(source_of(self.description.robot)).source, self.document()
+        source = origin.of(source_of(self.description.robot)).source
         save_model(folder / 'model.yaml', self.arm, source, self.core.estimate, self.misfit)
-        write_file(folder / 'diagnosis.json', json_text(document, indent=1))
         if self.residual is not None:
             write_file(folder / self.residual.table_file, csv_text(self.residual.table()))
         if self.next_run is not None:
             save_excitation(self.next_run.excitation, folder / self.plan_file)
-        write_file(folder / 'report.html', self.page(origin))
-        return document
+        return super().fill(folder, origin)
 
     @property
     def files(self) -> list[str]:
