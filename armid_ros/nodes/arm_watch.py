@@ -13,6 +13,7 @@ from armid_ros.excitation.supervision import tracking_fault
 from armid_ros.motion import FloatArray
 from armid_ros.nodes.base import ArmidNode
 from armid_ros.nodes.messages.timeliness import StampDifference
+from armid_ros.nodes.qos import publisher_names
 from armid_ros.recording.joint_state.decoder import JointStateMessages
 from armid_ros.robots import Robot
 import numpy as np
@@ -181,9 +182,9 @@ class ArmWatch:
             )
         if fault:
             return f'{topic}: {fault}'
-        senders = self._node.get_publishers_info_by_topic(topic)
+        senders = publisher_names(self._node, topic)
         if len(senders) > self.monitor.sources:
-            names = ', '.join(sorted(s.node_name for s in senders))
+            names = ', '.join(senders)
             return f'{topic}: {len(senders)} publishers for the same joints ({names}): stop one'
         late, clock = self.stamps.late, self._node.get_clock().now().nanoseconds * 1e-9
         if not abs(late) > difference:

@@ -66,6 +66,12 @@ def _profile(depth: int, reliable: bool, latched: bool) -> QoSProfile:
     )
 
 
+def publisher_names(node: Node, topic: str) -> list[str]:
+    """Return the full name of the node of each publisher of a topic, sorted."""
+    found = node.get_publishers_info_by_topic(topic)
+    return sorted(f'{p.node_namespace.rstrip("/")}/{p.node_name}' for p in found)
+
+
 class MatchedSubscription:
     """
     Subscription that starts once its topic has publishers, with their QoS.
@@ -112,11 +118,10 @@ class MatchedSubscription:
     @property
     def several(self) -> str:
         """Return a text on the publishers of the topic if there are at least two, else ''."""
-        found = self._node.get_publishers_info_by_topic(self.topic)
-        if len(found) < 2:
+        names = publisher_names(self._node, self.topic)
+        if len(names) < 2:
             return ''
-        nodes = (f'{p.node_namespace.rstrip("/")}/{p.node_name}' for p in found)
-        return f'{len(found)} nodes publish {self.topic}: {", ".join(sorted(nodes))}; stop one'
+        return f'{len(names)} nodes publish {self.topic}: {", ".join(names)}; stop one'
 
     def match(self) -> None:
         """Subscribe if the topic has publishers; subscribe again if their QoS changed."""

@@ -14,7 +14,7 @@ from uuid import uuid4
 from action_msgs.msg import GoalStatus, GoalStatusArray
 from armid_ros.errors import TrajectoryError
 from armid_ros.motion import Motion
-from armid_ros.nodes.qos import LATCHED, STREAM
+from armid_ros.nodes.qos import LATCHED, publisher_names, STREAM
 from rclpy.action import ActionClient
 from rclpy.action.client import ClientGoalHandle
 from rclpy.duration import Duration
@@ -126,8 +126,7 @@ class TrajectoryController:
     @property
     def _rivals(self) -> str:
         """Return a remark on other nodes that can send trajectories to the topic, or ''."""
-        found = self._node.get_publishers_info_by_topic(self.topic)
-        names = {f'{p.node_namespace.rstrip("/")}/{p.node_name}' for p in found}
+        names = {*publisher_names(self._node, self.topic)}
         others = ', '.join(sorted(names - {self._node.get_fully_qualified_name()}))
         return f'; {others} can also move the arm by {self.topic}' if others else ''
 
