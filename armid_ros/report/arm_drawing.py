@@ -38,7 +38,7 @@ _VIEW = pin.rpy.rpyToMatrix(np.radians(72.0), 0.0, np.radians(35.0)).T
 @dataclass(frozen=True)
 class ArmDrawing(Templated):
     """
-    Drawing of an arm as SVG elements, in one pose or in several poses side by side.
+    Drawing of an arm in one pose, as SVG elements.
 
     Attributes
     ----------
@@ -47,11 +47,9 @@ class ArmDrawing(Templated):
     bodies : tuple of (str, str)
         Outline of each body as coordinates of SVG, far ones first, and its colour.
     dots : tuple of (float, float, str, str)
-        Position [px], colour and name of joints, or of the last body in each pose.
-    paths : tuple of str
-        Path of the last body, for each pose.
-    captions : tuple of (float, str)
-        Position [px] and text of each caption.
+        Position [px], colour and name of joints, or of the last body without a name.
+    path : str
+        Path of the last body, as coordinates of SVG; empty for none.
     labels : tuple of (float, float, float, float, str)
         Ends of a line from a joint to its name [px], and the name.
     gravity : bool
@@ -67,18 +65,15 @@ class ArmDrawing(Templated):
     height: float
     bodies: tuple[tuple[str, str], ...]
     dots: tuple[tuple[float, float, str, str], ...]
-    paths: tuple[str, ...] = ()
-    captions: tuple[tuple[float, str], ...] = ()
+    path: str = ''
     labels: tuple[tuple[float, float, float, float, str], ...] = ()
     gravity: bool = False
-    label: str = 'Poses of the arm'
+    label: str = 'Pose of the arm'
 
 
-def draw_poses(
-    collision: CollisionModel, poses: FloatArray, captions: Sequence[str], path: FloatArray
-) -> ArmDrawing:
+def draw_poses(collision: CollisionModel, poses: FloatArray, path: FloatArray) -> list[ArmDrawing]:
     """
-    Draw an arm and its obstacles in several poses, with the path of its last body.
+    Draw an arm and its obstacles in each of several poses, with the path of its last body.
 
     Parameters
     ----------
@@ -86,8 +81,6 @@ def draw_poses(
         Bodies of the arm, and obstacles; half spaces are not drawn.
     poses : ndarray, shape (K, n)
         Poses to draw [rad or m].
-    captions : sequence of str, length K
-        Text below each pose.
     path : ndarray, shape (N, n)
         Poses along the path of the last body [rad or m].
 
@@ -101,23 +94,25 @@ def draw_poses(
         np.array([_flat(frame[last.joint].act(last.points.mean(axis=0))) for frame in some])
         for some in (frames, along)
     )
-    strip = _Strip.of(solids, frames, (190.0, 230.0), track)
+    pictures = [_picture(solids, frame) for frame in frames]
+    hulls = [hull for picture in pictures for hull, _ in picture]
+    canvas = _Canvas.around([track, *hulls], (190.0, 230.0))
 
     def colour(solid: _Solid) -> str:
         share = round(100.0 * solid.joint / len(robot.links))
         along_arm = f'color-mix(in srgb, var(--residual) {share}%, var(--measured))'
         return along_arm if solid.of_arm else OBSTACLE
 
-    return ArmDrawing(
-        round(strip.pitch * len(poses), 1),
-        round(strip.height + 30.0, 1),  # with a line of captions
-        strip.bodies(colour),
-        tuple(
-            (*strip.place(tip, k).tolist(), 'var(--predicted)', '') for k, tip in enumerate(tips)
-        ),
-        tuple(svg_points(strip.place(track, pose)) for pose in range(len(poses))),
-        tuple((round((k + 0.5) * strip.pitch, 1), text) for k, text in enumerate(captions)),
-    )
+    return [
+        ArmDrawing(
+            round(canvas.width, 1),
+            round(canvas.height, 1),
+            canvas.bodies(picture, colour),
+            ((*canvas.place(tip).tolist(), 'var(--predicted)', ''),),
+            canvas.svg(track),
+        )
+        for picture, tip in zip(pictures, tips, strict=True)
+    ]
 
 
 def draw_arm(
@@ -145,30 +140,29 @@ def draw_arm(
         poses = list(robot.positions(q[kept]))
     tried = [_frames(robot.model, pose) for pose in poses]
     seen = [np.array([_flat(one.translation) for one in frames]) for frames in tried]
-    frames = tried[int(np.argmax([np.prod(np.ptp(one, axis=0) + _MIN_SIZE) for one in seen]))]
-    solids = _solids(robot, collision_geometry(robot)[0])
-    strip = _Strip.of(solids, [frames], (300.0, 240.0))
+    best = int(np.argmax([np.prod(np.ptp(one, axis=0) + _MIN_SIZE) for one in seen]))
+    picture = _picture(_solids(robot, collision_geometry(robot)[0]), tried[best])
+    canvas = _Canvas.around([hull for hull, _ in picture], (300.0, 240.0))
 
     def colour(joint: int, other: str) -> str:
         chosen = joint > 0 and robot.moving[joint - 1] in marked
         return 'var(--predicted)' if chosen else other
 
     dots = [
-        (*strip.place(_flat(frames[k].translation), 0).tolist(), dot, name)
+        (*canvas.place(seen[best][k]).tolist(), colour(k, 'var(--measured)'), name)
         for k, name in enumerate(robot.moving, start=1)
-        for dot in [colour(k, 'var(--measured)')]
     ]
     labels, y, line = [], 0.0, 16.0  # height of a line of text [px]
     for x, top, _, name in sorted(
         (one for one in dots if one[3] in marked), key=lambda one: one[1]
     ):
         y = max(top, y + line)
-        labels.append((x, top, round(strip.pitch, 1), round(y, 1), name))
+        labels.append((x, top, round(canvas.width, 1), round(y, 1), name))
     letters = max((len(name) for *_, name in labels), default=0)
     return ArmDrawing(
-        round(strip.pitch + 9.5 * letters, 1),  # a letter is 9.5 px wide
-        round(max(strip.height, y + line), 1),
-        strip.bodies(lambda solid: colour(solid.joint, 'var(--faint)')),
+        round(canvas.width + 9.5 * letters, 1),  # a letter is 9.5 px wide
+        round(max(canvas.height, y + line), 1),
+        canvas.bodies(picture, lambda solid: colour(solid.joint, 'var(--faint)')),
         tuple(sorted(dots, key=lambda one: one[3] in marked)),  # on top of the others
         labels=tuple(labels),
         gravity=bool(np.any(robot.gravity)),
@@ -232,53 +226,47 @@ def _flat(points: FloatArray) -> FloatArray:
     return np.asarray(points @ _VIEW[:2].T)
 
 
-@dataclass(frozen=True)
-class _Strip:
-    """Picture frames of equal size side by side, one for each pose."""
+#: Outline of each body in the drawing plane, and the body; far ones first.
+_Picture = list[tuple[FloatArray, _Solid]]
 
-    solids: Sequence[_Solid]
-    frames: Sequence[list[pin.SE3]]
+
+def _picture(solids: Sequence[_Solid], frames: Sequence[pin.SE3]) -> _Picture:
+    """Return the outlines of all bodies, for the frames of all joints."""
+    seen = [(*solid.seen(frames[solid.joint]), solid) for solid in solids]
+    return [(hull, solid) for hull, _, solid in sorted(seen, key=lambda one: one[1])]
+
+
+@dataclass(frozen=True)
+class _Canvas:
+    """Map from the drawing plane [m] to pixels."""
+
     left: float  # [m]
     top: float  # [m]
-    pitch: float  # width of a picture frame [px]
+    width: float  # [px]
     height: float  # [px]
     scale: float  # [px/m]
 
     @classmethod
-    def of(
-        cls,
-        solids: Sequence[_Solid],
-        frames: Sequence[list[pin.SE3]],
-        room: tuple[float, float],
-        *others: FloatArray,
-    ) -> _Strip:
-        """Return frames of at most a given size [px] that show all bodies and points."""
-        hulls = [solid.seen(frame[solid.joint])[0] for frame in frames for solid in solids]
-        points, margin = np.concatenate([*others, *hulls]), 0.03  # around a drawing [m]
+    def around(cls, shapes: Sequence[FloatArray], room: tuple[float, float]) -> _Canvas:
+        """Return a canvas of at most a given size [px] that shows all points of some shapes."""
+        points, margin = np.concatenate(shapes), 0.03  # around a drawing [m]
         left, low = (points.min(axis=0) - margin).tolist()
         right, high = (points.max(axis=0) + margin).tolist()
         width, height = right - left, high - low
         scale = min(room[0] / width, room[1] / height)
-        return cls(solids, frames, left, high, width * scale, height * scale, scale)
+        return cls(left, high, width * scale, height * scale, scale)
 
-    def place(self, points: FloatArray, pose: int) -> FloatArray:
-        """Convert points of the drawing plane, (..., 2) [m], to pixels in the frame of a pose."""
-        right = pose * self.pitch + self.scale * (points[..., 0] - self.left)
-        down = self.scale * (self.top - points[..., 1])
-        return np.asarray(np.round(np.stack([right, down], axis=-1), 1))
+    def place(self, points: FloatArray) -> FloatArray:
+        """Convert points of the drawing plane, (..., 2) [m], to pixels."""
+        from_corner = np.stack([points[..., 0] - self.left, self.top - points[..., 1]], axis=-1)
+        return np.asarray(np.round(self.scale * from_corner, 1))
 
-    def bodies(self, colour: Callable[[_Solid], str]) -> tuple[tuple[str, str], ...]:
-        """Return outline and colour of each body in each pose, sorted from far to near."""
-        found = []
-        for pose, frame in enumerate(self.frames):
-            seen = [(solid, *solid.seen(frame[solid.joint])) for solid in self.solids]
-            found += [
-                (svg_points(self.place(hull, pose)), colour(solid))
-                for solid, hull, _ in sorted(seen, key=lambda one: one[2])
-            ]
-        return tuple(found)
+    def svg(self, points: FloatArray) -> str:
+        """Format points of the drawing plane, (K, 2) [m], as an SVG list of points."""
+        return ' '.join(f'{x:.1f},{y:.1f}' for x, y in self.place(points))
 
-
-def svg_points(points: FloatArray) -> str:
-    """Format points (K, 2) [px] as an SVG list of points."""
-    return ' '.join(f'{x:.1f},{y:.1f}' for x, y in points)
+    def bodies(
+        self, picture: _Picture, colour: Callable[[_Solid], str]
+    ) -> tuple[tuple[str, str], ...]:
+        """Return SVG outline and colour of each body."""
+        return tuple((self.svg(hull), colour(solid)) for hull, solid in picture)

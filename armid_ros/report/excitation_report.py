@@ -38,6 +38,7 @@ from armid_ros.report.blocks import (
     Origin,
     Panels,
     Paragraph,
+    SmallMultiples,
     TableCell,
     VerdictSection,
 )
@@ -106,18 +107,20 @@ def excitation_report(
     poses = draw_poses(
         with_obstacles(collision, obstacles),
         excitation.at(instants).q,
-        [f'{t:.1f} s' for t in instants],
         excitation.trajectory.one_period(150).q,
     )
+    figures = [
+        (f'{t:.1f} s', '', pose.html(), '') for t, pose in zip(instants, poses, strict=True)
+    ]
     colours = [
         ('residual', 'the arm, bluer towards its end'),
         ('predicted', 'path of the last body in one period'),
     ]
-    if any(colour == OBSTACLE for _, colour in poses.bodies):
+    if any(colour == OBSTACLE for pose in poses for _, colour in pose.bodies):
         colours.append(('line', ', '.join(obstacle.name for obstacle in obstacles)))
     sections: list[Section] = [
         _verdict(design, arm.robot, shares, checked, collision.notes, origin.step),
-        ContentSection('Poses', [poses, Legend(colours)]),
+        ContentSection('Poses', [SmallMultiples(figures), Legend(colours)]),
         _accuracy_section(design, arm.robot.links),
         *([] if isolability is None else [isolability_section(isolability)]),
         _motion_section(limits, motion, shares),

@@ -109,5 +109,5 @@ def test_an_arm_without_bodies_is_drawn_though_its_links_are_points_for_the_floo
     floor = Floor(0.0, np.array([0.0, 0.0, 1.0]), 'given')
     whole = with_obstacles(collision, floor_obstacles(collision, floor, 0.01))
     poses = np.zeros((1, robot.n_joints))
-    drawn = draw_poses(whole, poses, ['now'], poses)
+    (drawn,) = draw_poses(whole, poses, poses)
     assert sum(colour != OBSTACLE for _, colour in drawn.bodies) == robot.n_joints + 1
