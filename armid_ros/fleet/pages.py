@@ -28,14 +28,7 @@ from armid_ros.fleet.watch import (
 )
 from armid_ros.identification.fitting.identifiability import HALF_WIDTH
 from armid_ros.motion import FloatArray
-from armid_ros.report.blocks import (
-    ContentSection,
-    DataTable,
-    Fold,
-    Paragraph,
-    SmallMultiples,
-    VerdictSection,
-)
+from armid_ros.report.blocks import DataTable, Fold, Paragraph, SmallMultiples, VerdictSection
 from armid_ros.report.notation import counted, digits, pretty, with_interval
 from armid_ros.report.page import Page, Section, Templated
 from markupsafe import escape, Markup
@@ -65,10 +58,7 @@ def _overview(found: Watch, diagnoses: Diagnoses) -> str:
         'dashed line marks the change. Error: median of 100 |residual torque| / |torque| '
         'over the bags of an arm, each fitted by itself.'
     )
-    sections: list[Section] = [
-        _verdict(found, diagnoses),
-        _table('Arms', heads, rows, (3, 4, 5), hint),
-    ]
+    sections = [_table('Arms', heads, rows, (3, 4, 5), hint)]
     refused = [row for arm in found.arms for row in arm.refused]
     most = 50
     if refused:
@@ -81,7 +71,7 @@ def _overview(found: Watch, diagnoses: Diagnoses) -> str:
     subtitle = ' · '.join(
         filter(None, (counted(len(found.arms), 'arm'), counted(bags, 'bag'), span))
     )
-    return Page('A fleet over time', subtitle, sections, charts=False).html()
+    return Page('A fleet over time', subtitle, _verdict(found, diagnoses), sections).html()
 
 
 def _arm_page(found: Watch, arm: WatchedArm, diagnoses: Diagnoses) -> str:
@@ -102,7 +92,7 @@ def _arm_page(found: Watch, arm: WatchedArm, diagnoses: Diagnoses) -> str:
     if len(texts) > 1:
         sentences.append(f'{counted(len(texts) - 1, "more parameter")} changed; see below.')
     word, step = diagnosed or arm.health, _step(arm, bool(diagnosis), diagnosed)
-    sections: list[Section] = [VerdictSection(word, tone, sentences, step=step)]
+    sections = []
     if diagnosis is not None:
         report = f'../{quote(diagnosis["report"])}' if diagnosis['report'] else ''
         cells = (
@@ -124,7 +114,7 @@ def _arm_page(found: Watch, arm: WatchedArm, diagnoses: Diagnoses) -> str:
     if rest:
         line = f'{counted(len(rest), "parameter")} without a change'
         curves.append(Fold(line, [SmallMultiples(rest)]))
-    sections.append(ContentSection('Parameters over time', [Paragraph(hint, 'hint'), *curves]))
+    sections.append(Section('Parameters over time', [Paragraph(hint, 'hint'), *curves]))
     rows, steps = [], {one.series.parameter for one in arm.named if one.kind == 'step'}
     for row in (one for one in arm.wear if (one['name'], one['joint']) not in steps):
         std = (row['upper'] - row['lower']) / (2.0 * HALF_WIDTH)
@@ -139,7 +129,8 @@ def _arm_page(found: Watch, arm: WatchedArm, diagnoses: Diagnoses) -> str:
     if arm.refused:
         sections.append(_refused(arm.refused))
     subtitle = f'{counted(len(arm.bags), "bag")} · false discovery rate {found.alpha:g}'
-    return Page(arm.arm, subtitle, sections, charts=False).html()
+    verdict = VerdictSection(word, tone, sentences, step=step)
+    return Page(arm.arm, subtitle, verdict, sections).html()
 
 
 def _step(arm: WatchedArm, is_diagnosed: bool, fault: str) -> str:
@@ -278,11 +269,11 @@ def _table(
     rows: Sequence[Sequence[str]],
     numbers: Sequence[int] = (),
     hint: str = '',
-) -> ContentSection:
+) -> Section:
     """Return a section with a table, whose cells may hold links and curves."""
     words = [k for k in range(len(heads)) if k not in numbers]
     table = DataTable(heads, rows, words, 'fleet')
-    return ContentSection(title, [table, *([Paragraph(hint, 'hint')] if hint else [])])
+    return Section(title, [table, *([Paragraph(hint, 'hint')] if hint else [])])
 
 
 def _link(target: str, text: str) -> Markup:

@@ -10,28 +10,7 @@ from typing import ClassVar
 
 from armid_ros.report.charts import Role
 from armid_ros.report.page import Section, Templated
-from armid_ros.report.provenance import Provenance
 from markupsafe import Markup
-
-
-@dataclass(frozen=True)
-class ContentSection(Section):
-    """
-    Section of a page: a heading and a sequence of blocks.
-
-    Attributes
-    ----------
-    title : str
-        Heading; empty for none.
-    blocks : sequence of Templated
-        Content, in order.
-
-    """
-
-    template: ClassVar[str] = 'content.html'
-
-    title: str  # type: ignore[misc]  # instance attribute
-    blocks: Sequence[Templated]
 
 
 @dataclass(frozen=True)
@@ -297,7 +276,7 @@ class BarChart(Templated):
 
 
 @dataclass(frozen=True)
-class VerdictSection(Section):
+class VerdictSection(Templated):
     """
     Verdict box at the top of a page: verdict, findings, next step, bars, limitations.
 
@@ -320,7 +299,6 @@ class VerdictSection(Section):
 
     """
 
-    title: ClassVar[str] = 'Verdict'
     template: ClassVar[str] = 'verdict.html'
 
     grade: str
@@ -332,17 +310,7 @@ class VerdictSection(Section):
     command: str = ''
 
 
-def next_steps(steps: Sequence[str]) -> list[ContentSection]:
+def next_steps(steps: Sequence[str]) -> list[Section]:
     """Return the section with all next steps; [] if the verdict box shows the only one."""
     bullets = BulletList([(step, '') for step in steps], True)
-    return [ContentSection('What to do next', [bullets])] if steps[1:] else []
-
-
-@dataclass(frozen=True)
-class Origin(Section):
-    """Section on how a result was made: command, hashed files, versions, seed."""
-
-    title: ClassVar[str] = 'Provenance'
-    template: ClassVar[str] = 'origin.html'
-
-    provenance: Provenance
+    return [Section('What to do next', [bullets])] if steps[1:] else []

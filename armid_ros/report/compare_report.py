@@ -12,12 +12,10 @@ from armid_ros.identification.assess.comparison import Comparison, LoadChange
 from armid_ros.identification.fitting.identifiability import excludes_zero, HALF_WIDTH
 from armid_ros.report.blocks import (
     Cells,
-    ContentSection,
     DataTable,
     FactList,
     IntervalTrack,
     Legend,
-    Origin,
     Paragraph,
     TableCell,
     VerdictSection,
@@ -55,23 +53,23 @@ def compare_report(comparison: Comparison, origin: ResultOrigin) -> str:
             text += f'; torque error over all joints {side.error_percent:.2f} %'
         facts.append((heading, text))
     rows = change_rows(comparison)
-    sections: list[Section] = [
-        VerdictSection(
-            *verdict(comparison),
-            change_sentences(comparison),
-            _beware(comparison),
-            step=next_step(comparison),
-            command=origin.step,
-        ),
-        *([ContentSection('What changed', [DataTable(HEADS, rows, (0, 3))])] if rows else []),
+    box = VerdictSection(
+        *verdict(comparison),
+        change_sentences(comparison),
+        _beware(comparison),
+        step=next_step(comparison),
+        command=origin.step,
+    )
+    sections = [
+        *([Section('What changed', [DataTable(HEADS, rows, (0, 3))])] if rows else []),
         changes_section(comparison),
-        ContentSection('Input', [FactList(facts)]),
-        Origin(origin.provenance),
+        Section('Input', [FactList(facts)]),
     ]
     title = f'Comparison of two identifications of {robot_label(comparison.after.robot)}'
     subtitle = f'{comparison.before.source} · {comparison.after.source}'
     joints = dict.fromkeys(one.parameter.joint for one in comparison.changes)
-    return Page(title, subtitle, sections, names=[*filter(None, joints)]).html()
+    names = [*filter(None, joints)]
+    return Page(title, subtitle, box, sections, origin.provenance, names).html()
 
 
 def verdict(comparison: Comparison) -> tuple[str, str]:
@@ -259,7 +257,7 @@ def _beware(comparison: Comparison) -> tuple[str, ...]:
     return tuple(lines)
 
 
-def changes_section(comparison: Comparison) -> ContentSection:
+def changes_section(comparison: Comparison) -> Section:
     """Return the section with all parameters of both identifications side by side."""
     changes = comparison.changes
 
@@ -279,7 +277,7 @@ def changes_section(comparison: Comparison) -> ContentSection:
             IntervalTrack(one.after, HALF_WIDTH * one.after_std, one.before),
         )
 
-    return ContentSection(
+    return Section(
         'Side by side',
         [
             Paragraph(

@@ -20,10 +20,10 @@ from armid_ros.identification.rows.signals import conditioning, SignalSettings
 from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording
 from armid_ros.report.arm_drawing import ArmDrawing, draw_arm
-from armid_ros.report.blocks import ContentSection, next_steps, Origin, Paragraph, VerdictSection
+from armid_ros.report.blocks import next_steps, Paragraph, VerdictSection
 from armid_ros.report.charts import Chart, joined, joined_time, Series
 from armid_ros.report.notation import counted, percent, pretty, probability, robot_label, sentence
-from armid_ros.report.page import Page, Section
+from armid_ros.report.page import Page, Section, Templated
 from armid_ros.report.provenance import DEFAULT_ORIGIN, ResultOrigin
 from armid_ros.report.sections.data_quality import data_quality_section
 from armid_ros.report.sections.diagnosed import (
@@ -111,10 +111,12 @@ def diagnosis_report(
     arm = diagnosis.arm
     recordings = [(one, role) for role, several in read.items() for one in several]
     worse = tuple(dict.fromkeys(joint for pair in forward for joint in pair.worse))
-    sections: list[Section] = [_verdict(diagnosis, worse, ''.join(steps[:1]))]
+    verdict = _verdict(diagnosis, worse, ''.join(steps[:1]))
+    sections = []
     curves = whole_overlays(diagnosis, [one for one, _ in recordings])
     if curves is not None and diagnosis.gap is not None:
-        sections += [overlay_section(diagnosis, curves), Story(diagnosis, learned_joints)]
+        story = Story(diagnosis, learned_joints)
+        sections += [overlay_section(diagnosis, curves), Section('Arm and model', [story])]
         if diagnosis.findings:
             sections += [gap_section(diagnosis, diagnosis.gap), named_section(diagnosis.findings)]
         if diagnosis.where:
@@ -132,7 +134,6 @@ def diagnosis_report(
         sections.append(forward_section(arm.robot, forward, labels))
     quality = [(one, role, ()) for one, role in recordings]
     sections.append(data_quality_section(quality, at_fault=_at_fault(diagnosis, read)))
-    sections.append(Origin(origin.provenance))
     used = [
         kind.format(counted(len(read[role]), noun))
         for role, noun, kind in _ROLES
@@ -140,7 +141,8 @@ def diagnosis_report(
     ]
     subtitle = ' · '.join([robot_label(origin.robot), *used])
     names = (*arm.robot.joints, *arm.robot.links)
-    return Page(f'Diagnosis of {arm.robot.name}', subtitle, sections, names=names).html()
+    title = f'Diagnosis of {arm.robot.name}'
+    return Page(title, subtitle, verdict, sections, origin.provenance, names).html()
 
 
 def _at_fault(diagnosis: Diagnosis, read: Mapping[str, Sequence[Recording]]) -> list[str]:
@@ -171,9 +173,9 @@ def _verdict(diagnosis: Diagnosis, worse: Sequence[str], step: str) -> VerdictSe
 
 
 @dataclass(frozen=True)
-class Story(Section):
+class Story(Templated):
     """
-    Section with a drawing of the arm, and facts on the causes and the patched model.
+    Drawing of the arm, and facts on the causes and the patched model.
 
     Attributes
     ----------
@@ -184,7 +186,6 @@ class Story(Section):
 
     """
 
-    title: ClassVar[str] = 'Arm and model'
     template: ClassVar[str] = 'story.html'
 
     diagnosis: Diagnosis
@@ -241,7 +242,7 @@ class Story(Section):
         return [(question, answer) for question, answer in answers if answer]
 
 
-def overlay_section(diagnosis: Diagnosis, gap: Gap) -> ContentSection:
+def overlay_section(diagnosis: Diagnosis, gap: Gap) -> Section:
     """
     Return the section with measured and modelled torques of the worst joint.
 
@@ -275,7 +276,7 @@ def overlay_section(diagnosis: Diagnosis, gap: Gap) -> ContentSection:
         for given, last in ((before, after), (measured - before, measured - after))
     )
     dashes = ', dashes on it are the model with the named cause' * patched
-    return ContentSection(
+    return Section(
         'Measured and modelled',
         [
             Paragraph(

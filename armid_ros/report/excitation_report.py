@@ -31,11 +31,9 @@ from armid_ros.report.blocks import (
     BarChart,
     BulletList,
     Cells,
-    ContentSection,
     DataTable,
     FactList,
     Legend,
-    Origin,
     Panels,
     Paragraph,
     SmallMultiples,
@@ -118,22 +116,22 @@ def excitation_report(
     ]
     if any(colour == OBSTACLE for pose in poses for _, colour in pose.bodies):
         colours.append(('line', ', '.join(obstacle.name for obstacle in obstacles)))
-    sections: list[Section] = [
-        _verdict(design, arm.robot, shares, checked, collision.notes, origin.step),
-        ContentSection('Poses', [SmallMultiples(figures), Legend(colours)]),
+    verdict = _verdict(design, arm.robot, shares, checked, collision.notes, origin.step)
+    sections = [
+        Section('Poses', [SmallMultiples(figures), Legend(colours)]),
         _accuracy_section(design, arm.robot.links),
         *([] if isolability is None else [isolability_section(isolability)]),
         _motion_section(limits, motion, shares),
         _clearance_section(motion.t, curves, design.settings.clearance, remarks),
         _input_section(design, arm, origin.robot, obstacles, run, start_reason),
-        Origin(origin.provenance),
     ]
     subtitle = (
         f'{robot_label(origin.robot)} · {run.duration:.4g} s · {excitation.n_periods} periods · '
         f'{design.settings.speed}'
     )
     names = (*arm.robot.joints, *arm.robot.links)
-    return Page(f'Excitation of {arm.robot.name}', subtitle, sections, names=names).html()
+    title = f'Excitation of {arm.robot.name}'
+    return Page(title, subtitle, verdict, sections, origin.provenance, names).html()
 
 
 def _verdict(
@@ -225,7 +223,7 @@ def _input_section(
     obstacles: Sequence[Obstacle],
     approached: Run,
     start_reason: str,
-) -> ContentSection:
+) -> Section:
     """Return the section with robot, settings of the design, and obstacles."""
     settings, run = design.settings, design.excitation
     criterion = f'{settings.criterion}: {CRITERIA[settings.criterion]}'
@@ -260,12 +258,10 @@ def _input_section(
             f'{counted(settings.starts, "start")}, at most {settings.iterations} iterations each',
         ),
     ]
-    return ContentSection('Input', [FactList(facts)])
+    return Section('Input', [FactList(facts)])
 
 
-def _motion_section(
-    limits: Limits, motion: Motion, shares: Mapping[str, FloatArray]
-) -> ContentSection:
+def _motion_section(limits: Limits, motion: Motion, shares: Mapping[str, FloatArray]) -> Section:
     assert motion.tau is not None
     quantities = (
         ('position', motion.q, limits.lower, limits.upper),
@@ -291,7 +287,7 @@ def _motion_section(
             for name, values, lower, upper in quantities
         ]
         panels.append((joint, '', charts))
-    return ContentSection(
+    return Section(
         'Motion and limits',
         [
             Paragraph(
@@ -308,7 +304,7 @@ def _motion_section(
 
 def _clearance_section(
     t: FloatArray, curves: Mapping[str, FloatArray], margin: float, notes: Sequence[str]
-) -> ContentSection:
+) -> Section:
     """Return the section with distances of links from each other and from obstacles."""
     roles: tuple[Role, ...] = ('residual', 'before')
     blocks: list[Templated] = [
@@ -330,10 +326,10 @@ def _clearance_section(
         blocks = [Paragraph(f'Clearance is not checked: {none}.')]
     if notes:
         blocks.append(BulletList([(note, 'warn') for note in notes]))
-    return ContentSection('Clearance', blocks)
+    return Section('Clearance', blocks)
 
 
-def _accuracy_section(design: Design, links: Sequence[str] = ()) -> ContentSection:
+def _accuracy_section(design: Design, links: Sequence[str] = ()) -> Section:
     information, described = design.information, design.described
     size = information.std / information.scale
 
@@ -347,7 +343,7 @@ def _accuracy_section(design: Design, links: Sequence[str] = ()) -> ContentSecti
             relative if std < abs(value) or not relative else TableCell('> 100 %', 'unknown'),
         )
 
-    return ContentSection(
+    return Section(
         'Expected accuracy',
         [
             Paragraph(

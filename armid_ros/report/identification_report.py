@@ -17,11 +17,9 @@ from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording
 from armid_ros.report.blocks import (
     BulletList,
-    ContentSection,
     DataTable,
     FactList,
     next_steps,
-    Origin,
     Panels,
     Paragraph,
     TableCell,
@@ -97,16 +95,16 @@ def identification_report(
         for one in recordings
     ]
     forward, noise = (verification.forward, verification.noise) if verification else ((), None)
-    sections: list[Section] = [
-        VerdictSection(
-            grade.word,
-            TONES[grade.word],
-            (*grade.reasons, *findings_of(result, description, verification)),
-            beware,
-            error_bars(described, training, validation, result.halves),
-            ''.join(steps[:1]),
-            origin.step,
-        ),
+    verdict = VerdictSection(
+        grade.word,
+        TONES[grade.word],
+        (*grade.reasons, *findings_of(result, description, verification)),
+        beware,
+        error_bars(described, training, validation, result.halves),
+        ''.join(steps[:1]),
+        origin.step,
+    )
+    sections = [
         fit_section(described, training, validation, torque_reach(result, shown)),
         *next_steps(steps),
         *([forward_section(described, forward)] if forward else []),
@@ -116,13 +114,12 @@ def identification_report(
         *([] if noise is None else [_noise_section(described, noise)]),
         data_quality_section(read, described),
         _input_section(result, origin.robot),
-        Origin(origin.provenance),
     ]
     subtitle = f'{robot_label(origin.robot)} · {counted(len(training), "training recording")}'
     if validation:
         subtitle += f' · {counted(len(validation), "recording")} not used for the fit'
-    names = (*described.joints, *described.links)
-    return Page(f'Identification of {described.name}', subtitle, sections, names=names).html()
+    title, names = f'Identification of {described.name}', (*described.joints, *described.links)
+    return Page(title, subtitle, verdict, sections, origin.provenance, names).html()
 
 
 def parameter_sections(
@@ -153,7 +150,7 @@ def parameter_sections(
     ]
 
 
-def _input_section(result: Identification, robot: str) -> ContentSection:
+def _input_section(result: Identification, robot: str) -> Section:
     """Return the section with robot, method, filter and excitation."""
     used = result.used
     kept = used.rate_hz / used.decimation
@@ -171,10 +168,10 @@ def _input_section(result: Identification, robot: str) -> ContentSection:
             f'weighted regressor {plain(result.condition_number)}',
         ),
     ]
-    return ContentSection('Input', [FactList(facts)])
+    return Section('Input', [FactList(facts)])
 
 
-def _noise_section(robot: Robot, check: NoiseCheck) -> ContentSection:
+def _noise_section(robot: Robot, check: NoiseCheck) -> Section:
     """Return the section on encoder noise: its size, the test for bias, and the bias."""
     noise = ', '.join(
         f'{joint} {digits(1e3 * value)} m{unit}'
@@ -182,7 +179,7 @@ def _noise_section(robot: Robot, check: NoiseCheck) -> ContentSection:
             robot.joints, check.position_noise, robot.position_units, strict=True
         )
     )
-    return ContentSection(
+    return Section(
         'Encoder noise',
         [
             Paragraph(
@@ -199,7 +196,7 @@ def _noise_section(robot: Robot, check: NoiseCheck) -> ContentSection:
 
 def _physical_section(
     certificate: PhysicalCertificate, exports: Mapping[str, Sequence[str]]
-) -> ContentSection:
+) -> Section:
     """Return the section on physical consistency: mass, moments, pseudo-inertia of each link."""
     quantifier = 'Every' if certificate.consistent else 'Not every'
     training, held_out = (
@@ -234,7 +231,7 @@ def _physical_section(
             named = ', '.join(f'{kind} ({counted(n, "value")})' for kind, n in kinds.items())
             text = f'{file} has no place for {named}: a comment in it lists them.'
             homeless.append(Paragraph(text))
-    return ContentSection(
+    return Section(
         'Physical consistency',
         [
             Paragraph(
@@ -251,9 +248,7 @@ def _physical_section(
     )
 
 
-def convergence_section(
-    history: Sequence[tuple[float, Estimate]], truth: FloatArray
-) -> ContentSection:
+def convergence_section(history: Sequence[tuple[float, Estimate]], truth: FloatArray) -> Section:
     """
     Return the section with online estimates over time and the true values.
 
@@ -301,4 +296,4 @@ def convergence_section(
         '95 % interval of the online estimate; the line is the true value.'
     )
     title = 'Convergence of the online estimate'
-    return ContentSection(title, [Paragraph(text), Panels(panels, three=True)])
+    return Section(title, [Paragraph(text), Panels(panels, three=True)])

@@ -14,10 +14,8 @@ from armid_ros.motion import FloatArray
 from armid_ros.report.blocks import (
     Bar,
     BarChart,
-    ContentSection,
     DataTable,
     FactList,
-    Origin,
     Panels,
     Paragraph,
     VerdictSection,
@@ -69,12 +67,12 @@ def inspection_report(found: Inspection, origin: ResultOrigin = DEFAULT_ORIGIN) 
     texts = [remark.text for remark in found.remarks]
     texts.insert(first - 1, found.verdict)  # not worse than the worst remark
     sentences = [sentence(text.replace('`', '')) for text in texts]
-    sections: list[Section] = [
-        VerdictSection(
-            grade, _TONES[grade], sentences[:first], sentences[first:], step=origin.step
-        ),
+    verdict = VerdictSection(
+        grade, _TONES[grade], sentences[:first], sentences[first:], step=origin.step
+    )
+    sections = [
         _contents_section(found),
-        ContentSection(
+        Section(
             'Joints',
             [
                 DataTable(joint_heads(found), joint_rows(found)),
@@ -87,7 +85,6 @@ def inspection_report(found: Inspection, origin: ResultOrigin = DEFAULT_ORIGIN) 
             ],
         ),
         _curves_section(found),
-        Origin(origin.provenance),
     ]
     name = Path(recording.source).name or 'recording'
     subtitle = ' · '.join(
@@ -96,7 +93,8 @@ def inspection_report(found: Inspection, origin: ResultOrigin = DEFAULT_ORIGIN) 
             (robot_label(origin.robot), recording.topic, counted(recording.n_joints, 'joint')),
         )
     )
-    return Page(f'Inspection of {name}', subtitle, sections, names=recording.joints).html()
+    title = f'Inspection of {name}'
+    return Page(title, subtitle, verdict, sections, origin.provenance, recording.joints).html()
 
 
 def inspection_word(found: Inspection) -> str:
@@ -191,9 +189,8 @@ def description_check_report(
         before, after = (Bar(error, 'after', f'{digits(error)} %') for error in errors)
         rows = [('with the links of the URDF', [before]), ('with fitted links', [after])]
         bars = BarChart(rows, [('after', 'torque error, rms')])
-    sections: list[Section] = [
-        VerdictSection(grade, _TONES[grade], [first, *others], notes, bars, origin.step)
-    ]
+    verdict = VerdictSection(grade, _TONES[grade], [first, *others], notes, bars, origin.step)
+    sections = []
     if links is not None:
         hint = (
             'Centres of mass are in the frame of the joint that moves the link. Intervals: 95 %. '
@@ -201,11 +198,10 @@ def description_check_report(
             'torque error that this link explains if all other links are right.'
         )
         table = DataTable(HEADS, link_rows(links), (0, 3, 4))
-        sections.append(ContentSection('Links', [table, Paragraph(hint, 'hint')]))
-    sections.append(Origin(origin.provenance))
+        sections.append(Section('Links', [table, Paragraph(hint, 'hint')]))
     title = f'Check of {robot_label(origin.robot)}'
     names = () if links is None else (*links.joints, *links.links)
-    return Page(title, '', sections, charts=False, names=names).html()
+    return Page(title, '', verdict, sections, origin.provenance, names).html()
 
 
 def recording_facts(found: Inspection) -> list[tuple[str, str]]:
@@ -231,7 +227,7 @@ def recording_facts(found: Inspection) -> list[tuple[str, str]]:
     return facts
 
 
-def _contents_section(found: Inspection) -> ContentSection:
+def _contents_section(found: Inspection) -> Section:
     """Return the section with the topics and the sampling of a recording."""
     blocks: list[Templated] = [FactList(recording_facts(found))]
     if found.topics:
@@ -246,10 +242,10 @@ def _contents_section(found: Inspection) -> ContentSection:
         ]
         heads = ('Topic', 'Messages', 'Type', 'Joints')
         blocks.insert(0, DataTable(heads, rows, (0, 2, 3)))
-    return ContentSection('What is in it', blocks)
+    return Section('What is in it', blocks)
 
 
-def _curves_section(found: Inspection) -> ContentSection:
+def _curves_section(found: Inspection) -> Section:
     recording, robot = found.recording, found.robot
     blocks: list[Templated] = [
         Paragraph(
@@ -294,7 +290,7 @@ def _curves_section(found: Inspection) -> ContentSection:
         height=150,
         legend=False,
     )
-    return ContentSection('Curves', [*blocks, Panels([('Time between samples', '', [chart])])])
+    return Section('Curves', [*blocks, Panels([('Time between samples', '', [chart])])])
 
 
 def joint_heads(found: Inspection) -> tuple[str, ...]:

@@ -3,7 +3,7 @@
 """
 HTML page of a report: a single file without external resources.
 
-A section is a small frozen dataclass with a title and a template.
+A block of a section is a small frozen dataclass with a template.
 
 """
 
@@ -24,6 +24,7 @@ from armid_ros.report.notation import (
     plain,
     pretty,
 )
+from armid_ros.report.provenance import Provenance
 from armid_ros.version import GENERATOR
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
@@ -52,21 +53,27 @@ class Templated:
 
     def html(self) -> Markup:
         """Return the block as HTML; all text is escaped."""
-        return render(self.template, {'block': self, 'section': self}, self.package)
+        return render(self.template, {'block': self}, self.package)
 
 
+@dataclass(frozen=True)
 class Section(Templated):
     """
-    Base class of page sections; a Jinja template renders each, and sees it as `section`.
+    Section of a page: a heading and a sequence of blocks.
 
     Attributes
     ----------
     title : str
-        Heading; empty for none.
+        Heading.
+    blocks : sequence of Templated
+        Content, in order.
 
     """
 
-    title: ClassVar[str]
+    template: ClassVar[str] = 'section.html'
+
+    title: str
+    blocks: Sequence[Templated]
 
     @property
     def anchor(self) -> str:
@@ -77,7 +84,7 @@ class Section(Templated):
 @dataclass(frozen=True)
 class Page:
     """
-    Page of a report: heading, subtitle and sections.
+    Page of a report: heading, verdict, sections and provenance.
 
     Attributes
     ----------
@@ -85,10 +92,12 @@ class Page:
         Heading.
     subtitle : str
         Line below the heading: robot and recordings.
+    verdict : Templated
+        Box at the top of the page.
     sections : sequence of Section
-        Sections in order, the verdict first.
-    charts : bool
-        Whether the page has interactive charts.
+        Sections in order.
+    provenance : Provenance or None
+        How the result was made, for the last section; None for pages of a folder of results.
     names : sequence of str
         Joints and links of the arm. Tables and charts leave their common prefix out.
 
@@ -96,8 +105,9 @@ class Page:
 
     title: str
     subtitle: str
+    verdict: Templated
     sections: Sequence[Section]
-    charts: bool = True
+    provenance: Provenance | None = None
     names: Sequence[str] = ()
 
     def html(self) -> str:

@@ -14,7 +14,6 @@ from armid_ros.identification.fitting.identifiability import HALF_WIDTH, Unident
 from armid_ros.motion import FloatArray
 from armid_ros.report.blocks import (
     Cells,
-    ContentSection,
     DataTable,
     FactList,
     Fold,
@@ -24,7 +23,7 @@ from armid_ros.report.blocks import (
     TableCell,
 )
 from armid_ros.report.notation import counted, digits, pretty, robot_label
-from armid_ros.report.page import Templated
+from armid_ros.report.page import Section, Templated
 import numpy as np
 
 #: A parameter of a rigid body, and the number of its link.
@@ -164,7 +163,7 @@ def parameter_section(
     unidentified: Sequence[Unidentified] = (),
     links: Sequence[str] = (),
     reference: str = 'description',
-) -> ContentSection:
+) -> Section:
     """
     Return the section with all estimated parameters and their reference values.
 
@@ -219,7 +218,7 @@ def parameter_section(
     if lost:
         rows = [(reason, ', '.join(some)) for reason, some in lost.items()]
         blocks.append(Fold('Not identified', [FactList(rows)], opened=True))
-    return ContentSection('Parameters', blocks)
+    return Section('Parameters', blocks)
 
 
 def joint_columns(

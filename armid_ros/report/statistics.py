@@ -10,16 +10,9 @@ from dataclasses import dataclass
 from armid_ros.identification import Fit, Identification
 from armid_ros.identification.fitting.identifiability import HALF_WIDTH
 from armid_ros.motion import FloatArray
-from armid_ros.report.blocks import (
-    Cells,
-    ContentSection,
-    DataTable,
-    Fold,
-    Panels,
-    Paragraph,
-    TableCell,
-)
+from armid_ros.report.blocks import Cells, DataTable, Fold, Panels, Paragraph, TableCell
 from armid_ros.report.charts import Chart, Series
+from armid_ros.report.page import Section
 from armid_ros.robots import Robot
 import numpy as np
 
@@ -125,7 +118,7 @@ def torque_reach(result: Identification, fits: Sequence[Fit]) -> FloatArray:
     return np.asarray(HALF_WIDTH * np.sqrt(variance.mean(axis=0)))
 
 
-def residual_section(robot: Robot, fits: Sequence[Fit], role: str) -> ContentSection:
+def residual_section(robot: Robot, fits: Sequence[Fit], role: str) -> Section:
     """
     Return the section with each joint's residual over speed, position and load.
 
@@ -166,7 +159,7 @@ def residual_section(robot: Robot, fits: Sequence[Fit], role: str) -> ContentSec
         opened = most[joint] == max(most) or most[joint] > MIN_TREND_SHARE
         panels = Panels([('', '', [chart]) for chart in charts], three=True)
         folds.append(Fold(name, [panels], opened))
-    return ContentSection(
+    return Section(
         'Residual by variable',
         [
             Paragraph(
@@ -204,7 +197,7 @@ def _cloud(trend: Trend, xlabel: str, ylabel: str) -> Chart:
     )
 
 
-def whiteness_section(robot: Robot, fits: Sequence[Fit], role: str) -> ContentSection:
+def whiteness_section(robot: Robot, fits: Sequence[Fit], role: str) -> Section:
     """Return the section with the autocorrelation of each joint's residual."""
     panels = []
     for joint, name in enumerate(robot.joints):
@@ -224,7 +217,7 @@ def whiteness_section(robot: Robot, fits: Sequence[Fit], role: str) -> ContentSe
         f'Autocorrelation of the {role} residual. For white noise, 1 % of the lags are outside '
         'the band; the filters correlate the first one or two lags.'
     )
-    return ContentSection('Whiteness', [Paragraph(text), Panels(panels, three=True)])
+    return Section('Whiteness', [Paragraph(text), Panels(panels, three=True)])
 
 
 def trends_of(fits: Sequence[Fit], joint: int) -> dict[str, Trend]:

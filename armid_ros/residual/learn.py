@@ -18,16 +18,10 @@ from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.effects.learned import LearnedTorque, TorqueMap
 from armid_ros.errors import IdentificationError
 from armid_ros.motion import FloatArray
-from armid_ros.report.blocks import (
-    ContentSection,
-    DataTable,
-    Paragraph,
-    SmallMultiples,
-    TableCell,
-)
+from armid_ros.report.blocks import DataTable, Paragraph, SmallMultiples, TableCell
 from armid_ros.report.charts import image_data
 from armid_ros.report.notation import digits, percent
-from armid_ros.report.page import render
+from armid_ros.report.page import render, Section
 from armid_ros.residual.gaussian_process import learn_map
 from armid_ros.residual.law import Law, share_of, suggest_law
 from armid_ros.residual.rows import BLOCKS, joint_rows, JointRows
@@ -130,7 +124,7 @@ class Residual:
             for one in self.joints
         ]
 
-    def section(self) -> ContentSection:
+    def section(self) -> Section:
         """Return the report section that shows the learned maps at the mid-range load."""
         robot = self.base.robot
         rows, pictures = [], []
@@ -161,7 +155,7 @@ class Residual:
             'Looks like',
             'Share, formula',
         )
-        return ContentSection(
+        return Section(
             'Learned residual',
             [
                 Paragraph(

@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Labels leave out what all names of an arm begin with, and nothing else."""
 
-from armid_ros.report.blocks import ContentSection, DataTable, Paragraph
+from armid_ros.report.blocks import DataTable, Paragraph
 from armid_ros.report.notation import common_prefix
-from armid_ros.report.page import Page
+from armid_ros.report.page import Page, Section
 import pytest
 
 PANDA = tuple(f'panda_joint{number}' for number in range(1, 8))
@@ -30,6 +30,6 @@ def test_labels_of_a_page_have_short_names_and_sentences_whole_ones():
         Paragraph('See panda_joint3.'),
         DataTable(('Joint',), [(one,) for one in ('panda_joint2', *others)]),
     )
-    page = Page('', '', [ContentSection('A', blocks)], charts=False, names=PANDA).html()
+    page = Page('', '', Paragraph(''), [Section('A', blocks)], names=PANDA).html()
     for text in ('See panda_joint3', '>joint2<', *(f'>{one}<' for one in others)):
         assert text in page

@@ -22,15 +22,7 @@ from armid_ros.papers.elastic.identification.response import (
 )
 from armid_ros.papers.elastic.identification.rigid import CUTOFF, RigidFit
 from armid_ros.papers.elastic.identification.three_steps import Tuning, TwoInertiaIdentification
-from armid_ros.report.blocks import (
-    ContentSection,
-    DataTable,
-    FactList,
-    Origin,
-    Panels,
-    Paragraph,
-    VerdictSection,
-)
+from armid_ros.report.blocks import DataTable, FactList, Panels, Paragraph, VerdictSection
 from armid_ros.report.charts import Chart, Kind, Role, Series
 from armid_ros.report.notation import counted, digits, pretty
 from armid_ros.report.page import Page, Section, Templated
@@ -67,18 +59,18 @@ def elastic_report(
         Files, versions, settings, seed.
 
     """
-    sections: list[Section] = [verdict(result), responses_section(result)]
+    sections = [responses_section(result)]
     if result.tuning is not None:
         sections.append(steps_section(result.tuning))
     sections += [
         _parameters_section(result, known, source),
         rigid_section(result.rigid),
-        Origin(provenance),
     ]
     steps = 0 if result.tuning is None else result.tuning.measured.shape[1]
     subtitle = f'{robot} · {counted(result.experiments, "experiment")} through the resonances'
     subtitle += f' · {counted(steps, "step response")}'
-    return Page(f'Elastic joints of {robot}', subtitle, sections).html()
+    title = f'Elastic joints of {robot}'
+    return Page(title, subtitle, verdict(result), sections, provenance).html()
 
 
 def verdict(result: TwoInertiaIdentification) -> VerdictSection:
@@ -129,7 +121,7 @@ def named_rows(document: dict[str, Any]) -> list[dict[str, Any]]:
 
 def _parameters_section(
     result: TwoInertiaIdentification, known: TwoLinkParameters | None, source: str
-) -> ContentSection:
+) -> Section:
     """Return the section with parameters, 95 % intervals and reference values."""
     untuned = np.concatenate([unpack(result.untuned), result.untuned.total_damping])
     text = 'Fitted to the frequency responses. Step responses would add 95 % intervals.'
@@ -156,10 +148,10 @@ def _parameters_section(
             row += [f'{base[k]:g}', f'{100.0 * (value / base[k] - 1.0):+.2f} %']
         rows.append([*row, pretty(one['unit'])])
     table = DataTable([*heads, 'Unit'], rows, words=(0, 1, len(heads)))
-    return ContentSection('Parameters', [Paragraph(text), table])
+    return Section('Parameters', [Paragraph(text), table])
 
 
-def rigid_section(fit: RigidFit) -> ContentSection:
+def rigid_section(fit: RigidFit) -> Section:
     """Return the section with the parameters of step 1, which models the joints as rigid."""
     estimate = fit.estimate
     rows = [
@@ -174,7 +166,7 @@ def rigid_section(fit: RigidFit) -> ContentSection:
         f'torque error is {fit.relative_error:.2f} %.'
     )
     heads = ('Parameter', 'Joint', 'Estimate', '± 95 %', 'Unit')
-    return ContentSection('Rigid arm', [Paragraph(text), DataTable(heads, rows, words=(0, 1, 4))])
+    return Section('Rigid arm', [Paragraph(text), DataTable(heads, rows, words=(0, 1, 4))])
 
 
 #: Frequency ranges of the plots and of the comparison of responses [Hz].
@@ -182,7 +174,7 @@ _SHOWN_BAND, _COMPARED_BAND = (2.0, 100.0), (5.0, 60.0)
 _SIZE = 'magnitude [dB re rad/(N m s)]'
 
 
-def responses_section(result: TwoInertiaIdentification) -> ContentSection:
+def responses_section(result: TwoInertiaIdentification) -> Section:
     """Return the section with frequency responses of motor velocity to motor torque."""
     text = (
         'Motor velocity per motor torque at each frequency. At the dip (antiresonance), the link '
@@ -194,7 +186,7 @@ def responses_section(result: TwoInertiaIdentification) -> ContentSection:
         'Dashed lines: antiresonance and resonance of the joint alone. Errors are from 5 to 60 Hz.'
     )
     panels = [(joint, '', _joint(result, k)) for k, joint in enumerate(result.joints)]
-    return ContentSection(
+    return Section(
         'Frequency responses', [Paragraph(text), Panels(panels), Paragraph(hint, 'hint')]
     )
 
@@ -256,7 +248,7 @@ def _joint(result: TwoInertiaIdentification, k: int) -> list[Templated]:
     ]
 
 
-def steps_section(tuning: Tuning) -> ContentSection:
+def steps_section(tuning: Tuning) -> Section:
     """Return the section with measured and simulated link velocities after velocity steps."""
     before, after = tuning.rms
     text = (
@@ -286,7 +278,7 @@ def steps_section(tuning: Tuning) -> ContentSection:
         ]
         name = f'joint 2 at {pose:.0f}°, {reference[0]:g} and {reference[1]:g} rad/s reference'
         panels.append((name, '', charts))
-    return ContentSection('Step responses', [Paragraph(text), Panels(panels)])
+    return Section('Step responses', [Paragraph(text), Panels(panels)])
 
 
 SCHEMA = 'armid/elastic/1'

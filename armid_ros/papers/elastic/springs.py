@@ -15,7 +15,7 @@ from armid_ros.errors import RecordingError
 from armid_ros.papers.elastic.identification.files import read_sides
 from armid_ros.papers.elastic.identification.joints import fit_springs, SpringEstimate
 from armid_ros.recording.elastic import LINK
-from armid_ros.report.blocks import ContentSection, DataTable, Origin, Paragraph, VerdictSection
+from armid_ros.report.blocks import DataTable, Paragraph, VerdictSection
 from armid_ros.report.notation import counted
 from armid_ros.report.page import Page, Section
 from armid_ros.robots import Robot
@@ -31,7 +31,7 @@ _MOTORS = (
 )  # fmt: skip
 
 
-def _springs(found: Sequence[SpringEstimate]) -> ContentSection:
+def _springs(found: Sequence[SpringEstimate]) -> Section:
     """Return the section with stiffness, backlash, inertia and friction of each joint."""
     text = (
         'The twist between motor and link is the rigid-body torque divided by the stiffness. '
@@ -44,7 +44,7 @@ def _springs(found: Sequence[SpringEstimate]) -> ContentSection:
     )
     springs = DataTable(_SPRINGS, [_spring_row(one) for one in found])
     motors = DataTable(_MOTORS, [_motor_row(one) for one in found])
-    return ContentSection('Springs', [Paragraph(text), springs, motors, Paragraph(hint, 'hint')])
+    return Section('Springs', [Paragraph(text), springs, motors, Paragraph(hint, 'hint')])
 
 
 def _spring_row(one: SpringEstimate) -> tuple[str, ...]:
@@ -128,11 +128,11 @@ def identify_springs(
         found = fit_springs(body, sides)
     document = springs_document(found, source)
     origin = provenance(bags, {'model': str(model or source)})
-    sections: list[Section] = [verdict(found), _springs(found), Origin(origin)]
     subtitle = f'{robot.name} · {counted(len(found), "joint")}, encoders on both sides'
-    page = Page(f'Elastic joints of {robot.name}', subtitle, sections).html()
+    title, box = f'Elastic joints of {robot.name}', verdict(found)
+    page = Page(title, subtitle, box, [_springs(found)], origin).html()
     table = None if as_json else (_SPRINGS, [_spring_row(one) for one in found])
-    options.deliver_page(staged, page, 'elastic', document, verdict(found), table)
+    options.deliver_page(staged, page, 'elastic', document, box, table)
 
 
 def springs_document(found: Sequence[SpringEstimate], robot: str) -> dict[str, Any]:

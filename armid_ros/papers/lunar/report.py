@@ -12,15 +12,7 @@ from armid_ros.estimate import measured
 from armid_ros.identification.fitting.identifiability import HALF_WIDTH
 from armid_ros.motion import FloatArray
 from armid_ros.papers.lunar.reproduction import Composite, LOAD, Repeated, Reproduction
-from armid_ros.report.blocks import (
-    ContentSection,
-    DataTable,
-    Fold,
-    Origin,
-    Panels,
-    Paragraph,
-    VerdictSection,
-)
+from armid_ros.report.blocks import DataTable, Fold, Panels, Paragraph, VerdictSection
 from armid_ros.report.charts import Chart, Series, thinned
 from armid_ros.report.notation import digits
 from armid_ros.report.page import Page, Section
@@ -42,17 +34,14 @@ def lunar_report(found: Reproduction, provenance: Provenance) -> str:
         Files, versions, settings, seed.
 
     """
-    sections: list[Section] = [
-        verdict(found),
+    sections = [
         tables_section(found.repeated),
         curves_section(found.repeated),
         _gravity_section(found.composites, _load(found)),
-        Origin(provenance),
     ]
     subtitle = 'gravity and dynamics of a 6-DOF humanoid arm · the paper compared with its repeat'
-    return Page(
-        'Torques of a humanoid arm on the moon, as in the paper', subtitle, sections
-    ).html()
+    title = 'Torques of a humanoid arm on the moon, as in the paper'
+    return Page(title, subtitle, verdict(found), sections, provenance).html()
 
 
 def verdict(found: Reproduction) -> VerdictSection:
@@ -92,7 +81,7 @@ def _load(found: Reproduction) -> str:
     return ' ± '.join(measured(found.load, HALF_WIDTH * found.load_std)) + ' kg'
 
 
-def tables_section(repeated: Sequence[Repeated]) -> ContentSection:
+def tables_section(repeated: Sequence[Repeated]) -> Section:
     """Return the section with the tables of the paper and of the repetition."""
     text = (
         'Peak: torque of the paper, and largest gravity torque of the joint. Errors are those of '
@@ -104,7 +93,7 @@ def tables_section(repeated: Sequence[Repeated]) -> ContentSection:
         Fold(f'Table {one.table.number}: {one.table.title}', [_table(one)], opened=True)
         for one in repeated
     ]
-    return ContentSection('Tables', [Paragraph(text), *folds])
+    return Section('Tables', [Paragraph(text), *folds])
 
 
 def _table(one: Repeated) -> DataTable:
@@ -140,7 +129,7 @@ def _cells(values: FloatArray, count: int = 2) -> list[str]:
     return [digits(float(value), count) for value in values]
 
 
-def curves_section(repeated: Sequence[Repeated]) -> ContentSection:
+def curves_section(repeated: Sequence[Repeated]) -> Section:
     """Return the section with true and predicted torque along a held-out trajectory."""
     text = (
         'Gravity model, identified from the noisy run, along a held-out trajectory. Drag '
@@ -164,10 +153,10 @@ def curves_section(repeated: Sequence[Repeated]) -> ContentSection:
             panels.append((joint, '', [chart]))
         title = f'Table {one.table.number}: {one.table.title}'
         folds.append(Fold(title, [Panels(panels)], opened=number == 0))
-    return ContentSection('Torque curves', [Paragraph(text, 'hint'), *folds])
+    return Section('Torque curves', [Paragraph(text, 'hint'), *folds])
 
 
-def _gravity_section(composites: Sequence[Composite], load: str) -> ContentSection:
+def _gravity_section(composites: Sequence[Composite], load: str) -> Section:
     text = (
         'First moments times the gravity of the moon [N mm], from gravity torques alone, with '
         '95 % intervals. Nine parameters of the paper are legible; all have this form. '
@@ -185,9 +174,7 @@ def _gravity_section(composites: Sequence[Composite], load: str) -> ContentSecti
         )
         for one in composites
     ]
-    return ContentSection(
-        'Gravity parameters', [Paragraph(text), DataTable(heads, rows, words=(0, 1))]
-    )
+    return Section('Gravity parameters', [Paragraph(text), DataTable(heads, rows, words=(0, 1))])
 
 
 def lunar_document(found: Reproduction) -> dict[str, Any]:

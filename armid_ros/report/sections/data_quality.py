@@ -11,16 +11,9 @@ from armid_ros.identification.rows.period import find_period, refined_period
 from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording
 from armid_ros.recording.recording import GAP_PERIODS
-from armid_ros.report.blocks import (
-    BulletList,
-    ContentSection,
-    DataTable,
-    Fold,
-    Paragraph,
-    TableCell,
-)
+from armid_ros.report.blocks import BulletList, DataTable, Fold, Paragraph, TableCell
 from armid_ros.report.notation import digits, plain
-from armid_ros.report.page import Templated
+from armid_ros.report.page import Section, Templated
 from armid_ros.robots import Robot
 import numpy as np
 
@@ -29,7 +22,7 @@ def data_quality_section(
     read: Sequence[tuple[Recording, str, Sequence[Fit]]],
     robot: Robot | None = None,
     at_fault: Collection[str] = (),
-) -> ContentSection:
+) -> Section:
     """
     Return the section with rate, gaps and repairs of each recording.
 
@@ -71,7 +64,7 @@ def data_quality_section(
     blocks: list[Templated] = [DataTable(heads, rows, (0, 1, 6)), BulletList(notes)]
     if robot is not None:
         blocks += _repeatability(read, robot)
-    return ContentSection('Data quality', blocks)
+    return Section('Data quality', blocks)
 
 
 def _repeatability(

@@ -21,7 +21,6 @@ from armid_ros.report.blocks import (
     Bar,
     BarChart,
     Cells,
-    ContentSection,
     DataTable,
     Fold,
     Panels,
@@ -38,7 +37,7 @@ from armid_ros.report.notation import (
     value_of,
     with_interval,
 )
-from armid_ros.report.page import Templated
+from armid_ros.report.page import Section, Templated
 import numpy as np
 
 _DETECTABLE = (
@@ -113,13 +112,13 @@ def named_rows(
     return rows
 
 
-def named_section(findings: Sequence[Finding]) -> ContentSection:
+def named_section(findings: Sequence[Finding]) -> Section:
     """Return the section with the parameters of the named effects."""
     heads = ('Effect', 'Parameter', 'Joint', 'Value, 95 %')
-    return ContentSection('Parameters', [DataTable(heads, named_rows(findings), (0, 1, 2))])
+    return Section('Parameters', [DataTable(heads, named_rows(findings), (0, 1, 2))])
 
 
-def evidence_section(diagnosis: Diagnosis) -> ContentSection:
+def evidence_section(diagnosis: Diagnosis) -> Section:
     """Return the section with residuals of the worst joints over position, velocity and others."""
     folds = []
     total = 'the explained part' if diagnosis.findings else 'the difference'
@@ -152,10 +151,10 @@ def evidence_section(diagnosis: Diagnosis) -> ContentSection:
         line = f'{place.joint}: {100 * place.share_of_gap:.0f} % of {total}, '
         line += ' and '.join(named) or place.signature
         folds.append(Fold(line, [*blocks, Panels(panels)], opened=number == 0))
-    return ContentSection('Residual by variable', folds)
+    return Section('Residual by variable', folds)
 
 
-def minor_section(diagnosis: Diagnosis, patched: bool) -> ContentSection:
+def minor_section(diagnosis: Diagnosis, patched: bool) -> Section:
     """Return the section on significant effects that are negligible or fail on held-out data."""
     rows = [
         (
@@ -169,7 +168,7 @@ def minor_section(diagnosis: Diagnosis, patched: bool) -> ContentSection:
     ]
     share = 'Share of the difference' if diagnosis.findings else 'Share of the remaining error'
     not_in_model = '' if patched else ' None of them is in model.yaml.'
-    return ContentSection(
+    return Section(
         'Minor effects',
         [
             Paragraph(
@@ -181,10 +180,10 @@ def minor_section(diagnosis: Diagnosis, patched: bool) -> ContentSection:
     )
 
 
-def detectable_section(sizes: Sequence[Detectable]) -> ContentSection:
+def detectable_section(sizes: Sequence[Detectable]) -> Section:
     """Return the section with the detectable size of each effect, best and worst joint."""
     rows = [_detectable_row(name, sizes) for name in dict.fromkeys(one.name for one in sizes)]
-    return ContentSection(
+    return Section(
         'Smallest detectable effects',
         [
             Paragraph(
@@ -199,7 +198,7 @@ def detectable_section(sizes: Sequence[Detectable]) -> ContentSection:
     )
 
 
-def isolability_section(isolability: Isolability) -> ContentSection:
+def isolability_section(isolability: Isolability) -> Section:
     """Return the section on which effects a planned motion can detect and separate."""
     kinds, apart = isolability.of_kinds()
     near = (apart < DISTINCT) & ~np.eye(len(kinds), dtype=bool)
@@ -220,7 +219,7 @@ def isolability_section(isolability: Isolability) -> ContentSection:
         for k, name in enumerate(names)
     ]
     heads = (*_DETECTABLE, 'Not distinguishable from')
-    return ContentSection(
+    return Section(
         'Isolability',
         [
             Paragraph(
@@ -255,7 +254,7 @@ def _detectable_row(name: str, sizes: Sequence[Detectable]) -> tuple[str, str, s
     return name_in_words(name), best, worst if worst != best else '', never
 
 
-def candidates_section(diagnosis: Diagnosis) -> ContentSection:
+def candidates_section(diagnosis: Diagnosis) -> Section:
     """Return the section with the share of the residual that each effect alone explains."""
     explanation = diagnosis.explanation
     names = {finding.name for finding in diagnosis.findings}
@@ -275,10 +274,10 @@ def candidates_section(diagnosis: Diagnosis) -> ContentSection:
     ]
     if not rows:
         nothing = Paragraph('No effect explains any of the residual.')
-        return ContentSection('Candidates', [nothing])
+        return Section('Candidates', [nothing])
     heads = ('Effect', 'Joints', 'Share', 'Evidence', 'Value, 95 %', 'Visible')
     verb = 'was' if len(rows) == 1 else 'were'
-    return ContentSection(
+    return Section(
         'Candidates',
         [
             Fold(
@@ -312,12 +311,12 @@ def _candidate_value(diagnosis: Diagnosis, trial: CauseResult) -> str:
     return with_interval(float(trial.values[0]), float(trial.std[0]), name.unit)
 
 
-def gap_section(diagnosis: Diagnosis, gap: Gap) -> ContentSection:
+def gap_section(diagnosis: Diagnosis, gap: Gap) -> Section:
     """Return the section with each joint's torque error, without and with named effects."""
     usual_error, harmful = diagnosis.baseline, bool(diagnosis.harmful)
     recordings = 'recordings not used for the fit' if gap.predicted else gap.data
     unpatched = ' The model in model.yaml does not have the named cause.' * harmful
-    return ContentSection(
+    return Section(
         'Error of each joint',
         [
             Paragraph(

@@ -9,18 +9,10 @@ from collections.abc import Mapping, Sequence
 from armid_ros.identification import Fit, Score
 from armid_ros.identification.assess.verification import ForwardScore, ForwardValidation
 from armid_ros.motion import FloatArray
-from armid_ros.report.blocks import (
-    Bar,
-    BarChart,
-    ContentSection,
-    DataTable,
-    Fold,
-    Panels,
-    Paragraph,
-)
+from armid_ros.report.blocks import Bar, BarChart, DataTable, Fold, Panels, Paragraph
 from armid_ros.report.charts import Chart, joined, joined_time, Role, Series
 from armid_ros.report.notation import counted, digits, plain, sentence
-from armid_ros.report.page import Templated
+from armid_ros.report.page import Section, Templated
 from armid_ros.robots import Robot
 import numpy as np
 
@@ -59,9 +51,7 @@ def error_bars(robot: Robot, training: Fits, validation: Fits, halves: Score) ->
     return BarChart(rows, [(role, label) for role, label, _ in shown])
 
 
-def fit_section(
-    robot: Robot, training: Fits, validation: Fits, reach: FloatArray
-) -> ContentSection:
+def fit_section(robot: Robot, training: Fits, validation: Fits, reach: FloatArray) -> Section:
     """
     Return the section with measured and predicted torque of each joint.
 
@@ -128,7 +118,7 @@ def fit_section(
             'or from missing effects.'
         )
     )
-    return ContentSection('Torque', blocks)
+    return Section('Torque', blocks)
 
 
 def _fit_charts(fits: Sequence[Fit], joint: int, unit: str, link: str) -> tuple[Chart, Chart]:
@@ -164,7 +154,7 @@ def forward_section(
     robot: Robot,
     pairs: Sequence[ForwardValidation],
     labels: tuple[str, str] = ('description', 'identified'),
-) -> ContentSection:
+) -> Section:
     """
     Return the section with position errors of two simulated models under recorded torques.
 
@@ -214,7 +204,7 @@ def forward_section(
         own += _worst_joint(robot, pair, models)
         line = f'{pair.after.source}: at most {pair.errors()}'
         blocks.append(Fold(line, own, opened=number == 0))
-    return ContentSection('Forward validation', blocks)
+    return Section('Forward validation', blocks)
 
 
 def _worst_joint(

@@ -13,16 +13,7 @@ from armid_ros.motion import FloatArray
 from armid_ros.papers.exo.plant.gait import read_assumptions
 from armid_ros.papers.exo.plant.leg_pair import pair_torques, PairMotion, TiedPair
 from armid_ros.papers.exo.report.walk import by_torque_section, feet_section, SimulatedWalk, Walk
-from armid_ros.report.blocks import (
-    ContentSection,
-    DataTable,
-    FactList,
-    Fold,
-    Origin,
-    Panels,
-    Paragraph,
-    VerdictSection,
-)
+from armid_ros.report.blocks import DataTable, FactList, Fold, Panels, Paragraph, VerdictSection
 from armid_ros.report.charts import Chart, Role, Series
 from armid_ros.report.page import Page, Section
 from armid_ros.report.provenance import Provenance
@@ -57,16 +48,14 @@ def exo_report(
 
     """
     motions, abscissa, name = shown
-    sections: list[Section] = [verdict(found, walked), _stiffness_section(found, walked)]
+    sections = [_stiffness_section(found, walked)]
     if walked is not None:
-        sections += [Walk(walked), by_torque_section(walked), feet_section(walked.cycle)]
-    sections += [
-        forces_section(pair, motions, abscissa, name),
-        assumptions_section(),
-        Origin(provenance),
-    ]
+        sections.append(Section('Walking', [Walk(walked)]))
+        sections += [by_torque_section(walked), feet_section(walked.cycle)]
+    sections += [forces_section(pair, motions, abscissa, name), assumptions_section()]
     title = 'Straps between an exoskeleton and its wearer'
-    return Page(title, f'{len(pair.ties)} straps · {len(abscissa)} samples', sections).html()
+    subtitle = f'{len(pair.ties)} straps · {len(abscissa)} samples'
+    return Page(title, subtitle, verdict(found, walked), sections, provenance).html()
 
 
 def verdict(found: Sequence[Interaction], walked: SimulatedWalk | None) -> VerdictSection:
@@ -104,9 +93,7 @@ def verdict(found: Sequence[Interaction], walked: SimulatedWalk | None) -> Verdi
 _ROLES: tuple[Role, ...] = ('residual', 'predicted', 'before', 'measured')
 
 
-def _stiffness_section(
-    found: Sequence[Interaction], walked: SimulatedWalk | None
-) -> ContentSection:
+def _stiffness_section(found: Sequence[Interaction], walked: SimulatedWalk | None) -> Section:
     heads = ['Strap', 'Stiffness [N/m]', '± 95 %', 'Bias of ordinary least squares']
     rows = [
         [
@@ -128,7 +115,7 @@ def _stiffness_section(
         'from the recording, and the bias is corrected.'
     )
     table = DataTable([*heads, 'Simulated with'] if walked else heads, rows)
-    return ContentSection('Stiffness', [table, FactList(noise), Paragraph(text, 'hint')])
+    return Section('Stiffness', [table, FactList(noise), Paragraph(text, 'hint')])
 
 
 def _range(values: FloatArray) -> str:
@@ -139,7 +126,7 @@ def _range(values: FloatArray) -> str:
 
 def forces_section(
     pair: TiedPair, motions: PairMotion, abscissa: FloatArray, name: str
-) -> ContentSection:
+) -> Section:
     """Return the section with strap forces, and joint torques with and without straps."""
     torques = pair_torques(pair, *motions)
     alone = pair_torques(pair.with_stiffness(0.0), *motions)
@@ -158,7 +145,7 @@ def forces_section(
         ]
         chart = Chart(abscissa, both, name, 'torque [N m]', height=180, link='torques')
         panels.append((joint, '', [chart]))
-    return ContentSection(
+    return Section(
         'Interaction',
         [
             Paragraph(
@@ -171,7 +158,7 @@ def forces_section(
     )
 
 
-def assumptions_section() -> ContentSection:
+def assumptions_section() -> Section:
     """Return the section with name, value, unit and reason of each assumed quantity."""
     rows = []
     for name, entry in read_assumptions().items():
@@ -185,4 +172,4 @@ def assumptions_section() -> ContentSection:
         rows.append((name.replace('_', ' '), f'{text} {entry.unit}'.strip(), entry.reason))
     caption = 'Assumed values of quantities that the paper does not give.'
     table = DataTable(['Quantity', 'Value', 'Reason'], rows, words=(0, 1, 2))
-    return ContentSection('Assumptions', [Paragraph(caption), table])
+    return Section('Assumptions', [Paragraph(caption), table])

@@ -14,9 +14,9 @@ from armid_ros.papers.exo.plant.gait import read_assumptions
 from armid_ros.papers.exo.plant.gait_cycle import GaitCycle
 from armid_ros.papers.exo.plant.torque_driven import GaitCheck
 from armid_ros.papers.exo.plant.walkers import columns, contacts, floating, leg_length, SIDES
-from armid_ros.report.blocks import ContentSection, DataTable, Panels, Paragraph
+from armid_ros.report.blocks import DataTable, Panels, Paragraph
 from armid_ros.report.charts import Chart, Role, script_json, Series
-from armid_ros.report.page import Section
+from armid_ros.report.page import Section, Templated
 from armid_ros.robots import Robot
 from markupsafe import Markup
 import numpy as np
@@ -71,9 +71,9 @@ class SimulatedWalk(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Walk(Section):
+class Walk(Templated):
     """
-    Section with an animation of exoskeleton and wearer over a gait cycle.
+    Animation of exoskeleton and wearer over a gait cycle.
 
     Attributes
     ----------
@@ -82,7 +82,6 @@ class Walk(Section):
 
     """
 
-    title: ClassVar[str] = 'Walking'
     package: ClassVar[str] = 'armid_ros.papers.exo.report'
     template: ClassVar[str] = 'walk.html'
     #: Width and height of the drawing, and height of the ground [px].
@@ -148,7 +147,7 @@ class Walk(Section):
         )
 
 
-def feet_section(cycle: GaitCycle) -> ContentSection:
+def feet_section(cycle: GaitCycle) -> Section:
     """Return the section with foot forces, simulated and by the equations of the paper."""
     text = (
         'Ground forces on the feet, by the contact model of Table 3 of the paper '
@@ -184,10 +183,10 @@ def feet_section(cycle: GaitCycle) -> ContentSection:
                 f'{np.sqrt(np.mean((rule - feet)[two] ** 2)):.0f}',
             )
         )
-    return ContentSection('Feet', [Paragraph(text), Panels(panels), DataTable(heads, rows)])
+    return Section('Feet', [Paragraph(text), Panels(panels), DataTable(heads, rows)])
 
 
-def by_torque_section(walked: SimulatedWalk) -> ContentSection:
+def by_torque_section(walked: SimulatedWalk) -> Section:
     """Return the section with errors of torque-driven joints, here and in the paper."""
     rate = read_assumptions()['torque_rate'].value
     text = (
@@ -215,7 +214,7 @@ def by_torque_section(walked: SimulatedWalk) -> ContentSection:
             legend=False,
         )  # fmt: skip
         panels.append((joint, '', [Chart(phase, angles, '', 'angle [°]', link=joint), error]))
-    return ContentSection(
+    return Section(
         'Joints driven by their torque', [Paragraph(text), DataTable(heads, rows), Panels(panels)]
     )
 
