@@ -112,11 +112,17 @@ def verdict(result: TwoInertiaIdentification) -> VerdictSection:
     return VerdictSection(grade, tone, sentences, beware, step=step)
 
 
-def named_rows(document: dict[str, Any]) -> list[dict[str, Any]]:
-    """Return parameters and total damping of an elastic.json document, with readable names."""
-    words = {symbol: f'{name_in_words(field)} ({symbol})' for field, symbol, _ in PER_JOINT}
-    rows = [*document['parameters'], *document.get('total_damping', [])]
-    return [row | {'name': words.get(row['name'], row['name'])} for row in rows]
+#: Parameters in words, by their symbols in elastic.json.
+IN_WORDS = {
+    'alpha': 'inertia of link 1',
+    'beta': 'inertia of link 2',
+    'gamma': 'coupling of both links',
+    **{symbol: name_in_words(field) for field, symbol, _ in PER_JOINT},
+    'dl + dm gear^2': 'total damping',
+    'alpha + mm gear^2': 'inertia of link 1 and motor 1',
+    'mm gear^2': 'motor inertia at the joint',
+    'fm gear': 'Coulomb torque at the joint',
+}
 
 
 def _parameters_section(
@@ -125,7 +131,7 @@ def _parameters_section(
     """Return the section with parameters, 95 % intervals and reference values."""
     untuned = np.concatenate([unpack(result.untuned), result.untuned.total_damping])
     text = 'Fitted to the frequency responses. Step responses would add 95 % intervals.'
-    heads = ['Parameter', 'Joint', 'Estimate']
+    heads = ['Parameter', 'Symbol', 'Joint', 'Estimate']
     if result.tuning is not None:
         text = (
             'Tuned to the step responses. Only the sum dl + dm gear² of link and motor damping is '
@@ -137,9 +143,10 @@ def _parameters_section(
         heads += ['Known', 'Difference']
         base = np.concatenate([unpack(known), known.total_damping])
     rows = []
-    for k, one in enumerate(named_rows(elastic_document(result, ''))):
+    document = elastic_document(result, '')
+    for k, one in enumerate([*document['parameters'], *document.get('total_damping', [])]):
         value, std = one['value'], one['std']
-        row = [pretty(one['name']), one['joint']]
+        row = [IN_WORDS[one['name']], pretty(one['name']), one['joint']]
         if std is None:
             row.append(f'{value:.4g}')
         else:
@@ -147,7 +154,7 @@ def _parameters_section(
         if known is not None:
             row += [f'{base[k]:g}', f'{100.0 * (value / base[k] - 1.0):+.2f} %']
         rows.append([*row, pretty(one['unit'])])
-    table = DataTable([*heads, 'Unit'], rows, words=(0, 1, len(heads)))
+    table = DataTable([*heads, 'Unit'], rows, words=(0, 1, 2, len(heads)))
     return Section('Parameters', [Paragraph(text), table])
 
 
@@ -155,7 +162,13 @@ def rigid_section(fit: RigidFit) -> Section:
     """Return the section with the parameters of step 1, which models the joints as rigid."""
     estimate = fit.estimate
     rows = [
-        (pretty(name.name), name.joint, *measured(value, HALF_WIDTH * std), pretty(name.unit))
+        (
+            IN_WORDS[name.name],
+            pretty(name.name),
+            name.joint,
+            *measured(value, HALF_WIDTH * std),
+            pretty(name.unit),
+        )
         for name, value, std in zip(
             estimate.parameters, estimate.values, estimate.std, strict=True
         )
@@ -165,8 +178,8 @@ def rigid_section(fit: RigidFit) -> Section:
         f'identifiable only as a sum, and so is the friction of motors and links. The relative '
         f'torque error is {fit.relative_error:.2f} %.'
     )
-    heads = ('Parameter', 'Joint', 'Estimate', '± 95 %', 'Unit')
-    return Section('Rigid arm', [Paragraph(text), DataTable(heads, rows, words=(0, 1, 4))])
+    heads = ('Parameter', 'Symbol', 'Joint', 'Estimate', '± 95 %', 'Unit')
+    return Section('Rigid arm', [Paragraph(text), DataTable(heads, rows, words=(0, 1, 2, 5))])
 
 
 #: Frequency ranges of the plots and of the comparison of responses [Hz].

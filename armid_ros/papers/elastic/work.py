@@ -19,7 +19,7 @@ from armid_ros.papers.elastic.experiments import (
     run_experiment,
     step_experiments,
 )
-from armid_ros.papers.elastic.report import named_rows
+from armid_ros.papers.elastic.report import IN_WORDS
 from armid_ros.recording.elastic import write_runs
 from armid_ros.recording.writer import require_new
 from armid_ros.robots import Robot
@@ -103,13 +103,14 @@ def resonances_table(document: dict[str, Any]) -> Table:
 
 def values_table(document: dict[str, Any]) -> Table:
     """Return a table of all parameters with their standard deviations."""
-    return ('parameter', 'joint', 'value', 'std', 'unit'), [
+    return ('parameter', 'symbol', 'joint', 'value', 'std', 'unit'), [
         (
+            IN_WORDS[row['name']],
             row['name'],
             row['joint'],
             f'{row["value"]:.5g}',
             '' if row['std'] is None else f'{row["std"]:.2g}',
             row['unit'],
         )
-        for row in named_rows(document)
+        for row in [*document['parameters'], *document.get('total_damping', [])]
     ]
