@@ -124,8 +124,9 @@ def log_recording(
     """
     rr, robot = rerun(), arm.robot
     notes = _log_bodies(stream, robot, marked)
-    t, q = interpolated_poses(recording)
-    frames = ArmModel(robot).link_frames(Motion.of_states(robot.joints, q, 0.0, 0.0)).frames
+    wanted = max(1, int(30.0 * recording.duration))  # poses, 30 in a second
+    poses = recording.select(slice(None, None, max(1, len(recording) // wanted)))
+    frames = ArmModel(robot).link_frames(Motion.of_states(robot.joints, poses.q, 0.0, 0.0)).frames
     curves = [('position/{}', recording.t, recording.q)]
     if recording.dq is not None:
         curves.append(('velocity/{}', recording.t, recording.dq))
@@ -141,13 +142,11 @@ def log_recording(
     for j, joint in enumerate(robot.moving):
         turns = Rotation.from_matrix(frames[j].rotation.transpose(2, 0, 1)).as_quat()
         moved = rr.Transform3D.columns(translation=frames[j].origin.T, quaternion=turns)
-        stream.send_columns(f'arm/{_part(joint)}', [_times(t)], moved)
+        stream.send_columns(f'arm/{_part(joint)}', [_times(poses.t)], moved)
     for j, joint in enumerate(robot.joints):
         for entity, at, values in curves:
-            known = np.isfinite(values[:, j])
-            if known.any():
-                column = rr.Scalars.columns(scalars=values[known, j])
-                stream.send_columns(entity.format(_part(joint)), [_times(at[known])], column)
+            column = rr.Scalars.columns(scalars=values[:, j])
+            stream.send_columns(entity.format(_part(joint)), [_times(at)], column)
         for entity, name, colour in (
             ('torque/{}/measured', 'measured', (140, 145, 150)),
             ('torque/{}/predicted', 'predicted', (213, 94, 0)),
@@ -158,18 +157,6 @@ def log_recording(
     stream.send_blueprint(_layout(robot.joints, marked))
     stream.flush()
     return notes
-
-
-def interpolated_poses(recording: Recording) -> tuple[FloatArray, FloatArray]:
-    """Return times [s] and positions of a recording, interpolated at about 30 Hz: (K,), (K, n)."""
-    t = recording.t
-    count = max(2, int((t[-1] - t[0]) * 30.0) + 1)  # poses per second
-    at = np.linspace(t[0], t[-1], min(count, len(t)))
-    columns = []
-    for column in recording.q.T:
-        known = np.isfinite(column)
-        columns.append(np.interp(at, t[known], column[known]) if known.any() else 0.0 * at)
-    return at, np.column_stack(columns)
 
 
 def _log_bodies(stream: Any, robot: Robot, marked: Sequence[str]) -> list[str]:
