@@ -166,19 +166,16 @@ class MergedBags:
     refused: tuple[Refused, ...] = ()
 
     @classmethod
-    def of(cls, bags: Sequence[BagSummary | Refused]) -> MergedBags:
-        """Return the sum of the normal equations of bags, and the list of refused bags."""
-        used = [one for one in bags if isinstance(one, BagSummary)]
-        parts = [
-            cls(one.normal, one.seconds, ((one.bag.url, one.bag.version),), not one.computed)
-            for one in used
-        ]
-        refused = tuple(one for one in bags if isinstance(one, Refused))
-        return cls.together([*parts, cls(refused=refused)])
+    def of(cls, bag: BagSummary | Refused) -> MergedBags:
+        """Return the normal equations of a bag, without its rows, or the refused bag."""
+        if isinstance(bag, Refused):
+            return cls(refused=(bag,))
+        version = bag.bag.url, bag.bag.version
+        return cls(bag.normal, bag.seconds, (version,), not bag.computed)
 
     @classmethod
     def together(cls, parts: Sequence[MergedBags]) -> MergedBags:
-        """Return the sum of the normal equations of several groups of bags."""
+        """Return the sum of the normal equations of several bags."""
         known = [part.normal for part in parts if part.normal is not None]
         return cls(
             sum(known[1:], known[0]) if known else None,

@@ -91,25 +91,21 @@ class FleetOutcome:
         return tuple(sorted((one for a in self.arms for one in a.refused), key=lambda r: r.bag))
 
 
-#: Bags of one arm that one task reads.
-Group = tuple[BagFile, ...]
 #: All bags of an arm, and their fit; None instead of the fit if there are too few rows.
 Fitted = tuple[MergedBags, FleetFit | None]
 
 
-def take(bags: Group, job: Job, bags_of_arm: int) -> tuple[BagSummary | Refused, ...]:
-    """Dask task: return the summary of each bag; read bags without a stored summary."""
-    store, taken = Store(job.out), []
-    for bag in bags:
-        one = find_summary(store, bag, job)
-        if one is None:
-            one = prepare(bag, job, bags_of_arm)
-            if isinstance(one, Refused):
-                write_refused(store, one, job)
-            else:
-                write_summary(store, one, job)
-        taken.append(one)
-    return tuple(taken)
+def take(bag: BagFile, job: Job, bags_of_arm: int) -> BagSummary | Refused:
+    """Dask task: return the summary of a bag; read the bag if there is no stored summary."""
+    store = Store(job.out)
+    found = find_summary(store, bag, job)
+    if found is None:
+        found = prepare(bag, job, bags_of_arm)
+        if isinstance(found, Refused):
+            write_refused(store, found, job)
+        else:
+            write_summary(store, found, job)
+    return found
 
 
 def same(job: Job) -> Job:
@@ -117,20 +113,18 @@ def same(job: Job) -> Job:
     return job
 
 
-def fit(groups: Sequence[MergedBags], job: Job) -> Fitted:
-    """Dask task: sum the normal equations of all groups of an arm's bags, and fit parameters."""
-    merged = MergedBags.together(groups)
+def fit(bags: Sequence[MergedBags], job: Job) -> Fitted:
+    """Dask task: sum the normal equations of all bags of an arm, and fit parameters."""
+    merged = MergedBags.together(bags)
     return merged, None if merged.normal is None else FleetFit.of(merged.normal, job)
 
 
-def noise(taken: Sequence[BagSummary | Refused], fitted: Fitted, job: Job) -> FloatArray | None:
-    """Dask task: compute the noise covariance of the normal equations of a group of bags."""
-    known, found = fitted[1], None
-    for one in taken:
-        if known is not None and isinstance(one, BagSummary):
-            products = known.noise(one.rows_again(job))
-            found = products if found is None else found + products
-    return found
+def noise(taken: BagSummary | Refused, fitted: Fitted, job: Job) -> FloatArray | None:
+    """Dask task: compute the noise covariance of the normal equations of a bag."""
+    known = fitted[1]
+    if known is None or isinstance(taken, Refused):
+        return None
+    return known.noise(taken.rows_again(job))
 
 
 def finish(
@@ -145,28 +139,6 @@ def finish(
         total = np.sum([one for one in products if one is not None], axis=0)
         write_arm(Store(job.out), arm, known.estimate(merged.normal, total), merged, job)
     return ArmOutcome(arm, len(merged.versions), merged.found, merged.refused, problem)
-
-
-def grouped(bags: Sequence[BagFile]) -> tuple[Group, ...]:
-    """
-    Divide the bags of an arm into groups, one for each Dask task, in order.
-
-    Groups depend on sizes alone, so the order of sums, and so the last digit, is the same on every
-    cluster. A bag of unknown size forms a separate group.
-
-    """
-    # a task takes about a second, so that the overhead of Dask is small
-    most_bytes, most_bags = 16_000_000, 16
-    groups: list[list[BagFile]] = []
-    total = 0
-    for bag in bags:
-        size = bag.size or most_bytes
-        if not groups or total + size > most_bytes or len(groups[-1]) == most_bags:
-            groups.append([])
-            total = 0
-        groups[-1].append(bag)
-        total += size
-    return tuple(tuple(group) for group in groups)
 
 
 def identify_fleet(
@@ -207,14 +179,14 @@ class _Waiting:
     """Arm whose Dask tasks are not submitted yet, with bags to read and failed bags."""
 
     arm: str
-    groups: tuple[Group, ...]
+    bags: tuple[BagFile, ...]
     refused: tuple[Refused, ...] = ()
     hit: int = 0  # number of worker failures due to other tasks
 
 
 @dataclass
 class _UnderWay:
-    """Submitted Dask tasks of an arm, in the order of its groups of bags."""
+    """Submitted Dask tasks of an arm, in the order of its bags."""
 
     arm: _Waiting
     prepared: list[Future]
@@ -243,7 +215,7 @@ class _Run:
             own, job = list(group), job_of[arm]
             refused = arm_is_done(Store(job.out), arm, own, job) if job.settings.resume else None
             if refused is None:
-                self._waiting.append(_Waiting(arm, grouped(own)))
+                self._waiting.append(_Waiting(arm, tuple(own)))
             else:
                 done = len(own) - len(refused)
                 self.outcomes.append(ArmOutcome(arm, done, done, tuple(refused)))
@@ -251,8 +223,8 @@ class _Run:
 
     def work(self) -> None:
         """Process all arms, with enough arms in progress that no worker is idle."""
-        # groups of bags in progress: a constant, and a number per thread
-        limit = 2 + 3 * sum(self._client.nthreads().values())
+        # bags in progress: a constant, and a number per thread
+        limit = 2 + 8 * sum(self._client.nthreads().values())
         under_way: dict[Any, _UnderWay] = {}
         ended = as_completed(raise_errors=False)
         while self._waiting or under_way:
@@ -294,16 +266,15 @@ class _Run:
 
     def _submitted(self, arm: _Waiting) -> _UnderWay:
         """Submit the Dask tasks of an arm: read bags, fit, compute noise covariances, write."""
-        job, count = self._job(arm.arm), sum(len(group) for group in arm.groups)
+        job, count = self._job(arm.arm), len(arm.bags)
         prepared = []
-        for group in arm.groups:
-            future = self._submit(take, group, job, count, retries=RETRIES)
+        for bag in arm.bags:
+            future = self._submit(take, bag, job, count, retries=RETRIES)
             prepared.append(future)
 
-            def ended(future: Future, group: Group = group) -> None:
-                # groups that are lost or divided will be submitted again
-                if future.status == 'finished' or (future.status == 'error' and len(group) == 1):
-                    self._count(group)
+            def ended(future: Future, bag: BagFile = bag) -> None:
+                if future.status in ('finished', 'error'):  # others will be submitted again
+                    self._count([bag])
 
             future.add_done_callback(ended)
         fitted = self._submit(fit, [self._submit(MergedBags.of, one) for one in prepared], job)
@@ -313,40 +284,36 @@ class _Run:
 
     def _begin_again(self, tasks: _UnderWay) -> None:
         """Submit a failed arm again, without the bags that caused its failure."""
-        # A failed group is divided into single bags, to find the bag that fails. Tasks that depend
-        # on a failed task fail too, so the noise tasks are checked only if all bags were read. If
-        # another bag may have killed the worker, the bag is read once more alone.
+        # Tasks that depend on a failed task fail too, so the noise tasks are checked only if all
+        # bags were read. If another bag may have killed the worker, the bag is read once more
+        # alone.
         arm = tasks.arm
         job, futures = self._job_of[arm.arm], tasks.prepared
         if tasks.fitted.status == 'finished' and all(one.status != 'error' for one in futures):
             futures = tasks.noise
-        groups: list[Group] = []
+        bags: list[BagFile] = []
         failed: list[Refused] = []
         error = tasks.last.exception()
         hit = isinstance(error, KilledWorker) and all(one.status != 'error' for one in futures)
-        for group, future in zip(arm.groups, futures, strict=True):
+        for bag, future in zip(arm.bags, futures, strict=True):
+            failure = future.exception() if future.status == 'error' else None
+            if isinstance(failure, KilledWorker):  # repeat the task alone
+                future = self._submit(take, bag, self._job(arm.arm), 1, retries=RETRIES)
+                next(as_completed([future], raise_errors=False))
+                hit |= future.status != 'error'
             if future.status != 'error':
-                groups.append(group)
-            elif len(group) > 1:
-                groups.extend((bag,) for bag in group)
+                bags.append(bag)
             else:
-                if isinstance(future.exception(), KilledWorker):  # repeat the task alone
-                    future = self._submit(take, group, self._job(arm.arm), 1, retries=RETRIES)
-                    next(as_completed([future], raise_errors=False))
-                if future.status != 'error':
-                    groups.append(group)
-                    hit = True
-                else:
-                    failed.append(Refused(group[0], _reason(future.exception()), failed=True))
+                failed.append(Refused(bag, _reason(future.exception()), failed=True))
         for one in failed:
             write_refused(Store(job.out), one, job)
         left = _Waiting(
             arm.arm,
-            tuple(groups),
+            tuple(bags),
             (*arm.refused, *failed),
             arm.hit + (hit and arm.hit < 3),  # at most three times
         )
-        if left.groups and left != arm:
+        if left.bags and left != arm:
             self._waiting.appendleft(left)
         else:
             problem = 'none of its bags can be used' if failed else _reason(error)
