@@ -26,7 +26,7 @@ def test_springs_are_found_from_the_topics(bench):
     node = pair_node(bench)
     learner.match()
     bench.spin_until(lambda: all(topic.publishers for topic in learner.topics), 'discovery')
-    while not estimates and node.pair.t < 6.0:
+    while not estimates and node.t < 6.0:
         received = learner.received + 2
         node.step()
         bench.spin_until(lambda received=received: learner.received >= received, 'joint states')

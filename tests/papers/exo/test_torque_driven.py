@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Joints that follow torques, in this package's engine and in MuJoCo."""
 
+from itertools import islice
+
 from armid_ros.errors import TrajectoryError
 from armid_ros.papers.exo.plant.gait import read_gait
 from armid_ros.papers.exo.plant.leg_pair import (
@@ -12,7 +14,7 @@ from armid_ros.papers.exo.plant.leg_pair import (
     TiedPair,
     walking,
 )
-from armid_ros.papers.exo.plant.simulated_pair import SimulatedPair
+from armid_ros.papers.exo.plant.simulated_pair import PairSample, sensor_readings
 from armid_ros.papers.exo.plant.torque_driven import drive_by_torque, splined
 import numpy as np
 import pytest
@@ -55,15 +57,13 @@ def test_an_even_number_of_samples_is_refused(pair) -> None:
         drive_by_torque(pair, *even, ['exo_swing_hip'], lambda t: np.zeros(1))
 
 
-def simulated(**options) -> SimulatedPair:
-    return SimulatedPair(leg_pair(), read_gait(), rng=np.random.default_rng(0), **options)
+def simulated(count: int, **options) -> list[PairSample]:
+    rng = np.random.default_rng(0)
+    return list(islice(sensor_readings(leg_pair(), read_gait(), rng=rng, **options), count))
 
 
 def test_without_noise_it_is_the_gait_and_its_torques():
-    pair, samples = leg_pair(), []
-    standing = simulated()
-    for _ in range(120):
-        samples.append(standing.advance())
+    pair, samples = leg_pair(), simulated(120)
     motions = stepping(pair, read_gait(), np.array([s.t for s in samples]))
     np.testing.assert_allclose([s.q for s in samples], motions.own.q, atol=1e-12)
     np.testing.assert_allclose([s.other_q for s in samples], motions.other.q, atol=1e-12)
@@ -74,8 +74,8 @@ def test_without_noise_it_is_the_gait_and_its_torques():
 
 def test_noise_has_the_size_asked_for_and_comes_from_the_seed():
     noise = {'angle_noise': 1e-3, 'torque_noise': 0.5}
-    noisy, again, clean = simulated(**noise), simulated(**noise), simulated()
-    triples = [(noisy.advance(), again.advance(), clean.advance()) for _ in range(200)]
+    noisy, again, clean = simulated(200, **noise), simulated(200, **noise), simulated(200)
+    triples = list(zip(noisy, again, clean, strict=True))
     errors = np.array([a.q - c.q for a, _, c in triples])
     assert errors.std() == pytest.approx(1e-3, rel=0.1)
     assert np.array([a.tau - c.tau for a, _, c in triples]).std() == pytest.approx(0.5, rel=0.1)

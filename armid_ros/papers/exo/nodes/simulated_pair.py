@@ -17,7 +17,7 @@ from armid_ros.nodes.running.process import run
 from armid_ros.nodes.running.real_time import RealTime
 from armid_ros.papers.exo.plant.gait import read_gait
 from armid_ros.papers.exo.plant.leg_pair import leg_pair
-from armid_ros.papers.exo.plant.simulated_pair import SimulatedPair
+from armid_ros.papers.exo.plant.simulated_pair import sensor_readings
 from armid_ros.robots.ties import SEGMENTS
 import numpy as np
 from rclpy.time import Time
@@ -25,7 +25,15 @@ from sensor_msgs.msg import JointState
 
 
 class SimulatedPairNode(ArmidNode):
-    """Node that publishes simulated joint states of an exoskeleton and its wearer."""
+    """
+    Node that publishes simulated joint states of an exoskeleton and its wearer.
+
+    Attributes
+    ----------
+    t : float
+        Time of the simulation [s].
+
+    """
 
     table = (
         NodeParameter('gait', '', 'CSV file of a gait cycle; empty: level walking.'),
@@ -62,7 +70,8 @@ class SimulatedPairNode(ArmidNode):
         pair = leg_pair(self.value('stiffness'), self.value('segments'))
         pair = pair.with_slack(self.value('slack'))
         gait = self.value('gait')
-        self.pair = SimulatedPair(
+        self._begin = partial(
+            sensor_readings,
             pair,
             read_gait(Path(gait) if gait else None),
             rate=self.value('rate'),
@@ -70,10 +79,11 @@ class SimulatedPairNode(ArmidNode):
             torque_noise=self.value('torque_noise'),
             rng=np.random.default_rng(self.value('seed')),
         )
+        self._pair, self._readings, self.t = pair, self._begin(), 0.0
         self._origin_ns = self.get_clock().now().nanoseconds if start_ns is None else start_ns
         self._exo = self.create_publisher(JointState, 'exo/joint_states', SAMPLES)
         self._human = self.create_publisher(JointState, 'human/joint_states', SAMPLES)
-        self.real_time = RealTime(lambda: float(self.pair.t), self.step)
+        self.real_time = RealTime(lambda: self.t, self.step)
         self.offer('~/reset', self.reset)
         factor = self.value('real_time_factor')
         if factor:
@@ -83,17 +93,18 @@ class SimulatedPairNode(ArmidNode):
     @property
     def hardware(self) -> str:
         """Name of the exoskeleton, for diagnostics."""
-        return str(self.pair.pair.robot.name)
+        return str(self._pair.robot.name)
 
     @property
     def stamp_ns(self) -> int:
         """Timestamp of the current sample [ns]."""
-        return self._origin_ns + round(self.pair.t * 1e9)
+        return self._origin_ns + round(self.t * 1e9)
 
     def step(self) -> int:
         """Simulate the next sample, publish it on both topics, and return its timestamp [ns]."""
-        sample = self.pair.advance()
-        robot, other = self.pair.pair.robot, self.pair.pair.other
+        sample = next(self._readings)
+        self.t = float(sample.t)
+        robot, other = self._pair.robot, self._pair.other
         for publisher, joints, parts in (
             (self._human, other.joints, (sample.other_q, sample.other_dq)),
             (self._exo, robot.joints, (sample.q, sample.dq, sample.tau)),
@@ -115,14 +126,14 @@ class SimulatedPairNode(ArmidNode):
     def reset(self) -> str:
         """Return both machines to the initial state, without a jump of the time stamps."""
         self._origin_ns = self.stamp_ns
-        self.pair.reset()
+        self._readings, self.t = self._begin(), 0.0
         self.real_time.begin()
         return 'exoskeleton and wearer are in the initial state'
 
     def condition(self) -> tuple[str, Mapping[str, object]]:
         """Return a warning if simulation is slower than real time, and the skipped time."""
         values = {
-            'simulated_time': self.pair.t,
+            'simulated_time': self.t,
             'skipped_real_time': self.real_time.given_up,
         }
         return self.real_time.trouble('start it with a lower rate'), values

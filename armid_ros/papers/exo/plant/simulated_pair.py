@@ -4,11 +4,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from itertools import count
 from typing import NamedTuple
 
 from armid_ros.motion import FloatArray
 from armid_ros.papers.exo.plant.gait import Gait
-from armid_ros.papers.exo.plant.leg_pair import pair_torques, PairMotion, stepping, TiedPair
+from armid_ros.papers.exo.plant.leg_pair import pair_torques, stepping, TiedPair
 import numpy as np
 
 #: Samples that are computed together.
@@ -38,9 +40,17 @@ class PairSample(NamedTuple):
     other_dq: FloatArray
 
 
-class SimulatedPair:
+def sensor_readings(
+    pair: TiedPair,
+    gait: Gait,
+    *,
+    rate: float = 1000.0,
+    angle_noise: float = 0.0,
+    torque_noise: float = 0.0,
+    rng: np.random.Generator,
+) -> Iterator[PairSample]:
     """
-    Simulator of exoskeleton and wearer along a gait, with sensor noise.
+    Yield the sensor readings of exoskeleton and wearer who step forward and back.
 
     Parameters
     ----------
@@ -56,50 +66,17 @@ class SimulatedPair:
         Source of the noise.
 
     """
-
-    def __init__(
-        self,
-        pair: TiedPair,
-        gait: Gait,
-        *,
-        rate: float = 1000.0,
-        angle_noise: float = 0.0,
-        torque_noise: float = 0.0,
-        rng: np.random.Generator,
-    ) -> None:
-        self.pair = pair
-        self._gait = gait
-        self._rate = rate
-        self._noise = angle_noise, torque_noise
-        self._rng = rng
-        self.reset()
-
-    def reset(self) -> None:
-        """Return exoskeleton and wearer to the initial state."""
-        self._steps = 0
-        self._block: tuple[PairMotion, FloatArray] | None = None
-
-    @property
-    def t(self) -> float:
-        """Time since the initial state [s]."""
-        return self._steps / self._rate
-
-    def advance(self) -> PairSample:
-        """Advance by one sample, and return the sensor readings."""
-        k = self._steps % _BLOCK
-        self._steps += 1
-        if k == 0 or self._block is None:
-            t = (self._steps + np.arange(_BLOCK)) / self._rate
-            motions = stepping(self.pair, self._gait, t)
-            self._block = motions, pair_torques(self.pair, *motions).tau
-        (own, other), tau = self._block
-        noise = self._rng.standard_normal((3, len(tau[k])))
-        angles, torques = self._noise
-        return PairSample(
-            self.t,
-            own.q[k] + angles * noise[0],
-            own.dq[k],
-            tau[k] + torques * noise[1],
-            other.q[k] + angles * noise[2],
-            other.dq[k],
+    for first in count(1, _BLOCK):
+        t = (first + np.arange(_BLOCK)) / rate
+        own, other = stepping(pair, gait, t)
+        tau = pair_torques(pair, own, other).tau
+        noise = rng.standard_normal((_BLOCK, 3, tau.shape[1]))
+        yield from map(
+            PairSample,
+            t,
+            own.q + angle_noise * noise[:, 0],
+            own.dq,
+            tau + torque_noise * noise[:, 1],
+            other.q + angle_noise * noise[:, 2],
+            other.dq,
         )
