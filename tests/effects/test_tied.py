@@ -14,8 +14,8 @@ from armid_ros.papers.exo.plant.leg_pair import (
     leg_pair,
     pair_torques,
     PairMotion,
+    stepping,
     TiedPair,
-    walking,
 )
 from armid_ros.recording import recorded_together, Recording
 import numpy as np
@@ -32,7 +32,7 @@ def pair() -> TiedPair:
 
 @pytest.fixture(scope='module')
 def motions(pair) -> PairMotion:
-    return walking(pair, read_gait(), np.linspace(0.0, 0.456, 457))
+    return stepping(pair, read_gait(), np.linspace(0.0, 0.456, 457))
 
 
 @pytest.fixture(scope='module')

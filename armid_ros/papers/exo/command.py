@@ -118,9 +118,7 @@ def exo(
         walked = work.walk(pair, gait, stiffness, tick) if bag is None else None
     used = {'inertias': inertias, 'topics': topics}
     origin = provenance([path], used, seed if bag is None else None)
-    shown = work.recorded_motions(pair, machine, wearer)
-    if bag is None:
-        shown = work.single_support(pair, gait)
+    shown = motions if bag is None else work.recorded_motions(pair, machine, wearer)
     stiff = pair.with_stiffness(found[0].stiffness[0].clip(0.0))
     page = exo_report(stiff, shown, found, walked, origin)
     document = work.exo_document(found, walked, source)

@@ -11,10 +11,10 @@ from typing import Any
 from armid_ros.cli.terminal import Tick
 from armid_ros.identification.ties.recorded import recorded_interaction_problem
 from armid_ros.identification.ties.stiffness import identify_interaction, Interaction
-from armid_ros.motion import FloatArray, Motion
+from armid_ros.motion import Motion
 from armid_ros.papers.exo.plant.gait import Gait, read_assumptions
 from armid_ros.papers.exo.plant.gait_cycle import check_cycle, gait_cycle, ground_by_shares
-from armid_ros.papers.exo.plant.leg_pair import pair_torques, PairMotion, TiedPair, walking
+from armid_ros.papers.exo.plant.leg_pair import pair_torques, PairMotion, TiedPair
 from armid_ros.papers.exo.plant.walkers import walking_pair
 from armid_ros.papers.exo.report.walk import (
     DrivenJoint,
@@ -76,29 +76,16 @@ def identify_ties(
     return found
 
 
-def single_support(pair: TiedPair, gait: Gait) -> tuple[PairMotion, FloatArray, str]:
-    """Return motions on one foot, their gait phases, and the label of the phase axis."""
-    known = read_assumptions()
-    begin, end = known['single_support'].value
-    cycle = known['cycle_time'].value
-    t = np.linspace(0.0, (end - begin) * cycle, 2 * round(500 * (end - begin) * cycle) + 1)
-    phase = begin + 0.5 + t / cycle
-    return walking(pair, gait, t), phase, 'gait cycle of the swing leg'
-
-
-def recorded_motions(
-    pair: TiedPair, machine: Recording, wearer: Recording
-) -> tuple[PairMotion, FloatArray, str]:
-    """Return recorded positions on one time base, the times, and the label of the time axis."""
+def recorded_motions(pair: TiedPair, machine: Recording, wearer: Recording) -> PairMotion:
+    """Return recorded positions of both machines on one time base."""
     both = recorded_together(machine, wearer, pair.other)
     assert both.partner is not None
-    motions = PairMotion(
+    return PairMotion(
         *(
             Motion(joints, both.t, q, np.zeros_like(q), np.zeros_like(q))
             for joints, q in ((machine.joints, both.q), (wearer.joints, both.partner.q))
         )
     )
-    return motions, both.t, 'time [s]'
 
 
 def exo_document(

@@ -184,33 +184,6 @@ def assumed_stiffness(stiffness: npt.ArrayLike | None) -> FloatArray:
     return np.asarray(assumed if stiffness is None else stiffness, dtype=float)
 
 
-def walking(pair: TiedPair, gait: Gait, t: FloatArray) -> PairMotion:
-    """
-    Return the walking motion of exoskeleton and wearer while one foot is on the ground.
-
-    The wearer follows the gait, and the exoskeleton follows the wearer with a small error. Single
-    support begins at t = 0.
-
-    Parameters
-    ----------
-    pair : TiedPair
-        The shipped pair.
-    gait : Gait
-        Gait of one leg.
-    t : ndarray, shape (N,)
-        Time [s].
-
-    """
-    known = read_assumptions()
-    begin, cycle = known['single_support'].value[0], known['cycle_time'].value
-
-    def wearer(joints: tuple[str, ...], time: FloatArray) -> Motion:
-        phase = [begin + time / cycle, np.full_like(time, 1.0 / cycle), np.zeros_like(time)]
-        return stance_motion(gait, joints, time, np.array(phase))
-
-    return following(pair, t, wearer)
-
-
 def stepping(pair: TiedPair, gait: Gait, t: FloatArray, period: float | None = None) -> PairMotion:
     """
     Return a periodic motion of exoskeleton and wearer: a step forward and back, on one foot.

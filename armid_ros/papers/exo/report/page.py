@@ -25,7 +25,7 @@ _MAX_HALF_WIDTH = 0.1
 
 def exo_report(
     pair: TiedPair,
-    shown: tuple[PairMotion, FloatArray, str],
+    motions: PairMotion,
     found: Sequence[Interaction],
     walked: SimulatedWalk | None,
     provenance: Provenance,
@@ -37,8 +37,8 @@ def exo_report(
     ----------
     pair : TiedPair
         Both machines, with the estimated stiffness.
-    shown : (PairMotion, ndarray, str)
-        The motion of both machines, and abscissa of the plots, shape (N,), with name and unit.
+    motions : PairMotion
+        The recorded motions of both machines.
     found : sequence of Interaction
         Estimates with one stiffness for all ties, then with one for each.
     walked : SimulatedWalk or None
@@ -47,14 +47,13 @@ def exo_report(
         Files, versions, settings, seed.
 
     """
-    motions, abscissa, name = shown
     sections = [_stiffness_section(found, walked)]
     if walked is not None:
         sections.append(Section('Walking', [Walk(walked)]))
         sections += [by_torque_section(walked), feet_section(walked.cycle)]
-    sections += [forces_section(pair, motions, abscissa, name), assumptions_section()]
+    sections += [forces_section(pair, motions), assumptions_section()]
     title = 'Straps between an exoskeleton and its wearer'
-    subtitle = f'{len(pair.ties)} straps · {len(abscissa)} samples'
+    subtitle = f'{len(pair.ties)} straps · {len(motions.own)} samples'
     return Page(title, subtitle, verdict(found, walked), sections, provenance).html()
 
 
@@ -124,13 +123,11 @@ def _range(values: FloatArray) -> str:
     return ' to '.join(ends)
 
 
-def forces_section(
-    pair: TiedPair, motions: PairMotion, abscissa: FloatArray, name: str
-) -> Section:
+def forces_section(pair: TiedPair, motions: PairMotion) -> Section:
     """Return the section with strap forces, and joint torques with and without straps."""
     torques = pair_torques(pair, *motions)
     alone = pair_torques(pair.with_stiffness(0.0), *motions)
-    size = np.linalg.norm(torques.forces, axis=2)
+    t, size = motions.own.t, np.linalg.norm(torques.forces, axis=2)
     names = [name.replace('_', ' ') for name in pair.segments]
     series = [Series(name, size[:, k], _ROLES[k % len(_ROLES)]) for k, name in enumerate(names)]
     rows = [
@@ -143,7 +140,7 @@ def forces_section(
             Series('without straps', alone.tau[:, k], 'measured'),
             Series('with straps', torques.tau[:, k], 'residual'),
         ]
-        chart = Chart(abscissa, both, name, 'torque [N m]', height=180, link='torques')
+        chart = Chart.over_time(t, both, 'torque [N m]', height=180, link='torques')
         panels.append((joint, '', [chart]))
     return Section(
         'Interaction',
@@ -151,7 +148,7 @@ def forces_section(
             Paragraph(
                 'Force of each strap on the exoskeleton; the force on the wearer is opposite.'
             ),
-            Chart(abscissa, series, name, 'force [N]', height=260),
+            Chart.over_time(t, series, 'force [N]', height=260),
             DataTable(['Strap', 'Mean [N]', 'Largest [N]'], rows),
             Fold('Joint torques of the exoskeleton with and without straps', [Panels(panels)]),
         ],
