@@ -224,7 +224,7 @@ class _Run:
     def work(self) -> None:
         """Process all arms, with enough arms in progress that no worker is idle."""
         # bags in progress: a constant, and a number per thread
-        limit = 2 + 8 * sum(self._client.nthreads().values())
+        limit = 2 + 4 * sum(self._client.nthreads().values())
         under_way: dict[Any, _UnderWay] = {}
         ended = as_completed(raise_errors=False)
         while self._waiting or under_way:
