@@ -5,9 +5,8 @@
 from itertools import islice
 
 from armid_ros.errors import TrajectoryError
-from armid_ros.papers.exo.plant.gait import read_assumptions, read_gait, stance_motion
+from armid_ros.papers.exo.plant.gait import read_gait
 from armid_ros.papers.exo.plant.leg_pair import (
-    following,
     leg_pair,
     pair_torques,
     PairMotion,
@@ -23,19 +22,7 @@ from tests.papers.exo.pair_in_mujoco import drive_in_mujoco
 
 RATE = 100.0
 #: How far joints are off with springs that are 20 % too soft [deg].
-DRIVEN = {'exo_swing_hip': 0.61, 'exo_swing_knee': 1.71}
-
-
-def walking(pair: TiedPair, t: np.ndarray) -> PairMotion:
-    """Return walking at constant speed on one foot, from the begin of single support."""
-    known = read_assumptions()
-    begin, cycle = known['single_support'].value[0], known['cycle_time'].value
-
-    def wearer(joints, time):
-        phase = [begin + time / cycle, np.full_like(time, 1.0 / cycle), np.zeros_like(time)]
-        return stance_motion(read_gait(), joints, time, np.array(phase))
-
-    return following(pair, t, wearer)
+DRIVEN = {'exo_swing_hip': 1.14, 'exo_swing_knee': 2.81}
 
 
 @pytest.fixture(scope='module')
@@ -45,7 +32,7 @@ def pair() -> TiedPair:
 
 @pytest.fixture(scope='module')
 def motions(pair) -> PairMotion:
-    return walking(pair, np.linspace(0.0, 0.456, 229))
+    return stepping(pair, read_gait(), np.linspace(0.0, 0.456, 229), 0.912)
 
 
 def most(error: np.ndarray) -> float:
@@ -64,7 +51,7 @@ def test_springs_believed_too_soft_lead_both_engines_astray_alike(pair, motions,
 
 
 def test_an_even_number_of_samples_is_refused(pair) -> None:
-    even = walking(pair, np.linspace(0.0, 0.4, 20))
+    even = stepping(pair, read_gait(), np.linspace(0.0, 0.4, 20))
     with pytest.raises(TrajectoryError, match='odd'):
         drive_by_torque(pair, *even, ['exo_swing_hip'], lambda t: np.zeros(1))
 
@@ -86,8 +73,7 @@ def test_without_noise_it_is_the_gait_and_its_torques():
 
 def test_noise_has_the_size_asked_for_and_comes_from_the_seed():
     noise = {'angle_noise': 1e-3, 'torque_noise': 0.5}
-    noisy, again, clean = simulated(200, **noise), simulated(200, **noise), simulated(200)
-    triples = list(zip(noisy, again, clean, strict=True))
+    triples = list(zip(*(simulated(200, **one) for one in (noise, noise, {})), strict=True))
     errors = np.array([a.q - c.q for a, _, c in triples])
     assert errors.std() == pytest.approx(1e-3, rel=0.1)
     assert np.array([a.tau - c.tau for a, _, c in triples]).std() == pytest.approx(0.5, rel=0.1)
