@@ -5,12 +5,10 @@
 from armid_ros.arm.arm_model import ArmModel
 from armid_ros.arm.misfit import Misfit
 from armid_ros.arm.model_file import load_misfit, load_model, save_model
-from armid_ros.arm.torque_slope import TorqueSlope
 
 __all__ = [
     'ArmModel',
     'Misfit',
-    'TorqueSlope',
     'load_misfit',
     'load_model',
     'save_model',

@@ -69,38 +69,6 @@ class Hysteresis:
                 state[first + 1 : last + 1] = end - (end - state[first]) * decay
         return states
 
-    def pullback(self, q: FloatArray, dq: FloatArray, weights: FloatArray) -> FloatArray:
-        """
-        Return the derivative by joint positions of a weighted sum of torques along a motion.
-
-        Parameters
-        ----------
-        q, dq : ndarray, shape (N, n)
-            Positions and velocities, as for ``along``.
-        weights : ndarray, shape (N, n)
-            Weight of each joint torque.
-
-        Returns
-        -------
-        ndarray, shape (N, n)
-            Derivative by q.
-
-        """
-        travel, states = q @ self.directions.T, self.along(q, dq)
-        by_state = (weights @ self.directions.T) * self.level
-        by_travel = np.zeros_like(travel)
-        for element in np.flatnonzero(by_state.any(axis=0)):
-            path, state, distance = travel[:, element], states[:, element], self.distance[element]
-            # backwards, because a stretch starts in the final state of the previous one
-            for first, last, end in reversed(_monotone_parts(path)):
-                own = slice(first + 1, last + 1)
-                decay = np.exp(-np.abs(path[own] - path[first]) / distance)
-                slope = by_state[own, element] * (end - state[own]) * end / distance
-                by_travel[own, element] += slope
-                by_travel[first, element] -= slope.sum()
-                by_state[first, element] += by_state[own, element] @ decay
-        return np.asarray(by_travel @ self.directions)
-
 
 def _monotone_parts(travel: FloatArray) -> list[tuple[int, int, float]]:
     """Return each motion between two reversals: first sample, last sample, direction."""

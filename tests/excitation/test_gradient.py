@@ -91,8 +91,9 @@ def assert_gradient(objective, problem):
     [
         (),
         ('viscous_friction', 'rotor_inertia'),
-        ('coulomb_friction', 'load_dependent_friction', 'quadratic_friction'),
-        ('presliding_hysteresis', 'joint_spring', 'payload'),
+        ('coulomb_friction', 'load_dependent_friction', 'encoder_offset'),
+        ('stribeck_friction', 'quadratic_friction', 'torque_ripple'),
+        ('joint_spring', 'payload'),
     ],
 )
 def test_gradient_of_the_constraints(humanoid, humanoid_collision, effects):

@@ -19,7 +19,8 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
-from armid_ros.arm import TorqueSlope
+from armid_ros.arm import ArmModel
+from armid_ros.effects import law_derivatives
 from armid_ros.excitation.fourier import fourier_basis, FourierTrajectory, MARGIN
 from armid_ros.excitation.geometry.clearance import ClearanceModel
 from armid_ros.excitation.problem import DesignProblem, parameter_mask
@@ -272,12 +273,12 @@ class Constraints:
         )
 
         def gradients() -> FloatArray:
-            slope = TorqueSlope.of(arm, motion)
+            slopes = torque_slopes(arm, motion)
             result = np.empty((len(limited), motion.n_joints, self.basis[0].shape[1]))
             for row, weights in enumerate(of_torque):
                 result[row] = sum(
-                    by.T @ basis
-                    for by, basis in zip(slope.pullback(weights), self.basis, strict=True)
+                    (weights[:, np.newaxis] @ by)[:, 0].T @ basis
+                    for by, basis in zip(slopes, self.basis, strict=True)
                 )
             return result
 
@@ -323,5 +324,31 @@ class Constraints:
         """Return the soft maximum along the last axis, and its derivatives."""
         largest = excess.max(axis=-1, keepdims=True)
         weights = np.exp(self.sharpness * (excess - largest))
-        total = weights.sum(axis=-1, keepdims=True)
-        return (largest + np.log(total) / self.sharpness)[..., 0], weights / total
+        total = weights.sum()
+        return float(largest + np.log(total) / self.sharpness), weights / total
+
+
+def torque_slopes(arm: ArmModel, motion: Motion) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """
+    Return derivatives of the joint torque by q, dq and ddq, shape (N, n, n) each.
+
+    Element [k, j, m] is the derivative of the torque of joint j by joint m in sample k. The
+    directions of dry friction, its states of presliding, and the twist between motors and links
+    are held constant.
+
+    """
+    action, link = arm.along(motion).action(), arm.link_motion(motion)
+    slopes = arm.load_derivatives(link)
+    if arm.quasi_static:
+        slopes = slopes[0], np.zeros_like(slopes[1]), np.zeros_like(slopes[2])
+    together = arm.with_load_friction(motion, np.concatenate(slopes, axis=2))
+    by_q, by_dq, by_ddq = np.split(together, 3, axis=2)
+    if action.damping is not None:
+        by_dq = by_dq + action.damping
+    if action.inertia is not None:
+        by_ddq = by_ddq + action.inertia
+    for law, side in ((action.torque, motion), (action.link_torque, link)):
+        if law is not None:
+            more = law_derivatives(law, side)
+            by_q, by_dq = by_q + more[0], by_dq + more[1]
+    return by_q, by_dq, by_ddq
