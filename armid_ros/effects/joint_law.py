@@ -7,7 +7,6 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import ClassVar, NamedTuple
 
 from armid_ros.effects.action import Action, direction, DryFriction
@@ -15,7 +14,6 @@ from armid_ros.effects.base import Arm, Effect
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.robots import Robot
 import numpy as np
-import numpy.typing as npt
 
 
 class JointStates(NamedTuple):
@@ -59,9 +57,9 @@ class JointLaw(Effect):
     def columns(self, motion: Motion, arm: Arm) -> FloatArray:
         """Return the regressor of the effect along a motion, shape (N, n, P)."""
         side = arm.link_motion(motion) if self.on_links else motion
-        own, _ = _flat_places(self.joints, motion.joints, len(self.quantities))
+        own = self.indices(motion.joints)
         states = (part[:, own] for part in (side.q, side.dq, direction(side)))
-        return _placed(self, motion, self.law(JointStates(motion.t[:, np.newaxis], *states)))
+        return _placed(own, motion, self.law(JointStates(motion.t[:, np.newaxis], *states)))
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
         """Return the torque as terms of the plant; torque that jumps at rest is dry friction."""
@@ -118,8 +116,8 @@ def joint_columns(effect: Effect, motion: Motion, *quantities: FloatArray) -> Fl
         Zero where a parameter belongs to another joint.
 
     """
-    own, _ = _flat_places(effect.joints, motion.joints, len(quantities))
-    return _placed(effect, motion, [values[:, own] for values in quantities])
+    own = effect.indices(motion.joints)
+    return _placed(own, motion, [values[:, own] for values in quantities])
 
 
 def scatter(effect: Effect, values: FloatArray, robot: Robot) -> FloatArray:
@@ -146,21 +144,9 @@ def scatter(effect: Effect, values: FloatArray, robot: Robot) -> FloatArray:
     return spread
 
 
-def _placed(effect: Effect, motion: Motion, quantities: Sequence[FloatArray]) -> FloatArray:
-    """Build the regressor (N, n, P) from the torque per unit of each parameter, (N, k)."""
-    size = len(quantities) * len(effect.joints)
-    columns = np.zeros((len(motion), motion.n_joints * size))
-    _, places = _flat_places(effect.joints, motion.joints, len(quantities))
-    for place, values in zip(places, quantities, strict=True):
-        columns[:, place] = values
-    return columns.reshape(len(motion), motion.n_joints, size)
-
-
-@lru_cache(maxsize=1024)
-def _flat_places(
-    joints: tuple[str, ...], among: tuple[str, ...], count: int
-) -> tuple[npt.NDArray[np.intp], tuple[npt.NDArray[np.intp], ...]]:
-    """Return indices of joints among other joints, and of their entries in a regressor row."""
-    own = np.array([among.index(joint) for joint in joints], dtype=np.intp)
-    size = count * len(own)
-    return own, tuple(own * size + np.arange(first, size, count) for first in range(count))
+def _placed(own: list[int], motion: Motion, quantities: Sequence[FloatArray]) -> FloatArray:
+    """Build the regressor (N, n, P) from the torque of k joints per unit of each quantity."""
+    columns = np.zeros((*motion.q.shape, len(own), len(quantities)))
+    for number, values in enumerate(quantities):
+        columns[:, own, np.arange(len(own)), number] = values
+    return columns.reshape(*motion.q.shape, len(own) * len(quantities))
