@@ -16,9 +16,8 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, Self
 
-from armid_ros.effects.action import Action
 from armid_ros.effects.base import Arm, Effect
-from armid_ros.effects.joint_law import joint_columns, scatter
+from armid_ros.effects.joint_law import joint_columns
 from armid_ros.effects.quantities import Quantity
 from armid_ros.errors import ModelError
 from armid_ros.files import finite
@@ -230,16 +229,6 @@ class LearnedTorque(Effect):
         """Return the learned torque of each joint as a regressor column, (N, n, P) [N m]."""
         link = arm.link_motion(motion)
         return joint_columns(self, motion, self.torque(arm.body, link.q, link.dq))
-
-    def action(self, values: FloatArray, arm: Arm) -> Action:
-        """Return the learned torque as a term of the plant."""
-        (share,) = scatter(self, values, arm.robot)
-        robot = arm.robot
-
-        def torque(t: FloatArray, q: FloatArray, dq: FloatArray) -> FloatArray:
-            return np.asarray(share * self.torque(robot, q, dq))
-
-        return Action(link_torque=torque)
 
 
 def scaled_inputs(inputs: FloatArray, knee: float) -> FloatArray:
