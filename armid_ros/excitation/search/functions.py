@@ -324,8 +324,8 @@ class Constraints:
         """Return the soft maximum along the last axis, and its derivatives."""
         largest = excess.max(axis=-1, keepdims=True)
         weights = np.exp(self.sharpness * (excess - largest))
-        total = weights.sum()
-        return float(largest + np.log(total) / self.sharpness), weights / total
+        total = weights.sum(axis=-1, keepdims=True)
+        return (largest + np.log(total) / self.sharpness)[..., 0], weights / total
 
 
 def torque_slopes(arm: ArmModel, motion: Motion) -> tuple[FloatArray, FloatArray, FloatArray]:

@@ -287,12 +287,11 @@ class NoiseLevel:
 
     def settle(self, period: float) -> None:
         """Update the typical prediction errors once a window is full."""
-        if len(self._window) < WINDOW:
+        if self._count < WINDOW:
             return
-        innovations, moves = zip(*self._window, strict=True)
-        self._window = []
-        errors, noise, acceleration = map(np.array, zip(*innovations, strict=True))
-        errors /= self.model.growth(noise[:, np.newaxis], acceleration[:, np.newaxis])
+        window, self._count = self._window[: self._count], 0
+        growth = self.model.growth(window[:, -2:-1], window[:, -1:])
+        errors, moves = window[:, : len(self._finest)] / growth, window[:, len(self._finest) : -2]
         self._max_error = np.maximum(self._max_error, np.abs(errors).max(axis=0))
         size = robust_scale(errors)
         self._remember(size, share_of_noise(errors, size))
