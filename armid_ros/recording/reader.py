@@ -210,7 +210,9 @@ def assembled(
             hint = f'; if only the names differ, use --rename {rule}{hint}'
         elif found:
             hint = f"; if '{found}' is '{missing[0]}', use --rename {found}:{missing[0]}{hint}"
-        question = '' if present or rule else '; is it a recording of another robot?'
+        question = ''
+        if not present and not rule:
+            question = '; is it another robot? If only the names differ, use --rename OLD:NEW'
         raise RecordingError(
             f'{where}: the messages lack {"joint" if len(missing) == 1 else "joints"} {listed}; '
             f'their joints are {", ".join(decoder.names_seen)}{question}{hint}'

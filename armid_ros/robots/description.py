@@ -300,8 +300,8 @@ def _inertial(link: ElementTree.Element, name: str) -> Inertial | None:
     )
     if inertial.mass < 0.0:
         raise RobotError(
-            f'{link_name} has a negative mass, {inertial.mass:g} kg; with --physical, identified '
-            'parameters are physically consistent'
+            f'{link_name} has a negative mass, {inertial.mass:g} kg: correct it, or export the '
+            'URDF of an identification with --physical'
         )
     return inertial
 

@@ -109,9 +109,9 @@ def load_of(arm: ArmModel, joint: str | None = None, frame: str | None = None) -
 
 
 def _flange(joint: str, links: Collection[str]) -> str:
-    """Return the link named tool0 or flange, or else the only link; ModelError if several."""
-    # names that ROS-Industrial gives to the frame of a flange
-    usual = [name for name in ('tool0', 'flange') if name in links]
+    """Return the link whose name ends in tool0 or flange, or else the only one."""
+    # names that ROS-Industrial gives to the frame of a flange, after the prefix of an arm
+    usual = [link for name in ('tool0', 'flange') for link in links if link.endswith(name)]
     if not usual and len(links) != 1:
         raise ModelError(
             f"the link at the flange of joint '{joint}' is unknown: name it with --frame; "

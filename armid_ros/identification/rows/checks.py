@@ -136,8 +136,9 @@ def check_torque(
         for unit, factor in TORQUE_UNITS.items():
             if np.all((factors > 0.5 * factor) & (factors < 2.0 * factor)):
                 raise IdentificationError(
-                    f'{source}: torques of {joints} are {factor:g} times what the description '
-                    f'predicts; they seem to be in {unit}: convert them to N m'
+                    f'{source}: torques of {joints} are {np.median(factors):.3g} times what the '
+                    f'description predicts; they are currents, or in {unit}: give --current-gain, '
+                    'or convert them to N m'
                 )
     driven = driven_by_friction(robot, motions)
     if driven:
