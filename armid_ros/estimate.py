@@ -152,7 +152,11 @@ class Estimate:
         for position, parameter in enumerate(self.parameters):
             if parameter.name == name and parameter.joint == joint:
                 return position
-        own = [one for one in self.parameters if one.joint == joint] or self.parameters
+        joints = list(dict.fromkeys(one.joint for one in self.parameters))
+        if joint not in joints:
+            listed = ', '.join(filter(None, joints))
+            raise ModelError(f"no joint '{joint}'; joints are: {listed}{meant(joint, joints)}")
+        own = [one for one in self.parameters if one.joint == joint]
         known = ', '.join(f'{p.name} [{p.joint}]' if p.joint else p.name for p in own)
         guess = meant(name, [one.name for one in own])
         raise ModelError(f"no parameter '{name}' of joint '{joint}'; parameters: {known}{guess}")

@@ -27,7 +27,7 @@ from typing import NamedTuple
 from armid_ros.errors import IdentificationError
 from armid_ros.estimate import Estimate, ParameterName
 from armid_ros.identification.fitting.covariance import noise_products, sandwich
-from armid_ros.identification.fitting.identifiability import bounds
+from armid_ros.identification.fitting.identifiability import bounds, HALF_WIDTH
 from armid_ros.identification.fitting.least_squares import Method, solve, within_bounds
 from armid_ros.identification.fitting.nonlinear import (
     FittedValues,
@@ -201,9 +201,10 @@ class NoiseCheck:
 
     @property
     def harmless(self) -> bool:
-        """Whether the bias of every parameter is small compared with its standard deviation."""
+        """Whether no bias is significant, and a large share of its standard deviation."""
         # smallest bias that matters, in standard deviations: it reduces 95 % intervals to 94 %
-        return bool(np.max(np.abs(self.relative_bias), initial=0.0) < 0.25)
+        significant = np.maximum(np.abs(self.bias) - HALF_WIDTH * self.bias_std, 0.0)
+        return bool(np.all(significant <= 0.25 * self.std))
 
     def findings(self) -> tuple[tuple[str, bool], tuple[str, bool]]:
         """

@@ -395,8 +395,9 @@ def consistent_prior(arm: ArmModel) -> tuple[FloatArray, tuple[str, ...]]:
             second = (axes * np.maximum(values, least)) @ axes.T
             matrix[:3, :3] = second + mass * np.outer(center, center)
             theta[part] = link_parameters(matrix)
+            fault = 'inertia is impossible' if values[0] < -1e-9 * values[2] else 'body is thin'
             notes.append(
-                f"link '{link}': the described body is thin; the prior of the fit has a radius of "
+                f"link '{link}': the described {fault}; the prior of the fit has a radius of "
                 f'gyration of {1e3 * np.sqrt(least / mass):.2g} mm at least'
             )
     return theta, tuple(notes)
