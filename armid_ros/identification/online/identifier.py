@@ -30,7 +30,7 @@ from armid_ros.identification.online.recursive import (
     WeightedSample,
 )
 from armid_ros.identification.online.robust_covariance import RobustCovariance
-from armid_ros.identification.online.settings import FALSE_ALARM_TIME, OnlineSample, OnlineSettings
+from armid_ros.identification.online.settings import OnlineSample, OnlineSettings
 from armid_ros.identification.rows.causal import (
     CausalFilter,
     CausalMotion,
@@ -124,7 +124,6 @@ class OnlineIdentifier:
             robot.prismatic,
             'qvt' if settings.measured_velocity else 'qt',
             torque_limit=robot.torque_limit,
-            false_alarm_time=settings.false_alarm_time or FALSE_ALARM_TIME,
         )
         self._checks = StreamChecks(robot, self._gate)
         self._missing = MissingSamples()

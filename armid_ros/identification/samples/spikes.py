@@ -18,7 +18,7 @@ recording keeps them.
 
 The largest allowed error is the largest of three. The first is the typical prediction error in the
 noisiest window of the last minute, times the normal quantile for one false alarm in
-`false_alarm_time`. The second is the resolution, the smallest step of a signal, times the same
+`FALSE_ALARM_TIME`. The second is the resolution, the smallest step of a signal, times the same
 quantile. The third is the negligible error (``floor``): the error of one sample that changes an
 estimate as much as noise does. Across a gap, errors are larger: errors by an acceleration grow
 with the square of time, errors by noise hardly. Successive errors show which of the two dominates:
@@ -37,7 +37,6 @@ from armid_ros.identification.samples.straight_line import (
     all_unwrapped,
     ErrorModel,
     Excursion,
-    FALSE_ALARM_TIME,
     Innovation,
     innovation_of,
     MAX_GAP,
@@ -66,8 +65,6 @@ class SpikeGate:
         for velocities; t for torques, which may jump and return. A sample has m signals.
     torque_limit : array_like, shape (n,), optional
         Largest torque of each joint [N m or N], infinite where unknown.
-    false_alarm_time : float
-        Mean time between two good samples left out by error, in normal noise [s].
 
     Attributes
     ----------
@@ -89,7 +86,6 @@ class SpikeGate:
         signals: str,
         *,
         torque_limit: npt.ArrayLike = 0.0,
-        false_alarm_time: float = FALSE_ALARM_TIME,
     ) -> None:
         turning = ~np.asarray(prismatic, dtype=bool)
         kind = np.repeat(list(signals), len(turning))
@@ -114,7 +110,6 @@ class SpikeGate:
         onset = {'q': 2.0, 'v': 50.0, 't': 50.0}
         self._finest = scale * np.array([finest[one] for one in kind])
         self._onset = scale * np.array([onset[one] for one in kind])
-        self._false_alarm_time = false_alarm_time
         self.reset()
 
     def reset(self) -> None:
@@ -127,8 +122,7 @@ class SpikeGate:
         self._last: FloatArray | None = None  # last good sample, also of an earlier stretch
         count = len(self._turn)
         self.lowest, self.highest = np.full(count, np.inf), np.full(count, -np.inf)
-        resolution = self._finest, self._coarsest
-        self._level = NoiseLevel(*resolution, self._onset, self._false_alarm_time)
+        self._level = NoiseLevel(self._finest, self._coarsest, self._onset)
         self._restart([])
 
     def take(self, t: float, x: FloatArray, floor: FloatArray | float = 0.0) -> list[StreamSample]:

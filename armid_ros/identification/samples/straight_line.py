@@ -181,9 +181,9 @@ def all_unwrapped(samples: Sequence[StreamSample], turn: FloatArray) -> list[Str
     return found
 
 
-def quantile(period: float, count: int, false_alarm_time: float = FALSE_ALARM_TIME) -> float:
+def quantile(period: float, count: int) -> float:
     """Return the limit in standard deviations that noise of `count` signals seldom exceeds."""
-    return float(-special.ndtri(min(period / false_alarm_time / count, 0.5) / 2.0))
+    return float(-special.ndtri(min(period / FALSE_ALARM_TIME / count, 0.5) / 2.0))
 
 
 def robust_scale(innovations: FloatArray, share: float = 0.95) -> FloatArray:
@@ -223,8 +223,6 @@ class NoiseLevel:
         Best resolution of the signals, and worst resolution of signals that never changed.
     onset : ndarray, shape (m,)
         Assumed second derivative before the first motion, per second squared.
-    false_alarm_time : float
-        Mean time between two good samples left out by error, in normal noise [s].
 
     Attributes
     ----------
@@ -233,15 +231,8 @@ class NoiseLevel:
 
     """
 
-    def __init__(
-        self,
-        finest: FloatArray,
-        coarsest: FloatArray,
-        onset: FloatArray,
-        false_alarm_time: float,
-    ) -> None:
-        self._finest, self._coarsest = finest, coarsest
-        self._onset, self._false_alarm_time = onset, false_alarm_time
+    def __init__(self, finest: FloatArray, coarsest: FloatArray, onset: FloatArray) -> None:
+        self._finest, self._coarsest, self._onset = finest, coarsest, onset
         count = len(self._finest)
         self.model = ErrorModel(np.inf, np.zeros(count), np.zeros(count), 0.0)
         # a step that occurs three times is the resolution of a signal
@@ -301,7 +292,7 @@ class NoiseLevel:
 
     def _use(self, period: float, size: FloatArray, white: FloatArray) -> None:
         """Set the typical prediction errors to those of a window, but at least the resolution."""
-        allowed = quantile(period, len(size), self._false_alarm_time)
+        allowed = quantile(period, len(size))
         self.model = ErrorModel(period, np.maximum(size, self._least(period)), white, allowed)
 
     def _remember(self, size: FloatArray, white: FloatArray) -> None:
