@@ -128,7 +128,7 @@ class OnlineIdentifier:
         self._checks = StreamChecks(robot, self._gate)
         self._missing = MissingSamples()
         self._row_filter = TripleLag(settings.cutoff)
-        self._row_period = 1.0 / settings.rows_per_second()
+        self._row_period = 1.0 / settings.row_rate
         self._work = Background()
         self._had_row = False
         self._estimator = RecursiveLeastSquares(

@@ -25,9 +25,6 @@ class OnlineSettings:
     cutoff : float
         Frequency of the low-pass on torque and regressor rows [Hz]. Well above the motion, whose
         fastest part carries the inertial torque, and below disturbances of the torque signal.
-    row_rate : float or None
-        Samples used per second [1/s]; 40 times the cut-off frequency by default. After the filter,
-        the samples between them are nearly the same, so they would add only computing time.
     forgetting : float
         Forgetting factor per used sample, 0.9 to 1. A memory of T seconds is 1 - 1 / (T row_rate).
     torque_noise : tuple of float or None
@@ -43,7 +40,6 @@ class OnlineSettings:
     """
 
     cutoff: float = 5.0
-    row_rate: float | None = None
     forgetting: float = 1.0
     torque_noise: tuple[float, ...] | None = None
     max_gap: int = 10
@@ -58,25 +54,12 @@ class OnlineSettings:
                 'switches the detection of changes off'
             )
 
-    def rows_per_second(self) -> float:
-        """
-        Return the number of samples per second that the estimator uses.
-
-        Raises
-        ------
-        IdentificationError
-            If it is too low for the cut-off frequency.
-
-        """
+    @property
+    def row_rate(self) -> float:
+        """Samples that the estimator uses per second [1/s]."""
         # 40 rows resolve the steps of sign(dq), and aliases of the motion filter are outside the
         # band of the row filter
-        rate = 40.0 * self.cutoff if self.row_rate is None else self.row_rate
-        if not (np.isfinite(rate) and rate >= 2.0 * self.cutoff):
-            raise IdentificationError(
-                f'row_rate is {rate} samples per second, but a cut-off frequency of '
-                f'{self.cutoff:g} Hz needs at least {2.0 * self.cutoff:g}'
-            )
-        return rate
+        return 40.0 * self.cutoff
 
 
 @dataclass(frozen=True)

@@ -63,7 +63,7 @@ def test_filtering_does_not_bias_a_rigid_arm(arm, motion):
     rigid = ArmModel(arm.robot)
     tau = rigid.torque(motion)
     behind, before = (
-        identifier(rigid, OnlineSettings(cutoff=cutoff, row_rate=200.0))
+        identifier(rigid, OnlineSettings(cutoff=cutoff))
         for cutoff in (5.0, 5.0 / MOTION_FILTER_RATIO)
     )
     for online in (behind, before):
