@@ -65,7 +65,6 @@ class Bag(Source):
             self._metadata = _files_of(self.path)
         except OSError as error:
             raise RecordingError(f'{self.path}: cannot be read: {error.strerror}') from error
-        self._by_message = self._metadata.compression_mode == 'message'
         try:
             self._sources = [self._open(file) for file in self._metadata.files]
         except BaseException:
@@ -146,7 +145,7 @@ class Bag(Source):
             for source in self._sources:
                 for block in source.blocks(topic):
                     count += len(block)
-                    if self._by_message or block.message(0)[:4] == ZSTD:
+                    if block.message(0)[:4] == ZSTD:
                         messages, size = list[bytes](), 0
                         for at in range(len(block)):
                             messages.append(self._content(block.message(at)))
@@ -180,7 +179,7 @@ class Bag(Source):
 
     def _content(self, message: bytes) -> bytes:
         """Return the content of a message, decompressed if rosbag2 compressed each message."""
-        if not (self._by_message or message[:4] == ZSTD):
+        if message[:4] != ZSTD:
             return message
         return b''.join(unpacked(io.BytesIO(message), self._settings, 'a compressed message'))
 

@@ -46,21 +46,18 @@ LATCHED = VOLATILE._replace(durability=QosDurability.TRANSIENT_LOCAL)
 @dataclass(frozen=True)
 class BagMetadata:
     """
-    Storage files, compression and message counts that metadata.yaml states for a bag.
+    Storage files and message counts that metadata.yaml states for a bag.
 
     Attributes
     ----------
     files : tuple of Path
         The files of the bag, in order.
-    compression_mode : {'', 'file', 'message', 'storage'}
-        Objects that rosbag2 compressed: files or single messages; empty without compression.
     counts : mapping of str to int
         Number of messages of each topic, as stated by the writer.
 
     """
 
     files: tuple[Path, ...]
-    compression_mode: str = ''
     counts: Mapping[str, int] = field(default_factory=dict)
 
 
@@ -148,7 +145,6 @@ def read_metadata(bag: Path) -> BagMetadata:
                 raise ValueError('relative_file_paths has to be a list of file names')
             if len(set(names)) != len(names):
                 raise ValueError('relative_file_paths lists a file twice')
-            mode = str(information.get('compression_mode') or '').lower()
             counts: dict[str, int] = {}
             entries = information.get('topics_with_message_count')
             for entry in entries if isinstance(entries, list) else ():
@@ -169,7 +165,7 @@ def read_metadata(bag: Path) -> BagMetadata:
             f'{path}: lists the files {", ".join(missing)}, but the directory of the bag has only '
             f'{present}'
         )
-    return BagMetadata(files, '' if mode == 'none' else mode, counts)
+    return BagMetadata(files, counts)
 
 
 def parse_qos(text: str | None) -> tuple[Qos, ...]:
