@@ -48,10 +48,10 @@ def verdict(found: Reproduction) -> VerdictSection:
     """Return the verdict box: torque errors compared with the paper, and the identified load."""
     lines, held = [], True
     for one in found.repeated:
-        gravity, dynamics = (one.ratio(method.held_out) for method in one.methods)
+        paper, noisy, gravity, dynamics = one.ratios.values()
         name = f'Table {one.table.number} ({one.table.title})'
         if one.table.uniform:
-            low, high = (digits(float(end)) for end in np.sort(one.table.ratio)[[0, -1]])
+            low, high = (digits(float(end)) for end in np.sort(paper)[[0, -1]])
             lines.append(
                 f'{name}: error over noise at most {digits(float(gravity.max()))} with gravity '
                 f'alone, {digits(float(dynamics.max()))} with the full dynamics. '
@@ -59,14 +59,12 @@ def verdict(found: Reproduction) -> VerdictSection:
             )
             held &= bool(gravity.max() <= 0.15)  # of the noise
             continue
-        noisy = one.ratio(one.methods[0].noisy)
-        paper = 100.0 * float(np.mean(one.table.ratio))
-        held &= bool(100.0 * gravity.mean() <= 1.0)  # % of the peak
+        held &= bool(gravity.mean() <= 1.0)  # % of the peak
         lines += [
-            f'Mean torque error {digits(100.0 * float(noisy.mean()))} % of the peak torque, '
-            f'{digits(paper)} % in the paper: {name}.',
-            f'Without torque noise it is {digits(100.0 * float(gravity.mean()))} % with gravity '
-            f'alone, {digits(100.0 * float(dynamics.mean()))} % with the full dynamics.',
+            f'Mean torque error {digits(float(noisy.mean()))} % of the peak torque, '
+            f'{digits(float(paper.mean()))} % in the paper: {name}.',
+            f'Without torque noise it is {digits(float(gravity.mean()))} % with gravity alone, '
+            f'{digits(float(dynamics.mean()))} % with the full dynamics.',
         ]
     lines.append(
         f'The {len(found.composites)} gravity parameters give a load of {_load(found)} in the '
@@ -99,18 +97,10 @@ def tables_section(repeated: Sequence[Repeated]) -> Section:
 def _table(one: Repeated) -> DataTable:
     """Return a published table with additional rows for the results of the repetition."""
     gravity, dynamics = one.methods
-    scale, error, share = 100.0, 'RMSE', 'RMSE over peak [%]'
+    error, share = 'RMSE', 'RMSE over peak [%]'
     if one.table.uniform:
-        scale, error, share = 1.0, 'MAE', 'MAE over noise'
-    ratios = [
-        scale * ratio
-        for ratio in (
-            one.table.ratio,
-            one.ratio(gravity.noisy),
-            one.ratio(gravity.held_out),
-            one.ratio(dynamics.held_out),
-        )
-    ]
+        error, share = 'MAE', 'MAE over noise'
+    ratios = one.ratios.values()
     peaks = {'paper': one.table.peak, 'largest': one.peak}
     errors = {'paper': one.table.error, 'gravity': gravity.held_out, 'dynamics': dynamics.held_out}
     rows = [
@@ -189,16 +179,7 @@ def lunar_document(found: Reproduction) -> dict[str, Any]:
     """
     tables = []
     for one in found.repeated:
-        scale = 1.0 if one.table.uniform else 100.0
-        gravity, dynamics = one.methods
-        values = {
-            'paper': scale * one.table.ratio,
-            'against_noise': scale * one.ratio(gravity.noisy),
-            'weight_alone': scale * one.ratio(gravity.held_out),
-            'whole_dynamics': scale * one.ratio(dynamics.held_out),
-            'paper_peak': one.table.peak,
-            'largest_torque': one.peak,
-        }
+        values = {**one.ratios, 'paper_peak': one.table.peak, 'largest_torque': one.peak}
         tables.append(
             {
                 'number': one.table.number,

@@ -80,11 +80,6 @@ class PaperTable:
         """Whether the table gives mean absolute torque errors instead of rms torque errors."""
         return self.number == 6
 
-    @property
-    def ratio(self) -> FloatArray:
-        """Published torque errors (6,) relative to peak torque; in Table 6, to torque noise."""
-        return self.error / (self.noise if self.uniform else self.peak)
-
 
 TABLES = (
     PaperTable(
@@ -172,9 +167,19 @@ class Repeated:
     methods: tuple[MethodErrors, ...]
     test: Fit
 
-    def ratio(self, errors: FloatArray) -> FloatArray:
-        """Return torque errors, (6,), relative to peak torque or torque noise, as in the paper."""
-        return errors / (self.table.noise if self.table.uniform else self.peak_run)
+    @property
+    def ratios(self) -> dict[str, FloatArray]:
+        """Torque errors (6,) as a percentage of peak torque, or relative to torque noise."""
+        (gravity, dynamics), table = self.methods, self.table
+        published, unit = 0.01 * table.peak, 0.01 * self.peak_run
+        if table.uniform:
+            published = unit = table.noise
+        return {
+            'paper': table.error / published,
+            'against_noise': gravity.noisy / unit,
+            'weight_alone': gravity.held_out / unit,
+            'whole_dynamics': dynamics.held_out / unit,
+        }
 
 
 @dataclass(frozen=True)
