@@ -88,11 +88,24 @@ class Attached(Effect):
         link = arm.link_motion(motion)
         return self._columns(arm.link_frames(motion), link.dq, *self._anchor(arm)(link.t))
 
-    @abstractmethod
     def _columns(
         self, frames: LinkFrames, dq: FloatArray, anchors: FloatArray, velocities: FloatArray
     ) -> FloatArray:
         """Return `columns` for given motions of links and anchors, shape (N, n, P)."""
+        positions, jacobians = frames.points(self.joints, self._attachments)
+        rate = np.einsum('nkxj,nj->nkx', jacobians, dq) - velocities
+        columns = self._of_springs(jacobians, positions - anchors, rate)
+        return columns.reshape(*dq.shape, -1)
+
+    @abstractmethod
+    def _of_springs(self, jacobians: FloatArray, way: FloatArray, rate: FloatArray) -> FloatArray:
+        """
+        Return the joint torque per unit of each quantity of k springs, shape (N, n, k, ...).
+
+        `jacobians` of the attachments have the shape (N, k, 3, n). `way` is the vector from the
+        anchor to the attachment [m], and `rate` its derivative, (N, k, 3) each.
+
+        """
 
 
 @dataclass(frozen=True)
@@ -126,17 +139,11 @@ class HumanInteraction(Attached):
         middle = np.stack([frames.places(joint, point) for joint, point in points], axis=1)
         return lambda t: (middle, np.zeros((1, 1, 3)))
 
-    def _columns(
-        self, frames: LinkFrames, dq: FloatArray, anchors: FloatArray, velocities: FloatArray
-    ) -> FloatArray:
-        positions, jacobians = frames.points(self.joints, self._attachments)
-        relative = np.einsum('nkxj,nj->nkx', jacobians, dq) - velocities
-        columns = np.empty((*dq.shape, len(self.joints), len(self.quantities)))
-        columns[..., 0] = np.einsum('nkxj,nkx->njk', jacobians, positions - anchors)
-        columns[..., 1] = np.einsum('nkxj,nkx->njk', jacobians, relative)
-        for axis in range(len(self.quantities) - 2):
-            columns[..., 2 + axis] = -jacobians[:, :, axis].transpose(0, 2, 1)
-        return columns.reshape(*dq.shape, -1)
+    def _of_springs(self, jacobians: FloatArray, way: FloatArray, rate: FloatArray) -> FloatArray:
+        stretch, speed = (np.einsum('nkxj,nkx->njk', jacobians, x) for x in (way, rate))
+        forces = -jacobians.transpose(2, 0, 3, 1)
+        # ties to known points have no constant forces
+        return np.stack([stretch, speed, *forces][: len(self.quantities)], axis=-1)
 
 
 @dataclass(frozen=True)
@@ -204,16 +211,8 @@ class InterfaceSlack(Attached):
         fixed = self.shape_values[np.newaxis, :, 3:6], np.zeros((1, 1, 3))
         return lambda t: fixed
 
-    def _columns(
-        self, frames: LinkFrames, dq: FloatArray, anchors: FloatArray, velocities: FloatArray
-    ) -> FloatArray:
-        columns = np.empty((*dq.shape, len(self.joints)))
-        straps = zip(self.joints, self._attachments, self.slacks, strict=True)
-        for owner, (joint, attachment, slack) in enumerate(straps):
-            places = frames.places(joint, attachment)
-            pulls = extension(places - anchors[:, owner], slack)
-            columns[:, :, owner] = frames.torques(joint, places, pulls)
-        return columns
+    def _of_springs(self, jacobians: FloatArray, way: FloatArray, rate: FloatArray) -> FloatArray:
+        return np.asarray(np.einsum('nkxj,nkx->njk', jacobians, extension(way, self.slacks)))
 
 
 def _proposals(places: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -149,29 +149,6 @@ class LinkFrames:
             return by_moving
         return np.asarray(np.einsum('k...m,kmn->k...n', by_moving, self.coupling))
 
-    def torques(self, joint: str, places: FloatArray, forces: FloatArray) -> FloatArray:
-        """
-        Return the joint torques J^T f that result from forces f on a link.
-
-        Parameters
-        ----------
-        joint : str
-            The joint that moves the link.
-        places, forces : ndarray, shape (N, 3)
-            Point of application [m] and vector [N] of each force, in the base frame.
-
-        Returns
-        -------
-        ndarray, shape (N, n)
-
-        """
-        moments = _cross(places.T, forces.T)
-        result = np.einsum('jxn,xn->nj', self.lines, forces.T)
-        result += np.einsum('jxn,xn->nj', self.turns, moments)
-        movers = self.frames[self.joints.index(joint)].movers
-        result[:, [k for k in range(len(self.joints)) if k not in movers]] = 0.0
-        return self._by_driven(np.asarray(result))
-
 
 def _cross(a: FloatArray, b: FloatArray) -> FloatArray:
     """Return the cross products of the columns of two arrays (3, N)."""

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Points of links against Pinocchio, one configuration at a time."""
 
-from armid_ros.model import LinkFrames, points_motion
+from armid_ros.model import points_motion
 from armid_ros.robots import load_robot
 import numpy as np
 import pinocchio as pin
@@ -42,19 +42,3 @@ def test_points_are_where_pinocchio_has_them(joints):
             ).reshape(6, -1)
             at_point = frame.actionInverse @ moved
             np.testing.assert_allclose(jacobians[k, i], at_point[:3], atol=1e-12)
-
-
-def test_forces_on_a_link_do_the_work_of_the_torques_that_they_take():
-    robot = load_robot('humanoid_arm')
-    rng = np.random.default_rng(1)
-    q = rng.uniform(-1.0, 1.0, (5, robot.n_joints))
-    offset, forces = rng.normal(size=3), rng.normal(size=(5, 3))
-    frames = LinkFrames.of(robot, q)
-    for joint in robot.joints:
-        torques = frames.torques(joint, frames.places(joint, offset), forces)
-        dq = rng.normal(size=q.shape)
-        ends = [LinkFrames.of(robot, q + h * dq).places(joint, offset) for h in (1e-6, -1e-6)]
-        velocity = (ends[0] - ends[1]) / 2e-6
-        np.testing.assert_allclose(
-            np.sum(torques * dq, axis=1), np.sum(forces * velocity, axis=1), atol=1e-8
-        )
