@@ -16,7 +16,7 @@ from armid_ros.robots.reference import Reference
 from armid_ros.robots.two_link import ROBOT, two_link_set, TwoLinkParameters, TwoLinkSet
 from armid_ros.simulation.controller import MotorControl, VelocityLoop
 from armid_ros.simulation.plant import Plant
-from armid_ros.simulation.sensors import LinkAccelerometers, Sensors
+from armid_ros.simulation.sensors import Sensors
 from armid_ros.simulation.simulated_arm import SimulatedArm
 from armid_ros.simulation.springs import Elasticity
 import numpy as np
@@ -141,7 +141,7 @@ def make_simulated_arm(
         rng=rng,
         controller=replace(control, loop=loop),
         sensors=sensors,
-        accelerometers=LinkAccelerometers(plant.robot, places),
+        accelerometers=places,
         start=start,
     )
 

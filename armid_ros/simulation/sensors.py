@@ -7,13 +7,12 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from armid_ros.effects import Action
-from armid_ros.errors import ModelError, RobotError
+from armid_ros.errors import ModelError
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.robots import Robot
 from armid_ros.simulation.closed_loop import Trace
 from armid_ros.simulation.plant import Plant, State
 import numpy as np
-import numpy.typing as npt
 import pinocchio as pin
 
 
@@ -205,49 +204,31 @@ class RecentPast:
         return q[-1], dq[-1], tau[late]
 
 
-class LinkAccelerometers:
+def accelerometer_readings(robot: Robot, links: Motion, places: FloatArray) -> FloatArray:
     """
-    Accelerometers with three axes, one on every link, aligned with the frame of its joint.
+    Return the readings of accelerometers with three axes, one on every link, along a motion.
 
     Parameters
     ----------
     robot : Robot
         The arm.
-    places : array_like, shape (n, 3), optional
-        Positions of the accelerometers in the frames of the joints [m]; by default the centroids
-        of the links.
+    links : Motion
+        True motion of its n links, N samples.
+    places : ndarray, shape (n, 3)
+        Positions of the accelerometers in the frames of the joints [m], to which they are aligned.
 
-    Raises
-    ------
-    RobotError
-        If the places have another shape.
+    Returns
+    -------
+    ndarray, shape (n, N, 3)
+        Acceleration minus gravity [m/s^2].
 
     """
-
-    def __init__(self, robot: Robot, places: npt.ArrayLike | None = None) -> None:
-        if places is None:
-            places = [inertia.lever for inertia in list(robot.model.inertias)[1:]]
-        array = np.asarray(places, dtype=float)
-        if array.shape != (len(robot.links), 3):
-            raise RobotError(
-                f'{robot.name}: accelerometers need three coordinates for each of '
-                f'{len(robot.links)} links, got an array of shape {array.shape}'
-            )
-        self._robot, self._data = robot, robot.model.createData()
-        self._placements = [pin.SE3(np.eye(3), place) for place in array]
-
-    def read(self, q: FloatArray, dq: FloatArray, ddq: FloatArray) -> FloatArray:
-        """Return accelerometer readings in one state, (n, 3) [m/s^2]; at rest, minus gravity."""
-        model, data = self._robot.model, self._data
-        pin.forwardKinematics(model, data, *self._robot.state(q, dq, ddq))
-        up = -model.gravity.linear
-        readings = np.empty((len(self._placements), 3))
-        for joint, place in enumerate(self._placements, 1):
-            felt = pin.getFrameClassicalAcceleration(model, data, joint, place, pin.LOCAL).linear
-            readings[joint - 1] = felt + up.dot(data.oMi[joint].rotation)
-        return readings
-
-    def readings(self, link: Motion) -> FloatArray:
-        """Return the accelerometer readings along a motion, shape (n, N, 3) [m/s^2]."""
-        rows = [self.read(*row) for row in zip(link.q, link.dq, link.ddq, strict=True)]
-        return np.asarray(np.stack(rows, axis=1))
+    model, data = robot.model, robot.model.createData()
+    readings = np.empty((len(places), len(links), 3))
+    for k, states in enumerate(zip(links.q, links.dq, links.ddq, strict=True)):
+        pin.forwardKinematics(model, data, *robot.state(*states))
+        for joint, place in enumerate(places, 1):
+            here = pin.SE3(np.eye(3), place)
+            felt = pin.getFrameClassicalAcceleration(model, data, joint, here, pin.LOCAL).linear
+            readings[joint - 1, k] = felt - model.gravity.linear.dot(data.oMi[joint].rotation)
+    return readings

@@ -14,7 +14,7 @@ from armid_ros.robots.reference import Reference
 from armid_ros.simulation.closed_loop import command, CompiledLoop, run, Trace
 from armid_ros.simulation.controller import ComputedTorque, Controller, MotorControl
 from armid_ros.simulation.plant import Plant, State
-from armid_ros.simulation.sensors import LinkAccelerometers, RecentPast, Sensors
+from armid_ros.simulation.sensors import accelerometer_readings, RecentPast, Sensors
 import numpy as np
 import numpy.typing as npt
 
@@ -93,8 +93,9 @@ class SimulatedArm:
         for the plant.
     sensors : Sensors, optional
         Sensors of motors and links; without errors by default.
-    accelerometers : LinkAccelerometers, optional
-        Accelerometers of links on springs; in the centroids of the links by default.
+    accelerometers : ndarray, shape (n, 3), optional
+        Places of accelerometers on links with springs, in the frames of their joints [m]; by
+        default the centroids of the links.
     start : array_like, shape (n,), optional
         Initial pose [rad or m]; the middle of the range of motion by default.
 
@@ -112,7 +113,7 @@ class SimulatedArm:
         rng: np.random.Generator,
         controller: Controller | None = None,
         sensors: Sensors | None = None,
-        accelerometers: LinkAccelerometers | None = None,
+        accelerometers: FloatArray | None = None,
         start: npt.ArrayLike | None = None,
     ) -> None:
         self.plant = arm if isinstance(arm, Plant) else Plant(arm)
@@ -121,8 +122,10 @@ class SimulatedArm:
             controller = ComputedTorque(self.plant.arm) if rigid else MotorControl.of(self.plant)
         self.controller = controller
         self.sensors = sensors or Sensors()
-        if self.plant.springs is not None:
-            self.accelerometers = accelerometers or LinkAccelerometers(self.plant.robot)
+        if accelerometers is None:
+            inertias = list(self.plant.robot.model.inertias)[1:]
+            accelerometers = np.array([inertia.lever for inertia in inertias])
+        self.accelerometers = accelerometers
         self.rng = rng
         start = self.plant.robot.middle_pose if start is None else start
         self._compiled = CompiledLoop.of(self.plant, self.controller)
@@ -356,7 +359,8 @@ class SimulatedArm:
         """
         still = np.zeros_like(links.q)
         q, dq, _ = self.sensors.measure(links.q, links.dq, still, self.rng)
-        acceleration, noise = self.accelerometers.readings(links), self.sensors.acceleration_noise
+        acceleration = accelerometer_readings(self.plant.robot, links, self.accelerometers)
+        noise = self.sensors.acceleration_noise
         if noise:
             acceleration = acceleration + noise * self.rng.standard_normal(acceleration.shape)
         return q, dq, acceleration

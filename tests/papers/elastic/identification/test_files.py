@@ -9,7 +9,7 @@ from armid_ros.papers.elastic.identification.files import read_runs
 from armid_ros.recording import BagWriter, write_joint_states
 from armid_ros.recording.elastic import write_runs
 from armid_ros.robots import load_robot
-from armid_ros.simulation.sensors import LinkAccelerometers
+from armid_ros.simulation.sensors import accelerometer_readings
 import numpy as np
 import pytest
 
@@ -20,8 +20,10 @@ RADIUS = [0.4, 0.3]
 @pytest.fixture
 def bag(tmp_path, clean_steps):
     """Write the steps to a bag."""
-    sensors = LinkAccelerometers(ROBOT, np.outer(RADIUS, [1.0, 0.0, 0.0]))
-    runs = [replace(run, felt=sensors.readings(run.link)) for run in clean_steps]
+    places = np.outer(RADIUS, [1.0, 0.0, 0.0])
+    runs = [
+        replace(run, felt=accelerometer_readings(ROBOT, run.link, places)) for run in clean_steps
+    ]
     write_runs(tmp_path / 'steps', runs, ROBOT)
     return tmp_path / 'steps'
 
