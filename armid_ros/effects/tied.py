@@ -45,6 +45,37 @@ class Tied(Attached):
     partner: str = ''
     anchor: Anchor | None = None
 
+    @classmethod
+    def of(
+        cls, robot: Robot, ties: Sequence[Tie], partner: str, joints: Sequence[str] | None = None
+    ) -> Self:
+        """
+        Return the springs on given joints of a robot, by default on all joints that have a tie.
+
+        Raises
+        ------
+        ModelError
+            If a joint has no tie, or two ties, whose parameter names would be equal.
+
+        """
+        by_joint: dict[str, Tie] = {}
+        for tie in ties:
+            if tie.joint in by_joint:
+                raise ModelError(
+                    f'{cls.name}: there are two ties on {tie.joint}; only one on each joint is '
+                    'identifiable'
+                )
+            by_joint[tie.joint] = tie
+        chosen = tuple(by_joint if joints is None else joints)
+        for joint in chosen:
+            if joint not in by_joint:
+                raise ModelError(
+                    f"{cls.name}: there is no tie on joint '{joint}'; there are ties on "
+                    f'{", ".join(by_joint)}'
+                )
+            robot.index(joint)
+        return cls(chosen, ties=tuple(by_joint[joint] for joint in chosen), partner=partner)
+
     @property
     def points(self) -> tuple[str, ...]:
         """Names of the points of the other machine to which springs connect the arm."""
@@ -129,58 +160,6 @@ class TiedSlack(Tied, InterfaceSlack):
     )
 
 
-def tied_effect(
-    name: str,
-    ties: Sequence[Tie],
-    partner: str,
-    robot: Robot,
-    joints: Sequence[str] | None = None,
-) -> Tied:
-    """
-    Create the springs that connect joints of an arm to another machine.
-
-    Parameters
-    ----------
-    name : str
-        Name of the effect in the catalogue.
-    ties : sequence of Tie
-        Possible springs, at most one on each joint.
-    partner : str
-        The description of the other machine.
-    robot : Robot
-        The arm.
-    joints : sequence of str, optional
-        Joints to tie; by default all joints that have a tie.
-
-    Raises
-    ------
-    ModelError
-        If effects of that name are not tied, a joint has no tie, or it has two, whose parameter
-        names would be equal.
-
-    """
-    known = {kind.name: kind for kind in (TiedInteraction, TiedSlack)}
-    if name not in known:
-        raise ModelError(f"{name} cannot have 'ties'; effects that can are {', '.join(known)}")
-    by_joint: dict[str, Tie] = {}
-    for tie in ties:
-        if tie.joint in by_joint:
-            raise ModelError(
-                f'{name}: there are two ties on {tie.joint}; only one on each joint is '
-                'identifiable'
-            )
-        by_joint[tie.joint] = tie
-    chosen = tuple(by_joint if joints is None else joints)
-    for joint in chosen:
-        if joint not in by_joint:
-            raise ModelError(
-                f"{name}: there is no tie on joint '{joint}'; there are ties on "
-                f'{", ".join(by_joint)}'
-            )
-        robot.index(joint)
-    return known[name](chosen, ties=tuple(by_joint[joint] for joint in chosen), partner=partner)
-
-
 def tied_as_written(entry: Mapping[str, Any], robot: Robot) -> Tied:
     """
     Create the springs between an arm and another machine from an entry of model.yaml.
@@ -188,11 +167,15 @@ def tied_as_written(entry: Mapping[str, Any], robot: Robot) -> Tied:
     Raises
     ------
     ModelError
-        If the effect is impossible; see `tied_effect`.
+        If effects of that name are not tied, or the springs are impossible; see `Tied.of`.
     ValueError
         If a coordinate is not a number.
 
     """
+    known = {kind.name: kind for kind in (TiedInteraction, TiedSlack)}
+    name = str(entry['name'])
+    if name not in known:
+        raise ModelError(f"{name} cannot have 'ties'; effects that can are {', '.join(known)}")
 
     def point(values: Sequence[float]) -> tuple[float, float, float]:
         x, y, z = (finite(value, 'a coordinate of a tie') for value in values)
@@ -208,7 +191,7 @@ def tied_as_written(entry: Mapping[str, Any], robot: Robot) -> Tied:
         )
         for row in entry['ties']
     ]
-    return tied_effect(str(entry['name']), ties, str(entry['partner']), robot, entry['joints'])
+    return known[name].of(robot, ties, str(entry['partner']), entry['joints'])
 
 
 @dataclass(frozen=True)
@@ -233,5 +216,5 @@ class Partner:
 
     def tied(self, arm: Robot, joints: Sequence[str] | None = None, *, slack: bool) -> Effect:
         """Create springs with dampers, or straps with slack, on given or all connected joints."""
-        name = (TiedSlack if slack else TiedInteraction).name
-        return tied_effect(name, self.ties, self.source or self.robot.name, arm, joints)
+        kind = TiedSlack if slack else TiedInteraction
+        return kind.of(arm, self.ties, self.source or self.robot.name, joints)
