@@ -81,7 +81,7 @@ class TorqueRipple(JointLaw):
         # Range of ripple orders in a search [1/rad, 1/m]. Gravity and springs cause lower orders;
         # filters remove higher orders. Screws and racks have a turn or tooth every 4 to 60 mm.
         orders = [
-            wave_orders(
+            _wave_orders(
                 unexplained, joint, (100.0, 1600.0) if robot.prismatic[joint] else (3.0, 80.0)
             )
             for joint in self.indices(robot.joints)
@@ -98,22 +98,9 @@ class TorqueRipple(JointLaw):
         return np.sin(angle), np.cos(angle)
 
 
-def wave_orders(unexplained: Unexplained, joint: int, between: tuple[float, float]) -> FloatArray:
-    """
-    Return K ripple orders of a joint that explain most of its residual, shape (K,).
-
-    All recordings are used together, because a ripple has the same order and phase in each.
-
-    Parameters
-    ----------
-    unexplained : Unexplained
-        The residual.
-    joint : int
-        The joint.
-    between : (float, float)
-        The lowest and the highest order [1/rad or 1/m].
-
-    """
+def _wave_orders(unexplained: Unexplained, joint: int, between: tuple[float, float]) -> FloatArray:
+    """Return the ripple orders in a range [1/rad or 1/m] that explain most of a residual, (K,)."""
+    # all recordings are used together, because a ripple has the same order and phase in each
     count = 3  # of returned orders
     weight = unexplained.weight[:, joint]
     rows = weight > 0.0
@@ -123,27 +110,23 @@ def wave_orders(unexplained: Unexplained, joint: int, between: tuple[float, floa
     rest = unexplained.residual[rows, joint] * scale
     step = 0.5 * np.pi / max(float(np.ptp(angle)), 0.3 / between[0])
     orders = np.arange(*between, step)
-    gain = wave_gains(angle, rest, scale, orders)
+    gain = _wave_gains(angle, rest, scale, orders)
     padded = np.concatenate([[0.0], gain, [0.0]])
     peaks = np.flatnonzero((gain >= padded[:-2]) & (gain > padded[2:]))
     likely = orders[peaks[np.argsort(-gain[peaks])[:12]]]
     likely = likely if len(likely) else orders[:1]
     fine = likely[:, np.newaxis] + step * np.linspace(-1.0, 1.0, 2 * 8 + 1)
-    gain = wave_gains(angle, rest, scale, fine.ravel()).reshape(fine.shape)
+    gain = _wave_gains(angle, rest, scale, fine.ravel()).reshape(fine.shape)
     best = np.argsort(-gain.max(axis=1))[:count]
     return np.resize(fine[best, np.argmax(gain[best], axis=1)], count)
 
 
-def wave_gains(
+def _wave_gains(
     angle: FloatArray, rest: FloatArray, weight: FloatArray, orders: FloatArray
 ) -> FloatArray:
-    """
-    Return by how much a sine and cosine of each order reduce the squared residual, (K,).
-
-    With few cycles, orders leak into each other; least squares separate them better than a
-    spectrum.
-
-    """
+    """Return by how much a sine and cosine of each order reduce the squared residual, (K,)."""
+    # with few cycles, orders leak into each other; least squares separate them better than a
+    # spectrum
     wave = np.exp(1j * np.outer(orders, angle))
     aim, twice, count = wave @ (weight * rest), wave**2 @ weight**2, np.sum(weight**2)
     cosines, sines, mixed = count + twice.real, count - twice.real, twice.imag

@@ -150,7 +150,7 @@ def random_feasible(
         found = _shrunk(arm, limits, trajectory, clearance, 6)
         if found is not None:
             return found
-    centre = feasible_pose(arm, limits, rng, clearance)
+    centre = _feasible_pose(arm, limits, rng, clearance)
     trajectory = _draw(limits, period, harmonics, rng)
     centred = FourierTrajectory(limits.joints, period, centre, trajectory.a, trajectory.b)
     found = _shrunk(arm, limits, centred, clearance, 48)
@@ -162,21 +162,10 @@ def random_feasible(
     return found
 
 
-def feasible_pose(
-    arm: ArmModel,
-    limits: Limits,
-    rng: np.random.Generator,
-    clearance: ClearanceModel | None,
+def _feasible_pose(
+    arm: ArmModel, limits: Limits, rng: np.random.Generator, clearance: ClearanceModel | None
 ) -> FloatArray:
-    """
-    Draw random poses within torque limits; return the pose with the largest clearance.
-
-    Raises
-    ------
-    TrajectoryError
-        If no pose was found; the message names the joint and its limit, or the bodies.
-
-    """
+    """Draw random poses within torque limits; return the pose with the largest clearance."""
     lower, upper = limits.position_range()
     q = rng.uniform(lower, upper, (2000, len(lower)))
     motion = Motion.of_states(limits.joints, q, 0.0, 0.0)
