@@ -248,10 +248,18 @@ class ArmModel:
         """Return the derivatives of the rigid-body torque by q, dq and ddq, (N, n, n) each."""
         return inverse_dynamics_derivatives(self.body, self.rigid_body_motion(motion))
 
-    def link_torque_derivatives(self, motion: Motion) -> tuple[FloatArray, FloatArray] | None:
-        """Return derivatives of the effects' torques on links by q and dq; None without any."""
+    def link_slopes(self, motion: Motion) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return derivatives of the joint torque by q, dq and ddq of the links, (N, n, n) each."""
+        link = self.link_motion(motion)
+        slopes = self.load_derivatives(link)
+        by_q, by_dq, by_ddq = (self.with_load_friction(motion, by) for by in slopes)
+        if self.quasi_static:
+            by_dq, by_ddq = np.zeros_like(by_dq), np.zeros_like(by_ddq)
         law = self.along(motion).action().link_torque
-        return None if law is None else law_derivatives(law, self.link_motion(motion))
+        if law is not None:
+            more = law_derivatives(law, link)
+            by_q, by_dq = by_q + more[0], by_dq + more[1]
+        return by_q, by_dq, by_ddq
 
     def joint_torque(self, motion: Motion) -> FloatArray:
         """Return the true joint torque along a recorded motion, shape (N, n) [N m or N]."""
@@ -356,16 +364,8 @@ class ArmModel:
         ndarray, shape (N, n, P)
 
         """
-        link = self.link_motion(motion)
-        by_q, by_dq, by_ddq = self.load_derivatives(link)
-        columns = by_q @ change.q
-        if not self.quasi_static:
-            columns += by_dq @ change.dq + by_ddq @ change.ddq
-        columns = self.with_load_friction(motion, columns)
-        slopes = self.link_torque_derivatives(motion)
-        if slopes is not None:
-            columns += slopes[0] @ change.q + slopes[1] @ change.dq
-        return columns
+        by_q, by_dq, by_ddq = self.link_slopes(motion)
+        return np.asarray(by_q @ change.q + by_dq @ change.dq + by_ddq @ change.ddq)
 
     def torque_before(self, effect: Effect, motion: Motion) -> FloatArray:
         """Return the torque that a sensor effect turns into a reading, shape (N, n) [N m]."""

@@ -59,7 +59,7 @@ class _Memoized(ArmModel):
     gravity_columns = _once(ArmModel.gravity_columns)
     smoothed = _once(ArmModel.smoothed)
     load_derivatives = _once(ArmModel.load_derivatives)
-    link_torque_derivatives = _once(ArmModel.link_torque_derivatives)
+    link_slopes = _once(ArmModel.link_slopes)
     _moved = _once(ArmModel.link_motion)
     _load = _once(ArmModel.load)
     _body_columns = _once(ArmModel.body_columns)

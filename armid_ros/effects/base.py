@@ -417,6 +417,3 @@ class Arm(Protocol):
 
     def torque_change(self, motion: Motion, change: Displacement) -> FloatArray:
         """Return how the joint torques change with a small change of the links' motion."""
-
-    def columns_of(self, effect: Effect, motion: Motion) -> FloatArray:
-        """Return the derivatives of the torque readings by the parameters of an effect."""

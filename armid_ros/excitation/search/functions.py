@@ -337,18 +337,13 @@ def torque_slopes(arm: ArmModel, motion: Motion) -> tuple[FloatArray, FloatArray
     are held constant.
 
     """
-    action, link = arm.along(motion).action(), arm.link_motion(motion)
-    slopes = arm.load_derivatives(link)
-    if arm.quasi_static:
-        slopes = slopes[0], np.zeros_like(slopes[1]), np.zeros_like(slopes[2])
-    together = arm.with_load_friction(motion, np.concatenate(slopes, axis=2))
-    by_q, by_dq, by_ddq = np.split(together, 3, axis=2)
+    action = arm.along(motion).action()
+    by_q, by_dq, by_ddq = arm.link_slopes(motion)
     if action.damping is not None:
         by_dq = by_dq + action.damping
     if action.inertia is not None:
         by_ddq = by_ddq + action.inertia
-    for law, side in ((action.torque, motion), (action.link_torque, link)):
-        if law is not None:
-            more = law_derivatives(law, side)
-            by_q, by_dq = by_q + more[0], by_dq + more[1]
+    if action.torque is not None:
+        more = law_derivatives(action.torque, motion)
+        by_q, by_dq = by_q + more[0], by_dq + more[1]
     return by_q, by_dq, by_ddq
