@@ -48,8 +48,7 @@ def read_chunks(
     settings = replace(settings, check_crc=check)
     chunks = list(chunks)
     packed = any(chunk.compression for chunk in chunks)
-    # Small groups are slow in array code. Decompressed contents are copied into one buffer, which
-    # should fit into the processor cache. [bytes]
+    # small groups are slow in array code; large ones exceed the processor cache [bytes]
     most = 2 << 20 if packed else 4 << 20
     groups: list[list[Chunk]] = [[]]
     size = 0
