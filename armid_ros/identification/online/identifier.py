@@ -217,8 +217,9 @@ class OnlineIdentifier:
             busy = added and 4.0 * period <= self._row_period
         if not busy:
             self._add_pending_row()
-            # smallest number of pieces per second
-            self._work.advance(max(1, round(400.0 * period)))
+            if not self._gate.settle():  # a full window would always end with a row
+                # smallest number of pieces per second
+                self._work.advance(max(1, round(400.0 * period)))
         self._had_row = bool(self.latest)
         return self.latest[-1] if self.latest else None
 
@@ -397,8 +398,7 @@ class OnlineIdentifier:
         noise = self._row_noise()
         gain, independent = noise.gain, noise.independent(min(step, self._row_period))
         stamp = motion.t - (self.delay or 0.0)
-        weights = np.asarray(used * independent)
-        sample = WeightedSample(rows / gain, measured / gain, weights)
+        sample = WeightedSample(rows / gain, measured / gain, np.asarray(used * independent))
         self._add_pending_row()
         innovation = sample.tau - sample.rows @ self._estimator.values
         self._pending = Row(stamp, sample, motion, step, gain, begins), innovation

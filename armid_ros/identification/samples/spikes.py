@@ -43,6 +43,7 @@ from armid_ros.identification.samples.straight_line import (
     NoiseLevel,
     StreamSample,
     unwrapped,
+    WINDOW,
 )
 from armid_ros.motion import FloatArray
 import numpy as np
@@ -167,6 +168,10 @@ class SpikeGate:
             return self._classify(sample)
         self._first.append(sample)
         return self._begin() if len(self._first) == N_FIRST else []
+
+    def settle(self) -> bool:
+        """Update a nearly full window of typical errors early; return whether it was updated."""
+        return self._level.settle(self._period, WINDOW - 4)
 
     def begin(
         self,

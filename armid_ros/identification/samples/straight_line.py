@@ -271,15 +271,14 @@ class NoiseLevel:
 
     def learn(self, innovation: Innovation, move: FloatArray) -> None:
         """Add the prediction error of an undamaged sample, and the change of its signals (m,)."""
-        row, count = self._window[self._count], len(move)
-        row[:count], row[count : 2 * count] = innovation.error, move
-        row[-2], row[-1] = innovation.noise, innovation.acceleration
+        error, *growth = innovation
+        self._window[self._count] = np.concatenate([error, move, growth])
         self._count += 1
 
-    def settle(self, period: float) -> None:
-        """Update the typical prediction errors once a window is full."""
-        if self._count < WINDOW:
-            return
+    def settle(self, period: float, count: int = WINDOW) -> bool:
+        """Update the typical prediction errors once a window is full; return whether it was."""
+        if self._count < count:
+            return False
         window, self._count = self._window[: self._count], 0
         growth = self.model.growth(window[:, -2:-1], window[:, -1:])
         errors, moves = window[:, : len(self._finest)] / growth, window[:, len(self._finest) : -2]
@@ -289,6 +288,7 @@ class NoiseLevel:
         self.add_steps(moves)
         loudest = np.argmax(self._sizes, axis=0), np.arange(len(size))
         self._use(period, self._sizes[loudest], self._shares[loudest])
+        return True
 
     def _use(self, period: float, size: FloatArray, white: FloatArray) -> None:
         """Set the typical prediction errors to those of a window, but at least the resolution."""
