@@ -57,7 +57,7 @@ def fit_document(found: PositionFit, hints: Sequence[str] = ()) -> dict[str, Any
         )
         if rest > MAX_RESIDUAL_TO_NOISE * noise
     ]
-    partial = any(found.reasons) or coloured or hints
+    partial = _reasons(found) or coloured or hints
     return {
         'schema': SCHEMA,
         'robot': found.arm.robot.name,
@@ -80,6 +80,20 @@ def fit_document(found: PositionFit, hints: Sequence[str] = ()) -> dict[str, Any
         ],
         'hints': [*coloured, *hints],
     }
+
+
+def _without_tool(found: PositionFit) -> bool:
+    mass, std = found.of('payload_m', found.arm.robot.joints[-1])
+    return bool(np.isfinite(std) and mass < 1.96 * std)
+
+
+def _reasons(found: PositionFit) -> dict[str, list[str]]:
+    """Return reasons why values are not determined, with names; not of the centre of no tool."""
+    reasons: dict[str, list[str]] = {}
+    for one, reason in zip(found.parameters, found.reasons, strict=True):
+        if reason and not (_without_tool(found) and one.name.startswith('payload_center')):
+            reasons.setdefault(reason, []).append(f'{one.words} {one.joint}'.strip())
+    return reasons
 
 
 def fit_summary(found: PositionFit, document: dict[str, Any], step: str) -> Summary:
@@ -107,7 +121,10 @@ def fit_summary(found: PositionFit, document: dict[str, Any], step: str) -> Summ
         for joint, rest, behind in zip(joints, found.residual, found.tracking, strict=True)
     ]
     center = [cell(f'payload_center_{a}', joints[-1]).split(' ± ')[0] for a in 'xyz']
-    tool = f'{cell("payload_m", joints[-1])} kg at {", ".join(center)} m'
+    mass = cell('payload_m', joints[-1])
+    tool = f'{mass} kg at {", ".join(center)} m'
+    if _without_tool(found):
+        tool = f'none ({mass} kg)'
     title = f'command delay {cell("command_delay", factor=1e3)} ms, tool {tool}'
     lines = [f'{found.duration:.0f} s compared; links are taken as described']
     ratio, error = found.gain_ratio, found.gain_ratio_std
@@ -121,11 +138,7 @@ def fit_summary(found: PositionFit, document: dict[str, Any], step: str) -> Summ
                 f'{ratio[k]:.3g} ± {1.96 * error[k]:.1g} times at {joints[k]}' for k in places
             )
         lines.append(f'given position gains {text}')
-    reasons: dict[str, list[str]] = {}
-    for one, reason in zip(found.parameters, found.reasons, strict=True):
-        if reason:
-            reasons.setdefault(reason, []).append(f'{one.words} {one.joint}'.strip())
-    for reason, names in reasons.items():
+    for reason, names in _reasons(found).items():
         text = ', '.join(names) if len(names) < 9 else f'{len(names)} values'
         lines.append(f'not determined: {text}: {reason}')
     lines += document['hints']

@@ -133,6 +133,8 @@ class Bag(Source):
             return found[0]
         called = f' and name {wanted}' if wanted else ''
         damage = f' ({self.damage})' if self.damage else ''
+        if damage and not topics:
+            raise RecordingError(f'{self.path}: no message can be read, record again{damage}')
         raise RecordingError(
             f'{self.path}: the bag has {len(found)} topics of type {type_name}{called}, but one '
             f'is needed; its topics are {listed(topics)}{damage}'
