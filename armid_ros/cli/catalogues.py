@@ -4,11 +4,16 @@
 
 from __future__ import annotations
 
+import inspect
 import textwrap
+from typing import TYPE_CHECKING
 
 from armid_ros.cli import parameters
 from armid_ros.cli.terminal import say
 import click
+
+if TYPE_CHECKING:
+    from armid_ros.effects import Effect
 
 
 @click.command(epilog='Example: armid robots')
@@ -30,14 +35,14 @@ def robots(as_json: bool) -> None:
 @click.argument('names', nargs=-1, metavar='[NAME]...', shell_complete=parameters.completed)
 @parameters.as_json
 def effects(names: tuple[str, ...], as_json: bool) -> None:
-    """List the effects that can be simulated and estimated: all, or those named."""
+    """List the effects that can be simulated and estimated: all, or those named, with laws."""
     from armid_ros.effects import CATALOGUE
     from armid_ros.files import json_text
 
     rows = [
         {
             'name': name,
-            'what it is': effect.summary,
+            'what it is': _law(effect) if names else effect.summary,
             'parameters': [_with_unit(q.name, q.unit) for q in effect.quantities],
             'shapes': [_with_unit(s.name, s.unit) for s in effect.shapes],
         }
@@ -55,6 +60,11 @@ def effects(names: tuple[str, ...], as_json: bool) -> None:
 
 def _say_wrapped(text: str) -> None:
     say(textwrap.fill(text, 80, subsequent_indent='    ', break_on_hyphens=False))
+
+
+def _law(effect: type[Effect]) -> str:
+    """Return the first sentence of the documentation of an effect, which has its equation."""
+    return ' '.join(str(inspect.getdoc(effect)).partition('\n\n')[0].split())
 
 
 def _with_unit(name: str, unit: str) -> str:
