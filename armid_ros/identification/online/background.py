@@ -67,9 +67,3 @@ class Background:
         """Run all pending computations to their end."""
         while self.busy:
             self.advance()
-
-    def clear(self) -> None:
-        """Discard all pending computations."""
-        for job in self._jobs:
-            job.close()
-        self._jobs.clear()

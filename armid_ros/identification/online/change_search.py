@@ -221,23 +221,17 @@ class ChangeSearch:
         sizes = [len(c.parameters) for c in self._candidates]
         self._sizes, ends = np.array(sizes), np.cumsum(sizes)
         self._slices = [slice(end - size, end) for end, size in zip(ends, sizes, strict=True)]
-        places = np.minimum(np.arange(max(sizes)), self._sizes[:, np.newaxis] - 1)
-        self._sets = (ends - self._sizes)[:, np.newaxis] + places
+        members = np.minimum(np.arange(max(sizes)), self._sizes[:, np.newaxis] - 1)
+        self._sets = (ends - self._sizes)[:, np.newaxis] + members
         self.set_chance(chance)
-        self.reset()
+        places = {c.joint for c in self._candidates}
+        self._calibrations = {m: NullCalibration(sizes, m, len(places)) for m in _WINDOW_LENGTHS}
+        self._latest_change = -np.inf, 0.0
+        self.interrupt()
 
     def set_chance(self, chance: float) -> None:
         """Set the false-alarm probability of a block; 0 switches the detection off."""
         self._chance = chance / (len(self._sizes) * len(_WINDOW_LENGTHS))
-
-    def reset(self) -> None:
-        """Clear the calibrated critical values and all blocks."""
-        places = {c.joint for c in self._candidates}
-        self._calibrations = {
-            m: NullCalibration(self._sizes.tolist(), m, len(places)) for m in _WINDOW_LENGTHS
-        }
-        self._latest_change = -np.inf, 0.0
-        self.interrupt()
 
     def interrupt(self) -> None:
         """Discard the blocks from before an interruption of the stream."""

@@ -154,15 +154,16 @@ class ChangeWatch:
         Source of the friction columns, which only the search for changes uses.
     candidates : sequence of ChangeCandidate
         Candidate changes to search for.
-    false_alarm_time : float
-        Mean time between two alarms of an arm that does not change [s].
+    false_alarm_time : float or None
+        Mean time between two alarms of an arm that does not change [s]; None disables the
+        detection.
     work : Background
         Queue for long computations.
 
     Attributes
     ----------
     changes : list of Change
-        Detected changes since the last reset.
+        Detected changes.
 
     """
 
@@ -171,7 +172,7 @@ class ChangeWatch:
         estimator: RecursiveLeastSquares,
         nuisance: NuisanceRows,
         candidates: Sequence[ChangeCandidate],
-        false_alarm_time: float,
+        false_alarm_time: float | None,
         work: Background,
     ) -> None:
         self._estimator = estimator
@@ -182,16 +183,10 @@ class ChangeWatch:
         self._search = ChangeSearch(
             candidates,
             self._with_nuisance(np.hstack([c.directions for c in candidates])),
-            BLOCK_LENGTH / false_alarm_time,
+            _chance_of_block(false_alarm_time),
             self._work,
         )
-        self.reset()
-
-    def reset(self) -> None:
-        """Clear noise level and detected changes; must not be called during a computation."""
         self.changes: list[Change] = []
-        self._wider.reset()
-        self._search.reset()
         # smallest residual scale where only the ratios of the noise between joints are known: 0.01
         # of the assumed noise, which is 1e-4 of the torque limit [-]
         self._residual_scale = ResidualScale(0.01 if self._estimator.noise_is_relative else 1.0)
@@ -212,9 +207,7 @@ class ChangeWatch:
             Forgetting factor of the estimator.
 
         """
-        self._search.set_chance(
-            0.0 if false_alarm_time is None else BLOCK_LENGTH / false_alarm_time
-        )
+        self._search.set_chance(_chance_of_block(false_alarm_time))
         self._wider.forgetting = forgetting
 
     def interrupt(self) -> None:
@@ -365,6 +358,11 @@ class ChangeWatch:
         self.changes.append(
             replace(change, size=replace(size, covariance=factor * size.covariance))
         )
+
+
+def _chance_of_block(false_alarm_time: float | None) -> float:
+    """Return the probability of a false alarm in a block; 0 without a detection of changes."""
+    return 0.0 if false_alarm_time is None else BLOCK_LENGTH / false_alarm_time
 
 
 def _parts(items: Sequence[Item], size: int) -> Iterator[Sequence[Item]]:

@@ -26,10 +26,6 @@ class StreamChecks:
 
     def __init__(self, robot: Robot, gate: SpikeGate) -> None:
         self._robot, self._gate = robot, gate
-        self.reset()
-
-    def reset(self) -> None:
-        """Start the checks anew for a new stream."""
         self._moved: float | None = None
         self._moving = 0.0
         self._judged: tuple[bytes, str] | None = None
@@ -79,10 +75,6 @@ class MissingSamples:
     """
 
     def __init__(self) -> None:
-        self.reset()
-
-    def reset(self) -> None:
-        """Set the count of missing samples to zero."""
         self.count = 0
         self._last: float | None = None
         self._doubtful = 0

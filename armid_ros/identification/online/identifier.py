@@ -113,7 +113,15 @@ class OnlineIdentifier:
             )
         self.arm, self.settings = arm, settings
         self.base: BaseParameters = arm.base_parameters(rng)
-        self._kept = np.array([-1, *self.base.independent]) + 1  # torque and base columns
+        self._searches = settings.false_alarm_time is not None  # for changes, at any time
+        self._data = robot.model.createData()
+        held = {joint for e in arm.effects if e.holds_at_rest for joint in e.joints}
+        self._held = np.array([joint in held for joint in robot.joints])
+        self.reset()
+
+    def reset(self) -> None:
+        """Clear the estimate and all counters; keep the settings."""
+        arm, robot, settings = self.arm, self.arm.robot, self.settings
         self._filter = CausalFilter(
             robot.n_joints,
             settings.cutoff,
@@ -141,41 +149,20 @@ class OnlineIdentifier:
         window = max(1, round(4.0 / self._row_period))  # 4 s, beyond the correlation of errors
         self._scores = RobustCovariance(window, settings.forgetting, self._work)
         self._watch = None
-        alarm = settings.false_alarm_time
-        if alarm is not None and (candidates := change_candidates(arm, self.base)):
+        if self._searches and (candidates := change_candidates(arm, self.base)):
             watched = self._estimator, NuisanceRows(arm, settings.cutoff), candidates
-            self._watch = ChangeWatch(*watched, alarm, self._work)
-        self._clear_estimate()
-        self._data = robot.model.createData()
-        held = {joint for e in arm.effects if e.holds_at_rest for joint in e.joints}
-        self._held = np.array([joint in held for joint in robot.joints])
+            self._watch = ChangeWatch(*watched, settings.false_alarm_time, self._work)
+        self._pending: tuple[Row, FloatArray] | None = None  # with its innovation
+        self._n_changes = 0
+        self.latest: tuple[OnlineSample, ...] = ()
+        # of residuals: weighted squares, their weights, and the standard deviation
+        self._squares, self._counts, self._deviation = np.zeros((3, robot.n_joints))
+        self._floor: FloatArray | None = None
         self._generation = -1
         self._last_row: float | None = None
         self._last_moving = np.full(robot.n_joints, -np.inf)
         self._last_useless = self._last_moving.copy()  # last rest, or start of the row filter
         self._noise: RowNoise | None = None
-
-    def reset(self) -> None:
-        """Clear the estimate and all counters; keep the settings."""
-        self._work.clear()
-        self._clear_estimate()
-        self._filter.reset()
-        self._checks.reset()
-        self._missing.reset()
-        self._gate.reset()
-
-    def _clear_estimate(self) -> None:
-        """Clear the estimate; no background computation may be pending."""
-        self._pending: tuple[Row, FloatArray] | None = None  # with its innovation
-        self._n_changes = 0
-        self.latest: tuple[OnlineSample, ...] = ()
-        # of residuals: weighted squares, their weights, and the standard deviation
-        self._squares, self._counts, self._deviation = np.zeros((3, self.arm.robot.n_joints))
-        self._floor: FloatArray | None = None
-        self._estimator.reset()
-        self._scores.reset()
-        if self._watch is not None:
-            self._watch.reset()
 
     def update(
         self, t: float, q: npt.ArrayLike, dq: npt.ArrayLike | None, tau: npt.ArrayLike
@@ -294,8 +281,7 @@ class OnlineIdentifier:
                 raise IdentificationError(
                     f'the setting {setting.name} cannot change now; restart the identification'
                 )
-        off = self._watch is None and self.settings.false_alarm_time is None
-        if off and settings.false_alarm_time is not None:
+        if not self._searches and settings.false_alarm_time is not None:
             raise IdentificationError(
                 'false_alarm_time cannot be set now, as change detection was off at the start; '
                 'restart the identification'

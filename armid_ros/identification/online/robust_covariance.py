@@ -62,10 +62,6 @@ class RobustCovariance:
         self._window = window
         self.forgetting = forgetting
         self._work = work
-        self.reset()
-
-    def reset(self) -> None:
-        """Clear all Fourier products; must not be called during a computation."""
         self._settled: _Bands | None = None
         self._latest: _Bands | None = None
         self._shape: tuple[FloatArray, FloatArray] | None = None

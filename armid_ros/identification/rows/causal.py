@@ -195,10 +195,6 @@ class CausalFilter:
         self._measured_velocity = measured_velocity
         self._outputs = np.zeros((3, 3))
         self.generation = 0
-        self.reset()
-
-    def reset(self) -> None:
-        """Restart the filter; set the counts of rejected samples and restarts to zero."""
         self.rejected: Counter[str] = Counter()
         self.restarts: Counter[str] = Counter()
         self._begin()
