@@ -157,7 +157,6 @@ class OnlineIdentifier:
         self.latest: tuple[OnlineSample, ...] = ()
         # of residuals: weighted squares, their weights, and the standard deviation
         self._squares, self._counts, self._deviation = np.zeros((3, robot.n_joints))
-        self._floor: FloatArray | None = None
         self._generation = -1
         self._last_row: float | None = None
         self._last_moving = np.full(robot.n_joints, -np.inf)
@@ -232,7 +231,10 @@ class OnlineIdentifier:
             if self._watch is not None:
                 self._watch.interrupt()
             self._generation = self._filter.generation
-            self._last_row = self._noise = self._floor = None
+            period, pole = self._filter.period, self._filter.pole
+            assert period is not None and pole is not None
+            self._noise = RowNoise.of(period, pole, self._row_filter.pole)
+            self._last_row = None
             self._last_moving[:] = -np.inf
             self._last_useless[:] = motion.t
         # a joint below this velocity [rad/s or m/s] for longer than this time [s] is at rest; a
@@ -381,7 +383,8 @@ class OnlineIdentifier:
         stacked = np.concatenate(columns, axis=1).take(self._kept, axis=1)
         filtered = self._row_filter.update(step, stacked.reshape(-1))[2].reshape(stacked.shape)
         measured, rows = filtered[:, 0], filtered[:, 1:]
-        noise = self._row_noise()
+        noise = self._noise
+        assert noise is not None
         gain, independent = noise.gain, noise.independent(min(step, self._row_period))
         stamp = motion.t - (self.delay or 0.0)
         sample = WeightedSample(rows / gain, measured / gain, np.asarray(used * independent))
@@ -410,7 +413,6 @@ class OnlineIdentifier:
         self._counts = estimator.forgetting * self._counts + sample.weights
         known = np.maximum(self._counts, _SMALLEST)
         self._deviation = np.sqrt(np.maximum(self._squares, 0.0) / known)
-        self._floor = None
         scale = estimator.scale(sample.weights)
         self._scores.add(sample.rows * scale[:, None], sample.tau * scale, estimator.values)
         return True
@@ -419,17 +421,7 @@ class OnlineIdentifier:
     def _negligible_error(self) -> FloatArray:
         """Return the largest negligible error of each signal: positive for torques, else 0."""
         n = self.arm.robot.n_joints
-        if self._filter.pole is None:
-            return np.zeros((3 if self.settings.measured_velocity else 2) * n)
-        if self._floor is None:
-            self._floor = np.zeros((3 if self.settings.measured_velocity else 2) * n)
-            np.multiply(self._deviation, self._row_noise().single, out=self._floor[-n:])
-        return self._floor
-
-    def _row_noise(self) -> RowNoise:
-        """Return the noise of filtered samples relative to that of the sensors."""
-        if self._noise is None:
-            period, pole = self._filter.period, self._filter.pole
-            assert period is not None and pole is not None
-            self._noise = RowNoise.of(period, pole, self._row_filter.pole)
-        return self._noise
+        floor = np.zeros((3 if self.settings.measured_velocity else 2) * n)
+        if self._noise is not None:
+            np.multiply(self._deviation, self._noise.single, out=floor[-n:])
+        return floor
