@@ -157,7 +157,7 @@ def load_robot(
         text = expand_xacro(path, arguments, packages)
     elif arguments:
         raise RobotError(f'{path}: not a xacro file, so it takes no arguments')
-    text = with_mechanism(text, path)
+    text = _with_mechanism(text, path)
     for name, folder in packages.items():
         text = text.replace(f'package://{name}/', f'file://{escape(folder)}/')
     robot = robot_from_urdf(text, gravity=gravity, joints=joints, source=str(source), path=path)
@@ -367,19 +367,9 @@ def read_mounting(robot: Robot) -> tuple[float | None, Path] | None:
     return float(floor), path
 
 
-def with_mechanism(text: str, path: Path) -> str:
-    """
-    Add the coupled joints of NAME.mechanism.yaml, if it exists, to a URDF text.
-
-    The file is in the folder of NAME.urdf, NAME.urdf.xacro or NAME.xml. Other readers of a URDF
-    ignore the additional elements.
-
-    Raises
-    ------
-    RobotError
-        If the file cannot be read, or has other contents.
-
-    """
+def _with_mechanism(text: str, path: Path) -> str:
+    """Add the coupled joints of NAME.mechanism.yaml, if it exists, to the text of NAME.urdf."""
+    # other readers of a URDF ignore the additional elements
     name = path.name
     for end in ('.xacro', '.urdf', '.xml'):
         name = name.removesuffix(end)

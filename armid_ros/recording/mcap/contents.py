@@ -174,7 +174,7 @@ def messages_in(found: FileMap, contents: Contents) -> tuple[IntArray, npt.NDArr
         offsets = np.concatenate(listed)
         if not (np.diff(offsets) > 0).all():
             offsets.sort(kind='stable')
-        rows = heads_by_index(data, offsets, ranges)
+        rows = _heads_by_index(data, offsets, ranges)
         if rows is not None:
             return offsets, rows
     walked = []
@@ -190,30 +190,11 @@ def messages_in(found: FileMap, contents: Contents) -> tuple[IntArray, npt.NDArr
     return offsets, heads(data, offsets)
 
 
-def heads_by_index(
+def _heads_by_index(
     data: bytes | mmap.mmap, offsets: IntArray, ranges: IntArray
 ) -> npt.NDArray[np.void] | None:
-    """
-    Read message headers at the byte positions in an MCAP index; None if these are wrong.
-
-    An index is correct if messages and definitions fill the chunk without gaps: each record
-    begins at the end of the previous record.
-
-    Parameters
-    ----------
-    data : bytes or mmap
-        Buffer with the contents of the chunks.
-    offsets : ndarray, shape (N,)
-        Position of each message in the index, in ascending order.
-    ranges : ndarray, shape (K, 2)
-        First and last position of the content of each chunk in the buffer, in ascending order.
-
-    Returns
-    -------
-    ndarray of `MESSAGE`, shape (N,), or None
-        None if an index is wrong.
-
-    """
+    """Read the headers at the ascending positions of an index; None if the index is wrong."""
+    # It is correct if messages and definitions fill each chunk, a row of `ranges`, without gaps.
     begins, ends = ranges.T
     if not len(offsets) or offsets[0] < begins[0] or offsets[-1] + MESSAGE.itemsize > ends[-1]:
         return None

@@ -72,7 +72,7 @@ def open_table(path: Path, *, episode: int | None = None) -> Table:
         with open_regular(path, RecordingError):  # opening a FIFO would block
             pass
     try:
-        table = read_lerobot(path, episode) if lerobot else _READERS[_suffix(path)](path)
+        table = _read_lerobot(path, episode) if lerobot else _READERS[_suffix(path)](path)
         return _with_stamps(_with_dates(_with_names(table)))
     except RecordingError:
         raise
@@ -239,18 +239,8 @@ def read_parquet(path: Path) -> Table:
     return replace(table_of_arrays(str(path), arrays, 'Parquet'), words=words)
 
 
-def read_lerobot(path: Path, episode: int | None = None) -> Table:
-    """
-    Read one episode of a LeRobot dataset as a table.
-
-    Parameters
-    ----------
-    path : Path
-        Folder of the dataset, which has meta/info.json.
-    episode : int, optional
-        Number of the episode; 0 by default.
-
-    """
+def _read_lerobot(path: Path, episode: int | None = None) -> Table:
+    """Read one episode, the first by default, of the LeRobot dataset in a folder."""
     with reading(path / INFO, RecordingError):
         info = json.loads(read_document(path / INFO, RecordingError))
         names: dict[str, list[str]] = {}
