@@ -110,12 +110,6 @@ class TwoLinkParameters:
         """Viscous friction of link and motor at the joint, dl + dm gear^2, (2,) [N m s/rad]."""
         return np.asarray(self.link_damping + self.joint_motor_damping)
 
-    def mass_matrix(self, angle: float) -> FloatArray:
-        """Return the mass matrix for an angle of joint 2 [rad], shape (2, 2) [kg m^2]."""
-        coupling = self.beta + self.gamma * np.cos(angle)
-        first = self.alpha + self.beta + 2.0 * self.gamma * np.cos(angle)
-        return np.array([[first, coupling], [coupling, self.beta]])
-
     def body(self, robot: Robot) -> Robot:
         """
         Return a robot whose link inertias agree with alpha, beta and gamma.
