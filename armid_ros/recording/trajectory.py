@@ -90,7 +90,6 @@ def read_waypoints(
     path: str | Path,
     joints: Sequence[str],
     *,
-    topic: str | None = None,
     settings: ReadSettings = DEFAULT,
 ) -> Reference:
     """
@@ -102,8 +101,6 @@ def read_waypoints(
         A rosbag2 directory, or a bare file.
     joints : sequence of str
         Joints to read, in this order.
-    topic : str, optional
-        Topic of the message; by default the only one of its type.
     settings : ReadSettings
         Whether checksums are compared, and the memory limit.
 
@@ -116,11 +113,11 @@ def read_waypoints(
     Raises
     ------
     RecordingError
-        If the bag or topic does not exist, or the trajectory is not valid or lacks a joint.
+        If the bag has no or several trajectories, or the trajectory is not valid or lacks a joint.
 
     """
     with Bag(path, settings) as bag:
-        chosen = bag.topic_of(JOINT_TRAJECTORY, topic)
+        chosen = bag.topic_of(JOINT_TRAJECTORY)
         cdr = b''
         for block in bag.blocks(chosen.name):
             cdr = block.message(len(block) - 1)

@@ -55,7 +55,7 @@ def test_the_last_of_several_trajectories_counts(motion, tmp_path):
         writer.add_topic('/goal', JOINT_TRAJECTORY)
         writer.write('/goal', joint_trajectory_cdr(motion), 1)
         writer.write('/goal', joint_trajectory_cdr(motion.select(slice(0, 50))), 2)
-    assert len(read_waypoints(tmp_path / 'bag', ('a', 'b'), topic='goal').t) == 50
+    assert len(read_waypoints(tmp_path / 'bag', ('a', 'b')).t) == 50
 
 
 def changed(motion, **fields):
@@ -91,8 +91,6 @@ def test_a_missing_trajectory_or_joint_is_refused_with_what_there_is(motion, swi
     write_joint_trajectory(tmp_path / 'bag', motion)
     with pytest.raises(RecordingError, match=r'c;.*a, b'):
         read_waypoints(tmp_path / 'bag', ('a', 'c'))
-    with pytest.raises(RecordingError, match=r'/x,.*/joint_trajectory'):
-        read_waypoints(tmp_path / 'bag', ('a', 'b'), topic='/x')
     write_recording(tmp_path / 'states', swinging)
     with pytest.raises(RecordingError, match=JOINT_TRAJECTORY):
         read_waypoints(tmp_path / 'states', ('a', 'b'))
