@@ -10,8 +10,8 @@ from typing import Literal
 from xml.etree import ElementTree
 
 from armid_ros.model.pseudo_inertia import require_consistent
-from armid_ros.motion import FloatArray
 from armid_ros.robots import held_joints, Robot
+from armid_ros.robots.description import text_of
 from armid_ros.robots.geometry import shapes_of
 import numpy as np
 import pinocchio as pin
@@ -62,7 +62,7 @@ def export_mjcf(
     require_consistent(robot.links, robot.rigid_parameters)
     root = ElementTree.Element('mujoco', model=robot.name)
     ElementTree.SubElement(root, 'compiler', angle='radian')
-    ElementTree.SubElement(root, 'option', gravity=_numbers(robot.gravity))
+    ElementTree.SubElement(root, 'option', gravity=text_of(robot.gravity))
     defaults = ElementTree.SubElement(root, 'default')
     for of, contacts in _CLASSES.items():
         default = ElementTree.SubElement(defaults, 'default', {'class': of})
@@ -82,8 +82,8 @@ def export_mjcf(
         bodies[identity] = body
         inertia = model.inertias[identity]
         upper = inertia.inertia[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
-        mass = {'pos': _numbers(inertia.lever), 'mass': repr(float(inertia.mass))}
-        ElementTree.SubElement(body, 'inertial', mass | {'fullinertia': _numbers(upper)})
+        mass = {'pos': text_of(inertia.lever), 'mass': repr(float(inertia.mass))}
+        ElementTree.SubElement(body, 'inertial', mass | {'fullinertia': text_of(upper)})
         ElementTree.SubElement(body, 'joint', _joint(robot.tree, index))
         for key, table in values.items():
             if table.get(joint):
@@ -130,7 +130,7 @@ def _couplings(root: ElementTree.Element, robot: Robot) -> list[str]:
             **{k: -x for k, x in mimic.multipliers.items()},
         }.items():
             ElementTree.SubElement(fixed, 'joint', joint=leader, coef=repr(factor))
-        constant = _numbers([mimic.offset, 0.0, 0.0, 0.0, 0.0])
+        constant = text_of([mimic.offset, 0.0, 0.0, 0.0, 0.0])
         ElementTree.SubElement(equal, 'tendon', tendon1=name, polycoef=constant)
     for loop in robot.description.loops:
         frames = [robot.model.getFrameId(link, pin.FrameType.BODY) for link in loop.links]
@@ -138,7 +138,7 @@ def _couplings(root: ElementTree.Element, robot: Robot) -> list[str]:
         names = [robot.links[body - 1] if body else robot.base for body in bodies]
         place = robot.model.frames[frames[0]].placement.act(np.array(loop.points[0]))
         ends = dict(zip(('body1', 'body2'), names, strict=True))
-        ElementTree.SubElement(equal, 'connect', ends, anchor=_numbers(place))
+        ElementTree.SubElement(equal, 'connect', ends, anchor=text_of(place))
     return left_out
 
 
@@ -152,9 +152,9 @@ def _shapes(
         for shape in shapes_of(robot, of):
             if shape.kind in ('box', 'sphere'):  # half edges, or the radius
                 share = 0.5 if shape.kind == 'box' else 1.0
-                size = {'size': _numbers([share * x for x in shape.size])}
+                size = {'size': text_of([share * x for x in shape.size])}
             elif shape.kind != 'mesh':  # radius and half length
-                size = {'size': _numbers([shape.size[0], 0.5 * shape.size[1]])}
+                size = {'size': text_of([shape.size[0], 0.5 * shape.size[1]])}
             else:
                 if shape.path is None or shape.path.suffix.lower() not in _MESHES:
                     left_out[f'{of} mesh {shape.mesh.rsplit("/", 1)[-1]}'] = None
@@ -163,7 +163,7 @@ def _shapes(
                 if key not in files:
                     files[key] = f'{shape.path.stem}_{len(files)}'
                     values = {'name': files[key], 'file': str(key[0]), 'inertia': 'shell'}
-                    ElementTree.SubElement(assets, 'mesh', values, scale=_numbers(shape.size))
+                    ElementTree.SubElement(assets, 'mesh', values, scale=text_of(shape.size))
                 size = {'mesh': files[key]}
             body = bodies[robot.model.frames[shape.frame].parentJoint]
             values = {'class': of, 'type': shape.kind, **size, **_place(shape.placement)}
@@ -174,7 +174,7 @@ def _shapes(
 def _place(placement: pin.SE3) -> dict[str, str]:
     """Return a placement as MJCF attributes: position and quaternion."""
     x, y, z, w = pin.Quaternion(placement.rotation).coeffs()
-    return {'pos': _numbers(placement.translation), 'quat': _numbers([w, x, y, z])}
+    return {'pos': text_of(placement.translation), 'quat': text_of([w, x, y, z])}
 
 
 def _joint(robot: Robot, index: int) -> dict[str, str]:
@@ -184,16 +184,11 @@ def _joint(robot: Robot, index: int) -> dict[str, str]:
     attributes = {
         'name': robot.joints[index],
         'type': 'slide' if slides else 'hinge',
-        'axis': _numbers(geometry.slide if slides else geometry.turn),
+        'axis': text_of(geometry.slide if slides else geometry.turn),
     }
     lower, upper, limit = robot.lower[index], robot.upper[index], robot.torque_limit[index]
     if np.isfinite(lower) and np.isfinite(upper):
-        attributes |= {'limited': 'true', 'range': _numbers([lower, upper])}
+        attributes |= {'limited': 'true', 'range': text_of([lower, upper])}
     if np.isfinite(limit):
-        attributes |= {'actuatorfrclimited': 'true', 'actuatorfrcrange': _numbers([-limit, limit])}
+        attributes |= {'actuatorfrclimited': 'true', 'actuatorfrcrange': text_of([-limit, limit])}
     return attributes
-
-
-def _numbers(values: Sequence[float] | FloatArray) -> str:
-    """Format numbers, separated by blanks."""
-    return ' '.join(repr(float(value)) for value in values)

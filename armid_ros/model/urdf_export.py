@@ -18,6 +18,7 @@ from armid_ros.errors import ModelError
 from armid_ros.model.pseudo_inertia import Consistency, pseudo_inertia, require_consistent
 from armid_ros.motion import FloatArray
 from armid_ros.robots import Robot, robot_from_urdf
+from armid_ros.robots.description import inertia_attributes, text_of
 from armid_ros.robots.meshes import find_mesh
 from armid_ros.robots.robot import PER_LINK
 import numpy as np
@@ -156,13 +157,9 @@ def _set_inertial(link: minidom.Element, parameters: FloatArray) -> None:
     """Write inertial parameters to a URDF link as mass, centre of mass and inertia."""
     body = pin.Inertia.FromDynamicParameters(parameters)
     values = {
-        'origin': {'xyz': ' '.join(map(repr, body.lever.tolist())), 'rpy': '0 0 0'},
-        'mass': {'value': repr(float(body.mass))},
-        'inertia': {
-            f'i{"xyz"[i]}{"xyz"[j]}': repr(float(body.inertia[i, j]))
-            for i in range(3)
-            for j in range(i, 3)
-        },
+        'origin': {'xyz': text_of(body.lever), 'rpy': '0 0 0'},
+        'mass': {'value': text_of(body.mass)},
+        'inertia': inertia_attributes(body.inertia),
     }
     inertial = _child(link, 'inertial')
     for name, row in values.items():

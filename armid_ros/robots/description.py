@@ -17,6 +17,7 @@ from armid_ros.files.documents import LARGEST
 from armid_ros.files.regular import TEXT_LIMIT
 from armid_ros.motion import FloatArray
 import numpy as np
+import numpy.typing as npt
 
 MOVABLE = ('revolute', 'continuous', 'prismatic')
 JOINT_TYPES = (*MOVABLE, 'fixed', 'floating', 'planar')
@@ -24,6 +25,17 @@ JOINT_TYPES = (*MOVABLE, 'fixed', 'floating', 'planar')
 Vector = tuple[float, float, float]
 #: Components of an inertia, in the order of a URDF.
 INERTIA = ('ixx', 'ixy', 'ixz', 'iyy', 'iyz', 'izz')
+
+
+def text_of(numbers: npt.ArrayLike) -> str:
+    """Return one or several numbers as the value of an XML attribute, with all digits."""
+    return ' '.join(repr(float(number)) for number in np.ravel(numbers))
+
+
+def inertia_attributes(tensor: FloatArray) -> dict[str, str]:
+    """Return an inertia (3, 3) [kg m^2] as the attributes ixx to izz of a URDF."""
+    values = tensor[np.triu_indices(3)]
+    return {name: text_of(value) for name, value in zip(INERTIA, values, strict=True)}
 
 
 @dataclass(frozen=True)

@@ -21,11 +21,12 @@ from armid_ros.motion import FloatArray
 from armid_ros.robots.coupling import couple, moving_joints
 from armid_ros.robots.description import (
     Description,
-    INERTIA,
+    inertia_attributes,
     Joint,
     MOVABLE,
     parse_description,
     parse_xml,
+    text_of,
 )
 from armid_ros.robots.mjcf import is_mjcf, urdf_of_mjcf
 from armid_ros.robots.robot import joint_fields, parse_gravity, Robot
@@ -305,10 +306,11 @@ def _kinematic_urdf(description: Description, positions: Mapping[str, float]) ->
         if inertial is None:
             continue
         element = ElementTree.SubElement(link, 'inertial')
-        ElementTree.SubElement(element, 'origin', xyz=_text(inertial.xyz), rpy=_text(inertial.rpy))
+        ElementTree.SubElement(
+            element, 'origin', xyz=text_of(inertial.xyz), rpy=text_of(inertial.rpy)
+        )
         ElementTree.SubElement(element, 'mass', value=repr(inertial.mass))
-        values = dict(zip(INERTIA, map(repr, inertial.inertia), strict=True))
-        ElementTree.SubElement(element, 'inertia', values)
+        ElementTree.SubElement(element, 'inertia', inertia_attributes(inertial.tensor))
     for joint in description.joints:
         driven = joint.kind in MOVABLE and joint.name not in positions
         kind = 'prismatic' if joint.kind == 'prismatic' else 'revolute'
@@ -322,16 +324,12 @@ def _kinematic_urdf(description: Description, positions: Mapping[str, float]) ->
         element = ElementTree.SubElement(
             root, 'joint', name=joint.name, type=kind if driven else 'fixed'
         )
-        ElementTree.SubElement(element, 'origin', xyz=_text(xyz), rpy=_text(rpy))
+        ElementTree.SubElement(element, 'origin', xyz=text_of(xyz), rpy=text_of(rpy))
         ElementTree.SubElement(element, 'parent', link=joint.parent)
         ElementTree.SubElement(element, 'child', link=joint.child)
-        ElementTree.SubElement(element, 'axis', xyz=_text(joint.axis))
+        ElementTree.SubElement(element, 'axis', xyz=text_of(joint.axis))
         ElementTree.SubElement(element, 'limit', lower='-1', upper='1', effort='1', velocity='1')
     return ElementTree.tostring(root, encoding='unicode')
-
-
-def _text(numbers: Sequence[float]) -> str:
-    return ' '.join(map(repr, numbers))
 
 
 def read_mounting(robot: Robot) -> tuple[float | None, Path] | None:

@@ -22,6 +22,7 @@ from xml.etree import ElementTree
 
 from armid_ros.errors import RobotError
 from armid_ros.motion import FloatArray
+from armid_ros.robots.description import inertia_attributes, text_of
 import numpy as np
 import pinocchio as pin
 
@@ -176,15 +177,10 @@ class _Writer:
             axes = _rotation(model.body_iquat[body])
             tensor = axes @ np.diag(model.body_inertia[body]) @ axes.T
             inertial = ElementTree.SubElement(link, 'inertial')
-            centre = _text(model.body_ipos[body] - anchor)
+            centre = text_of(model.body_ipos[body] - anchor)
             ElementTree.SubElement(inertial, 'origin', xyz=centre, rpy='0 0 0')
-            ElementTree.SubElement(inertial, 'mass', value=_number(model.body_mass[body]))
-            rows = {
-                f'i{"xyz"[i]}{"xyz"[j]}': _number(tensor[i, j])
-                for i in range(3)
-                for j in range(i, 3)
-            }
-            ElementTree.SubElement(inertial, 'inertia', rows)
+            ElementTree.SubElement(inertial, 'mass', value=text_of(model.body_mass[body]))
+            ElementTree.SubElement(inertial, 'inertia', inertia_attributes(tensor))
         self._shapes(link, body, anchor)
         return anchor
 
@@ -205,15 +201,15 @@ class _Writer:
         kind = 'prismatic' if slides else 'revolute' if limited else 'continuous'
         element = ElementTree.SubElement(self.root, 'joint', name=name, type=kind)
         _place(element, parent, child, placement * shift)
-        ElementTree.SubElement(element, 'axis', xyz=_text(axis))
+        ElementTree.SubElement(element, 'axis', xyz=text_of(axis))
         limits: dict[str, str] = {}
         if limited:
             limits |= dict(
-                zip(('lower', 'upper'), map(_number, model.jnt_range[joint]), strict=True)
+                zip(('lower', 'upper'), map(text_of, model.jnt_range[joint]), strict=True)
             )
         effort = self._effort(joint)
         if math.isfinite(effort):
-            limits['effort'] = _number(effort)
+            limits['effort'] = text_of(effort)
         if limits and (limited or not slides):
             ElementTree.SubElement(element, 'limit', limits)
         dynamics = {
@@ -222,7 +218,7 @@ class _Writer:
             'armature': model.dof_armature[dof],
         }
         ElementTree.SubElement(
-            element, 'dynamics', {key: _number(value) for key, value in dynamics.items()}
+            element, 'dynamics', {key: text_of(value) for key, value in dynamics.items()}
         )
         self._mimic(element, joint)
         if np.any(model.jnt_stiffness[joint]):
@@ -268,8 +264,8 @@ class _Writer:
                 continue
             zero, zero_of_leader = (model.qpos0[model.jnt_qposadr[j]] for j in (joint, leader))
             offset = constant + zero - factor * zero_of_leader
-            values = {'joint': self.joints[leader], 'multiplier': _number(factor)}
-            ElementTree.SubElement(element, 'mimic', values | {'offset': _number(offset)})
+            values = {'joint': self.joints[leader], 'multiplier': text_of(factor)}
+            ElementTree.SubElement(element, 'mimic', values | {'offset': text_of(offset)})
 
     def _loop(self, equality: int, anchors: Mapping[int, FloatArray]) -> bool:
         """Write a `connect` equality as a closed loop; return False if this is impossible."""
@@ -296,7 +292,7 @@ class _Writer:
         names = ' '.join(self.joints[joint] for joint in passive)
         loop = ElementTree.SubElement(self.root, 'loop', passive=names)
         for body, point in zip(bodies, model.eq_data[equality, :6].reshape(2, 3), strict=True):
-            xyz = _text(point - anchors[body])
+            xyz = text_of(point - anchors[body])
             ElementTree.SubElement(loop, 'point', link=self.bodies[body], xyz=xyz)
         return True
 
@@ -313,15 +309,15 @@ class _Writer:
             kind = kinds(int(model.geom_type[geom]))
             pieces: list[tuple[str, dict[str, str], float]] = []
             if kind in (kinds.mjGEOM_BOX, kinds.mjGEOM_ELLIPSOID):  # bounding box
-                pieces = [('box', {'size': _text([2 * x, 2 * y, 2 * z])}, 0.0)]
+                pieces = [('box', {'size': text_of([2 * x, 2 * y, 2 * z])}, 0.0)]
             elif kind == kinds.mjGEOM_SPHERE:
-                pieces = [('sphere', {'radius': _number(x)}, 0.0)]
+                pieces = [('sphere', {'radius': text_of(x)}, 0.0)]
             elif kind in (kinds.mjGEOM_CYLINDER, kinds.mjGEOM_CAPSULE):
-                sizes = {'radius': _number(x), 'length': _number(2 * y)}
+                sizes = {'radius': text_of(x), 'length': text_of(2 * y)}
                 ends = (y, -y) if kind == kinds.mjGEOM_CAPSULE else ()
                 pieces = [
                     ('cylinder', sizes, 0.0),
-                    *(('sphere', {'radius': _number(x)}, end) for end in ends),
+                    *(('sphere', {'radius': text_of(x)}, end) for end in ends),
                 ]
             elif kind == kinds.mjGEOM_MESH:
                 mesh = int(model.geom_dataid[geom])
@@ -329,7 +325,7 @@ class _Writer:
                 moved = pin.SE3(_rotation(model.mesh_quat[mesh]), np.array(model.mesh_pos[mesh]))
                 place = place * moved.inverse()
                 if file and model.mesh_pathadr[mesh] >= 0:
-                    scale = _text(model.mesh_scale[mesh])
+                    scale = text_of(model.mesh_scale[mesh])
                     pieces = [('mesh', {'filename': f'file://{file}', 'scale': scale}, 0.0)]
             for shape, values, along in pieces:
                 element = ElementTree.SubElement(link, tag)
@@ -361,18 +357,10 @@ def _origin(element: ElementTree.Element, placement: pin.SE3) -> None:
     pitch = math.atan2(-r[2, 0], math.hypot(r[2, 1], r[2, 2]))
     sine, cosine = math.sin(roll), math.cos(roll)
     yaw = math.atan2(sine * r[0, 2] - cosine * r[0, 1], cosine * r[1, 1] - sine * r[1, 2])
-    xyz = _text(placement.translation)
-    ElementTree.SubElement(element, 'origin', xyz=xyz, rpy=_text([roll, pitch, yaw]))
+    xyz = text_of(placement.translation)
+    ElementTree.SubElement(element, 'origin', xyz=xyz, rpy=text_of([roll, pitch, yaw]))
 
 
 def _rotation(quaternion: FloatArray) -> FloatArray:
     w, x, y, z = (float(value) for value in quaternion)
     return np.array(pin.Quaternion(w, x, y, z).normalized().toRotationMatrix())
-
-
-def _number(value: float) -> str:
-    return repr(float(value))
-
-
-def _text(values: Any) -> str:
-    return ' '.join(_number(value) for value in values)
