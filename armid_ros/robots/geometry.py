@@ -30,6 +30,12 @@ _SHAPE_ATTRIBUTES = {
     'capsule': ('radius', 'length'),
     'mesh': ('scale',),
 }
+_BODIES = {
+    'box': coal.Box,
+    'sphere': coal.Sphere,
+    'cylinder': coal.Cylinder,
+    'capsule': coal.Capsule,
+}
 
 
 class LinkShape(NamedTuple):
@@ -129,8 +135,8 @@ def collision_geometry(
     """
     Return the collision bodies of a robot, with notes on links whose mesh file is missing.
 
-    Boxes, spheres and cylinders are exact. A mesh is replaced by convex bodies that contain the
-    mesh. A mesh that is not found is left out and noted.
+    Boxes, spheres, cylinders and capsules are exact. A mesh is replaced by convex bodies that
+    contain the mesh. A mesh that is not found is left out and noted.
 
     Returns
     -------
@@ -154,9 +160,8 @@ def collision_geometry(
                 f"link '{shape.link}': collision mesh {shape.mesh} not found; left out"
             )
         joint = robot.model.frames[shape.frame].parentJoint
-        for piece, (body, along) in enumerate(_bodies(shape, meshes)):
-            name = f'{shape.link}_{shape.number}_{piece}'
-            place = shape.placement * pin.SE3(np.eye(3), np.array([0.0, 0.0, along]))
+        for piece, body in enumerate(_bodies(shape, meshes)):
+            name, place = f'{shape.link}_{shape.number}_{piece}', shape.placement
             geometry.addGeometryObject(pin.GeometryObject(name, joint, shape.frame, place, body))
     return geometry, notes
 
@@ -187,21 +192,15 @@ def combined_mesh_note(notes: Sequence[str]) -> tuple[str, ...]:
     return (f'{len(notes)} meshes not found, such as that of {notes[0]}',)
 
 
-def _bodies(shape: LinkShape, meshes: _Meshes) -> list[tuple[coal.CollisionGeometry, float]]:
-    """Return the coal bodies that form a shape, each with an offset along the shape's z axis."""
-    if shape.kind == 'box':
-        return [(coal.Box(*shape.size), 0.0)]
-    if shape.kind == 'sphere':
-        return [(coal.Sphere(*shape.size), 0.0)]
-    if shape.kind == 'mesh':
-        if shape.path is None:
-            return []
-        if (shape.path, shape.size) not in meshes:
-            meshes[shape.path, shape.size] = convex_bodies(shape.path, np.array(shape.size))
-        return [(body, 0.0) for body in meshes[shape.path, shape.size]]
-    radius, length = shape.size
-    ends = (0.5 * length, -0.5 * length) if shape.kind == 'capsule' else ()
-    return [(coal.Cylinder(radius, length), 0.0), *((coal.Sphere(radius), end) for end in ends)]
+def _bodies(shape: LinkShape, meshes: _Meshes) -> tuple[coal.CollisionGeometry, ...]:
+    """Return the coal bodies that form a shape."""
+    if shape.kind != 'mesh':
+        return (_BODIES[shape.kind](*shape.size),)
+    if shape.path is None:
+        return ()
+    if (shape.path, shape.size) not in meshes:
+        meshes[shape.path, shape.size] = convex_bodies(shape.path, np.array(shape.size))
+    return meshes[shape.path, shape.size]
 
 
 def _geometry(element: ElementTree.Element) -> tuple[str, tuple[float, ...], str]:

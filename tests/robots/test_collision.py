@@ -83,6 +83,12 @@ class TestDistances:
         assert distance(model, angle, 0.0) == pytest.approx(height - 0.05, abs=1e-4)
         assert model.pairs == (('base', 'lower'),)
 
+    def test_a_capsule_reaches_as_far_as_its_lower_end(self) -> None:
+        capsule = '<capsule radius="0.05" length="0.2"/>'
+        model = collision_model(robot_from_urdf(arm(hand=capsule)))
+        end = np.sin(0.3) - 0.1 * np.cos(0.3)
+        assert distance(model, -0.3, 0.0) == pytest.approx(end + 0.2 - 0.05, abs=1e-4)
+
     def test_a_robot_without_collision_bodies_is_always_free(self) -> None:
         bare = arm(base='').replace(f'<collision>{at_tip(BALL)}</collision>', '')
         model = collision_model(robot_from_urdf(bare))
