@@ -351,14 +351,9 @@ def _place(element: ElementTree.Element, parent: str, child: str, placement: pin
 
 
 def _origin(element: ElementTree.Element, placement: pin.SE3) -> None:
-    """Write a placement as <origin> of a URDF element; angles are exact even in gimbal lock."""
-    r = np.array(placement.rotation)
-    roll = math.atan2(r[2, 1], r[2, 2])
-    pitch = math.atan2(-r[2, 0], math.hypot(r[2, 1], r[2, 2]))
-    sine, cosine = math.sin(roll), math.cos(roll)
-    yaw = math.atan2(sine * r[0, 2] - cosine * r[0, 1], cosine * r[1, 1] - sine * r[1, 2])
-    xyz = text_of(placement.translation)
-    ElementTree.SubElement(element, 'origin', xyz=xyz, rpy=text_of([roll, pitch, yaw]))
+    """Write a placement as <origin> of a URDF element."""
+    xyz, rpy = text_of(placement.translation), text_of(pin.rpy.matrixToRpy(placement.rotation))
+    ElementTree.SubElement(element, 'origin', xyz=xyz, rpy=rpy)
 
 
 def _rotation(quaternion: FloatArray) -> FloatArray:
