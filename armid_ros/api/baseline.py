@@ -7,7 +7,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from itertools import product
 from pathlib import Path
-from typing import TypeGuard
 
 from armid_ros.api.arguments import arm_of, is_model, RecordingLike, recordings_of, Rng, RobotLike
 from armid_ros.api.identification import IdentificationResult, identify
@@ -37,7 +36,7 @@ def baseline_recordings(
         return recordings_of(baseline, model.robot)
     if isinstance(arm, IdentificationResult):
         found = [*arm.recordings, *arm.held_out]
-    elif _is_written(arm):
+    elif isinstance(arm, str | Path) and is_model(arm):
         found = recordings_of(identified_from(arm), model.robot)
     else:
         return []
@@ -70,9 +69,9 @@ def diagnosed_model(
     require_any_mass(model.robot)
     recordings = recordings_of(against, model.robot)
     if not recordings:
-        if isinstance(arm, IdentificationResult):
-            return arm, model, arm.misfit, None
-        return arm, model, read_misfit(arm, model) if _is_written(arm) else None, None
+        if isinstance(arm, str | Path) and is_model(arm):
+            return arm, model, read_misfit(arm, model), None
+        return arm, model, arm.misfit if isinstance(arm, IdentificationResult) else None, None
     if baseline:
         raise IdentificationError(
             'a baseline and recordings of a simulator were both given; give only one of them'
@@ -81,7 +80,3 @@ def diagnosed_model(
     usual = [name for name, kind in kinds if kind.traits.usual or kind.traits.mjcf_attribute]
     found = identify(model.robot, recordings, effects=effects or ','.join(usual), rng=rng)
     return found.arm, found.arm, None, found
-
-
-def _is_written(arm: RobotLike | IdentificationResult) -> TypeGuard[str | Path]:
-    return isinstance(arm, (str, Path)) and is_model(arm)
