@@ -19,7 +19,7 @@ from armid_ros.motion import Motion
 from armid_ros.recording import reader, ReadSettings, Recording, Topic
 from armid_ros.recording.columns import ColumnSettings, numbers
 from armid_ros.recording.source import DEFAULT
-from armid_ros.robots import joints_beside_arms, load_robot, Robot, shipped_robots
+from armid_ros.robots import joints_beside_arms, Robot, shipped_robots
 from armid_ros.robots.load import shipped_path
 import numpy as np
 
@@ -41,11 +41,7 @@ USUAL = ','.join(USUAL_EFFECTS)
 
 def robot_of(robot: RobotLike) -> Robot:
     """Return the robot of a model, or load the robot that a name or path denotes."""
-    if isinstance(robot, ArmModel):
-        return robot.robot
-    if isinstance(robot, Robot):
-        return robot
-    return load_model(robot).robot if is_model(robot) else load_robot(str(robot))
+    return arm_of(robot, effects='').robot
 
 
 def is_model(path: str | Path) -> bool:
@@ -242,22 +238,21 @@ def read_recording(
         rename=tuple(rename.items() if isinstance(rename, Mapping) else rename),
         episode=episode,
     )
+    joints: tuple[str, ...] | None = None
+    slides: list[bool] | None = None
     if robot is None:
-        topics = topics_of(Path(path))
-        named = [one.name for one in topics if one.joints]
+        named = [one.name for one in topics_of(Path(path)) if one.joints]
         if topic is None and len(named) > 1:
             raise RecordingError(
                 f'{path}: several topics contain JointState messages: {", ".join(named)}; choose '
                 'one with topic='
             )
-        return reader.read_recording(path, topic=topic, columns=settings)
-    if isinstance(robot, (Robot, ArmModel, str, Path)):
+    elif isinstance(robot, (Robot, ArmModel, str, Path)):
         described = robot_of(robot)
-        slides = [bool(one) for one in described.prismatic]
-        return reader.read_recording(
-            path, joints=described.joints, slides=slides, topic=topic, columns=settings
-        )
-    return reader.read_recording(path, joints=tuple(robot), topic=topic, columns=settings)
+        joints, slides = described.joints, [bool(one) for one in described.prismatic]
+    else:
+        joints = tuple(robot)
+    return reader.read_recording(path, joints=joints, slides=slides, topic=topic, columns=settings)
 
 
 def topics_of(path: Path, settings: ReadSettings = DEFAULT) -> tuple[Topic, ...]:
