@@ -8,9 +8,9 @@ from collections.abc import Collection, Sequence
 
 from armid_ros.identification import Fit
 from armid_ros.identification.rows.period import find_period, refined_period
+from armid_ros.inspection.facts import Sampling
 from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording
-from armid_ros.recording.recording import GAP_PERIODS
 from armid_ros.report.blocks import BulletList, DataTable, Fold, Paragraph, TableCell
 from armid_ros.report.notation import digits, plain
 from armid_ros.report.page import Section, Templated
@@ -38,18 +38,15 @@ def data_quality_section(
     """
     rows, notes = [], []
     for recording, role, _ in read:
-        source = recording.source or 'in memory'
-        steps = np.diff(recording.t) if len(recording) > 1 else np.zeros(1)
-        period = recording.period or 1.0
-        ordinary = steps[steps < GAP_PERIODS * period]
+        source, sampling = recording.source or 'in memory', Sampling.of(recording)
         rows.append(
             (
                 source,
                 role,
-                f'{recording.duration:.1f} s',
-                f'{plain(1.0 / period, 4)} Hz',
-                f'{100 * float(np.std(ordinary) / period) if len(ordinary) else 0.0:.1f} %',
-                f'{plain(1e3 * float(steps.max()))} ms',
+                f'{sampling.duration:.1f} s',
+                f'{plain(sampling.rate_hz, 4)} Hz',
+                f'{100 * sampling.jitter:.1f} %',
+                f'{plain(1e3 * sampling.longest_step)} ms',
                 recording.clock,
             )
         )
