@@ -262,25 +262,15 @@ class Constraints:
         return totals, gradients
 
     def _torque(self, motion: Motion) -> Part:
-        arm, limits = self.problem.arm, self.problem.limits
-        torque = arm.joint_torque(motion)
-        unit = np.ones(len(limits.joints))
-        most = np.where(np.isfinite(limits.torque), unit, np.inf)
-        limited, totals, signed = self._between(torque / limits.torque, -most, most, unit)
-        of_torque = np.zeros((len(limited), *torque.shape))
-        of_torque[np.arange(len(limited)), :, limited] = (
-            signed / limits.torque[limited, np.newaxis]
-        )
+        arm, limit = self.problem.arm, self.problem.limits.torque
+        limited, totals, weights = self._between(arm.joint_torque(motion), -limit, limit, limit)
 
         def gradients() -> FloatArray:
-            slopes = torque_slopes(arm, motion)
-            result = np.empty((len(limited), motion.n_joints, self.basis[0].shape[1]))
-            for row, weights in enumerate(of_torque):
-                result[row] = sum(
-                    (weights[:, np.newaxis] @ by)[:, 0].T @ basis
-                    for by, basis in zip(slopes, self.basis, strict=True)
-                )
-            return result
+            parts = [
+                np.einsum('lk,klm,kc->lmc', weights, by[:, limited], basis, optimize=True)
+                for by, basis in zip(_torque_slopes(arm, motion), self.basis, strict=True)
+            ]
+            return np.asarray(np.sum(parts, axis=0))
 
         return totals, gradients
 
@@ -328,15 +318,9 @@ class Constraints:
         return (largest + np.log(total) / self.sharpness)[..., 0], weights / total
 
 
-def torque_slopes(arm: ArmModel, motion: Motion) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """
-    Return derivatives of the joint torque by q, dq and ddq, shape (N, n, n) each.
-
-    Element [k, j, m] is the derivative of the torque of joint j by joint m in sample k. The
-    directions of dry friction, its states of presliding, and the twist between motors and links
-    are held constant.
-
-    """
+def _torque_slopes(arm: ArmModel, motion: Motion) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return derivatives of the joint torques by q, dq and ddq, shape (N, n, n) each."""
+    # directions of dry friction, states of presliding and twists of springs are held constant
     action = arm.along(motion).action()
     by_q, by_dq, by_ddq = arm.link_slopes(motion)
     if action.damping is not None:
