@@ -212,6 +212,6 @@ def _of_verification(verification: Verification, misfits: bool) -> Iterator[Caut
         yield (
             'Encoder noise biases parameters by up to '
             f'{digits(size)} standard deviations, which the intervals do not include.',
-            'Lower the cut-off of the position filter (--cutoff), or move faster: encoder noise biases '
-            'parameters.',
+            'Lower the cut-off of the position filter (--cutoff), or move faster: encoder noise '
+            'biases parameters.',
         )

@@ -113,6 +113,7 @@ class OnlineIdentifier:
             )
         self.arm, self.settings = arm, settings
         self.base: BaseParameters = arm.base_parameters(rng)
+        self._kept = np.array([-1, *self.base.independent]) + 1  # torque and base columns
         self._searches = settings.false_alarm_time is not None  # for changes, at any time
         self._data = robot.model.createData()
         held = {joint for e in arm.effects if e.holds_at_rest for joint in e.joints}
