@@ -29,7 +29,7 @@ from armid_ros.diagnosis.verdict.remaining_misfit import (
 )
 from armid_ros.diagnosis.verdict.remarks import data_remarks, doubt_of_model, with_doubt
 from armid_ros.diagnosis.verdict.where import locate_explained, locate_remaining_gap
-from armid_ros.diagnosis.verdict.words import decide, names_and_places
+from armid_ros.diagnosis.verdict.words import decide, names_and_places, percent
 from armid_ros.errors import IdentificationError
 from armid_ros.estimate import name_in_words
 from armid_ros.identification.assess.data_faults import check_data, mistaken_recordings
@@ -265,11 +265,18 @@ def _as_diagnosis(
     explainer.tell(1.0, word.word)
     share = settings.thresholds.headline
     small = [one for one in found if settings.everything and one.share < share]
-    remarks = _remarks(found, minor, worse, explanation, word.word, doubt, explainer)
+    remarks = _remarks(found, worse, explanation, word.word, doubt, explainer)
+    large = [one for one in minor if one.share > settings.thresholds.open_share]
+    contradicted = word.word == 'unknown' and unseen is not None and bool(large)
+    contradiction = [
+        f'The held-out recordings contradict {names_and_places([one])}, which explains '
+        f'{percent(one.share)} of the others.'
+        for one in large[:contradicted]
+    ]
     untested = explanation.untested if before is not None else ''
     return Diagnosis(
         verdict=word.word,
-        summary=' '.join([word.summary, *remarks]),
+        summary=' '.join([*(contradiction or [word.summary]), *remarks]),
         findings=tuple(one for one in found if one not in small),
         minor=(*small, *minor),
         where=places or locate_blocked_joints(arm, resting),
@@ -285,6 +292,7 @@ def _as_diagnosis(
         harmful=bool(found and worse),
         doubt=doubt,
         not_repeating=not_repeating,
+        contradicted=contradicted,
     )
 
 
@@ -334,20 +342,15 @@ def _not_visible(
 
 def _remarks(
     found: Sequence[Finding],
-    minor: Sequence[Finding],
     worse: Sequence[str],
     explanation: Explanation,
     verdict: str,
     doubt: str,
     explainer: Explainer,
 ) -> list[str]:
-    """Return notes on contradictions, an unpatched or doubtful model, and unchecked joints."""
+    """Return notes: on a model that may be wrong or is not patched, and on unchecked joints."""
     names = ' and '.join(name_in_words(one.name) for one in found)
-    large = [one for one in minor if one.share > explainer.settings.thresholds.open_share]
-    contradicted = names_and_places(large[:1]) if large and explainer.held_out else ''
     remarks = {
-        f'The held-out recordings contradict {contradicted}: with --validate, give recordings '
-        'since the change only.': bool(contradicted) and verdict == 'unknown',
         f'The model is not patched: {names} would make it worse in {", ".join(worse)}.': worse,
         explanation.untested: verdict == 'unknown',
         doubt: verdict != 'consistent',  # then it precedes the verdict

@@ -227,7 +227,7 @@ class Fitness:
                 height, what = height - self.floor.height, 'floor'
             side = 'above' if height >= 0.0 else 'below'
             parts.append(
-                f'lowest point {abs(height):.3f} m {side} the {what} ({self.lowest.link})'
+                f'lowest checked point {abs(height):.3f} m {side} the {what} ({self.lowest.link})'
             )
         near = ', '.join(parts)
         found = [f'{text[0].upper()}{text[1:]}.' for text in (limits, near) if text]

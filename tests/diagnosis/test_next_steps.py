@@ -23,6 +23,7 @@ def diagnosis(name, joints, rivals=(), verdict='named', effects=(), given=()):
         not_visible=(),
         doubt='',
         harmful=False,
+        contradicted=False,
         not_checked=(),
         arm=SimpleNamespace(effects=effects),
         explanation=SimpleNamespace(given=SimpleNamespace(effects=given)),

@@ -53,7 +53,9 @@ def next_steps(
             'Check the recording with armid inspect. Correct it or the description, and '
             'diagnose again.'
         )
-    if verdict in ('unknown', 'partial'):
+    if diagnosis.contradicted:
+        steps.append('With --validate, give only recordings since the change, and diagnose again.')
+    elif verdict in ('unknown', 'partial'):
         steps += [f'Look for a cause at {w.joint}: {w.signature}.' for w in diagnosis.left]
         option = '' if learned else '--residual gp, which learns that torque as a map'
         if diagnosis.baseline != OWN_MISFIT:

@@ -306,6 +306,8 @@ class Diagnosis:
         Seconds of each recording in which the findings act; empty if they act throughout.
     not_repeating : tuple of str
         Joints whose torque differs between equal periods, the largest difference first.
+    contradicted : bool
+        Whether held-out recordings contradict an effect that explains the others.
 
     """
 
@@ -327,6 +329,7 @@ class Diagnosis:
     doubt: str = ''
     spans: tuple[Span, ...] = ()
     not_repeating: tuple[str, ...] = ()
+    contradicted: bool = False
 
     @property
     def estimate(self) -> Estimate | None:

@@ -61,8 +61,8 @@ def verdict(found: Reproduction) -> VerdictSection:
             continue
         held &= bool(gravity.mean() <= 1.0)  # % of the peak
         lines += [
-            f'Mean torque error {digits(float(noisy.mean()))} % of the peak torque, '
-            f'{digits(float(paper.mean()))} % in the paper: {name}.',
+            f'{name}: mean torque error {digits(float(noisy.mean()))} % of the peak torque; '
+            f'the paper has {digits(float(paper.mean()))} %.',
             f'Without torque noise it is {digits(float(gravity.mean()))} % with gravity alone, '
             f'{digits(float(dynamics.mean()))} % with the full dynamics.',
         ]
@@ -71,7 +71,7 @@ def verdict(found: Reproduction) -> VerdictSection:
         f'hand; {LOAD:g} kg was simulated.'
     )
     grade = ('reproduced', 'good') if held else ('in part', 'fair')
-    return VerdictSection(*grade, lines)
+    return VerdictSection(*grade, lines, step='Compare each row of the tables below.')
 
 
 def _load(found: Reproduction) -> str:

@@ -335,7 +335,6 @@ def gap_bars(diagnosis: Diagnosis, gap: Gap) -> BarChart:
     roles: list[tuple[Role, str, FloatArray]] = [
         ('before', 'given model', gap.before),
         ('after', 'with the named cause' if diagnosis.findings else 'error', gap.after),
-        ('floor', 'usual error', gap.floor),
     ]
     roles = roles if diagnosis.findings else roles[1:]
     rows, first = [], roles[0][2]
@@ -345,9 +344,12 @@ def gap_bars(diagnosis: Diagnosis, gap: Gap) -> BarChart:
             rows.append((name, [Bar(0.0, 'floor', 'not judged')]))
             continue
         unit, least = robot.torque_units[joint], max(float(gap.floor[joint]), 1e-12)
-        bars = [
-            Bar(float(errors[joint]) / least, role, f'{digits(float(errors[joint]))} {unit}')
-            for role, _, errors in roles
-        ]
+        bars = [Bar(1.0, 'floor', '')]
+        for role, _, errors in reversed(roles):
+            error, ratio = float(errors[joint]), float(errors[joint]) / least
+            bars.insert(
+                0, Bar(ratio, role, f'{digits(ratio)} times usual ({digits(error)} {unit})')
+            )
         rows.append((name, bars))
-    return BarChart(rows, [(role, label) for role, label, _ in roles])
+    legend = [(role, label) for role, label, _ in roles]
+    return BarChart(rows, [*legend, ('floor', 'usual error of the joint')])

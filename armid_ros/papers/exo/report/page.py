@@ -74,7 +74,7 @@ def verdict(found: Sequence[Interaction], walked: SimulatedWalk | None) -> Verdi
     if walked is not None:
         errors = ', '.join(f'{one.right.joint} {one.right.most:.2g}°' for one in walked.driven)
         sentences.append(
-            f'Largest error of a joint that its torque drives, over a gait cycle: {errors}.'
+            f'Largest error of joints driven by their computed torques, in a gait cycle: {errors}.'
         )
     beware = (
         [f'{", ".join(weak)}: the strap extension is too small for an accuracy of 10 %.']
@@ -84,8 +84,9 @@ def verdict(found: Sequence[Interaction], walked: SimulatedWalk | None) -> Verdi
     if stiffness - reach <= 0.0:
         return VerdictSection('no interaction', 'fair', ['No interaction was identified.'], beware)
     sure = reach < _MAX_HALF_WIDTH * stiffness
+    step = 'Use the stiffness of each strap in exo.json; its interval is 95 %.'
     return VerdictSection(
-        'found' if sure else 'uncertain', 'good' if sure else 'fair', sentences, beware
+        'found' if sure else 'uncertain', 'good' if sure else 'fair', sentences, beware, step=step
     )
 
 
