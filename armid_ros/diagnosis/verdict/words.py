@@ -94,12 +94,13 @@ def decide(
             text = f'No effect in the catalogue explains {error}. It is {size}.'
             text += f' Best candidate: {small}' if small else ''
             return Verdict('unknown', f'{text} {refit}'.rstrip())
+        error = 'the error'
         if gap is not None:
             largest = int(np.argmax(ratio))
-            number = f' ({gap.after[largest]:.2g} {units[largest]} in {joints[largest]})'
+            error += f' of {joints[largest]} ({gap.after[largest]:.2g} {units[largest]})'
         changed = 'No change was found' if above else 'Nothing changed'
-        text = f'{changed}: the model' if known and not refit else 'The model'
-        text += f' explains the recordings. The remaining error{number} {at_floor}'
+        lead = changed if known and not refit else 'The model explains the recordings'
+        text = f'{lead}: {error} {at_floor}'
         text += f', or too small to matter. {small}' if small else '.'
         return Verdict('consistent', f'{refit}{text}')
     causes = _sentences(findings)
