@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Test for changes: a quadratic form, its tail probability, and multiple-test corrections."""
+"""Tests for changes: tail probabilities, change points, and multiple-test corrections."""
 
 from __future__ import annotations
 
@@ -13,38 +13,6 @@ from scipy import special, stats
 
 #: Median of a squared standard normal variable [-].
 MEDIAN_SQUARE = float(stats.chi2(1).median())
-
-
-def quadratic_form(
-    score: FloatArray, information: FloatArray, tolerance: float
-) -> tuple[FloatArray, npt.NDArray[np.intp]]:
-    """
-    Return s^T S^+ s for scores s with covariance S (S^+: pseudo-inverse), and the rank of S.
-
-    Parameters
-    ----------
-    score : ndarray, shape (..., p)
-        Scores s.
-    information : ndarray, shape (..., p, p)
-        Covariance S of the scores, symmetric.
-    tolerance : float
-        Share of the largest eigenvalue below which an eigenvalue counts as zero.
-
-    Returns
-    -------
-    squares, rank : ndarray, shape (...)
-        Twice the logarithm of the likelihood ratio, and its degrees of freedom.
-
-    """
-    if score.shape[-1] == 1:  # the eigenvalue of a 1 x 1 matrix is its element
-        sizes, along = information[..., 0], score
-    else:
-        sizes, vectors = np.linalg.eigh(information)
-        along = np.einsum('...pk,...p->...k', vectors, score)
-    kept = sizes > tolerance * np.maximum(sizes[..., -1:], 0.0)
-    with np.errstate(over='ignore'):
-        parts = np.divide(along**2, sizes, where=kept, out=np.zeros_like(along))
-    return np.asarray(parts.sum(axis=-1)), np.asarray(kept.sum(axis=-1))
 
 
 def tail(
@@ -70,7 +38,17 @@ def tail(
 
 
 def limits(chance: float, rank: FloatArray, freedom: FloatArray) -> FloatArray:
-    """Return the threshold that a quadratic form exceeds by chance with the given probability."""
+    """
+    Return the thresholds that quadratic forms exceed by chance with a given probability, (k,).
+
+    Parameters
+    ----------
+    chance : float
+        Probability that the quadratic form exceeds its threshold, if nothing changed.
+    rank, freedom : ndarray, shape (k,)
+        Degrees of freedom of each quadratic form, and of its noise variance.
+
+    """
     # Fisher's distribution by the beta distribution, as scipy.stats takes ten times as long
     share = special.betaincinv(0.5 * freedom, 0.5 * rank, chance)
     return np.asarray(freedom * (1.0 - share) / share)

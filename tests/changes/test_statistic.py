@@ -2,20 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """The one test of changes: its statistic, its distribution and its correction for many."""
 
-from armid_ros.changes.statistic import beyond_chance, limits, quadratic_form, tail, two_means
+from armid_ros.changes.statistic import beyond_chance, limits, tail, two_means
 import numpy as np
 import pytest
 from scipy import stats
-
-
-def test_the_quadratic_form_is_the_gain_of_least_squares():
-    rng = np.random.default_rng(0)
-    rows, y = rng.normal(size=(20, 3)), rng.normal(size=20)
-    rows[:, 2] = rows[:, 0] - rows[:, 1]  # a sum that shows nothing of its own
-    squares, rank = quadratic_form(rows.T @ y, rows.T @ rows, 1e-9)
-    left = y - rows @ np.linalg.lstsq(rows, y)[0]
-    assert squares == pytest.approx(y @ y - left @ left)
-    assert rank == 2
 
 
 def test_limits_are_exceeded_as_often_as_they_say():

@@ -28,7 +28,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 import re
 
-from armid_ros.changes.statistic import beyond_chance, quadratic_form, tail
+from armid_ros.changes.statistic import beyond_chance, tail
 from armid_ros.errors import ModelError
 from armid_ros.estimate import ParameterName
 from armid_ros.identification.assess.comparison import (
@@ -194,24 +194,19 @@ def _common_change(
     std = np.sqrt(np.diag(covariance))
     if not np.all(std > 0.0):
         return difference, covariance, 1.0
-
-    def distance(rows: FloatArray) -> tuple[float, int]:
-        """Return the sum of squared Mahalanobis distances of rows, and the covariance's rank."""
-        correlation = covariance / np.outer(std, std)
-        with np.errstate(over='ignore'):
-            squares, rank = quadratic_form(rows / std, correlation, _ROUNDING)
-            return float(squares.sum()), int(rank.max())
-
-    # the covariance of noise is multiplied by the excess scatter between recordings
+    sizes, axes = np.linalg.eigh(covariance / np.outer(std, std))
+    kept = sizes > _ROUNDING * sizes[-1]
+    white = axes[:, kept] / np.sqrt(sizes[kept]) / std[:, np.newaxis]
+    rank = int(kept.sum())
     scatters = [one.scatter_of(names) for one in files]
-    inflation = 1.0
-    if sum(map(len, scatters)):
-        squares, rank = distance(np.concatenate(scatters))
-        inflation = max(1.0, squares / rank)
-    squares, rank = distance(difference[np.newaxis])
     freedom = sum(max(len(scatter) - 1, 0) for scatter in scatters)
-    known = np.inf if inflation <= 1.0 else rank * freedom
-    return difference, inflation * covariance, float(tail(squares / inflation, rank, known))
+    with np.errstate(over='ignore'):
+        # the covariance of noise is multiplied by the excess scatter between recordings
+        excess = float(np.sum((np.concatenate(scatters) @ white) ** 2)) / rank
+        square = float(np.sum((difference @ white) ** 2))
+    inflation = max(1.0, excess)
+    known = np.inf if excess <= 1.0 else rank * freedom
+    return difference, inflation * covariance, float(tail(square / inflation, rank, known))
 
 
 def _find_load(
