@@ -87,7 +87,7 @@ class RecursiveLeastSquares:
     noise_is_relative : bool
         Whether the noise is known up to a factor only.
     samples : int
-        Samples used since the last reset.
+        Number of samples used.
 
     """
 
@@ -116,17 +116,21 @@ class RecursiveLeastSquares:
             )
         self.noise_is_relative = scale_covariance
         count = len(parameters)
-        values = np.zeros(count) if start is None else np.asarray(start, dtype=np.float64)
-        self._start = values
-        self.reset()
+        self._start = np.zeros(count) if start is None else np.asarray(start, dtype=np.float64)
+        self._take(np.asfortranarray(np.eye(count) / PRIOR_STD), self._start)
+        self._squares = 0.0
+        # the first P observations are fitted exactly and contain no information on noise
+        self._freedom = -float(count)
 
     def with_more(self, parameters: tuple[ParameterName, ...]) -> RecursiveLeastSquares:
-        """Return a restarted estimator with additional parameters, which start at 0."""
-        wider = copy(self)
-        wider.parameters = self.parameters + parameters
-        wider._start = np.concatenate([self._start, np.zeros(len(parameters))])
-        wider.reset()
-        return wider
+        """Return a new estimator with additional parameters, which start at 0."""
+        return RecursiveLeastSquares(
+            self.parameters + parameters,
+            self._noise,
+            forgetting=self._forgetting,
+            start=np.concatenate([self._start, np.zeros(len(parameters))]),
+            scale_covariance=self.noise_is_relative,
+        )
 
     def restricted(self, count: int) -> RecursiveLeastSquares:
         """Return the estimator of the first `count` parameters; the others are fixed to zero."""
@@ -137,15 +141,6 @@ class RecursiveLeastSquares:
         fewer._squares += float(np.sum(right[count:] ** 2))
         fewer._freedom += len(self.parameters) - count
         return fewer
-
-    def reset(self) -> None:
-        """Forget all samples, and return to the prior mean."""
-        self.samples = 0
-        root = np.asfortranarray(np.eye(len(self._start)) / PRIOR_STD)
-        self._take(root, self._start)
-        self._squares = 0.0
-        # the first P observations are fitted exactly and contain no information on noise
-        self._freedom = -float(len(self._start))
 
     def update(
         self,
