@@ -17,6 +17,7 @@ from typing import Any
 from armid_ros.errors import RecordingError
 from armid_ros.motion import FloatArray, Temperatures
 from armid_ros.recording.bag import Bag
+from armid_ros.recording.message_types import header_stamp
 from armid_ros.recording.recording import Recording
 from armid_ros.recording.source import Topic
 from armid_ros.recording.writer import BagWriter
@@ -126,10 +127,9 @@ def _readings(bag: Bag, topic: Topic, recording: Recording) -> Iterator[tuple[st
                 continue
             last[frame] = received
             message = bag.decoded(topic, cdr)
-            stamp = message.header.stamp.sec * 10**9 + message.header.stamp.nanosec
-            stamp = stamp if stamp and recording.clock == 'header' else received
+            sent = header_stamp(cdr) if recording.clock == 'header' else 0
             for name, value in _named(message, topic, recording.joints):
-                yield name, stamp, value
+                yield name, sent or received, value
 
 
 def _named(message: Any, topic: Topic, joints: Sequence[str]) -> Iterator[tuple[str, float]]:
