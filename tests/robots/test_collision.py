@@ -15,6 +15,7 @@ from tests.clearance import path_clearance
 
 TABLE = '<collision><origin xyz="0 0 -1"/><geometry><box size="4 4 1.6"/></geometry></collision>'
 BALL = '<sphere radius="0.05"/>'
+CAPSULE = '<capsule radius="0.05" length="0.2"/>'
 DUMBBELL = ((0.0, 0.2, 0.3), (0.2, 0.8, 0.1), (0.8, 1.0, 0.3))  # from, to, width [m]
 
 
@@ -77,17 +78,12 @@ def distance(model: CollisionModel, *q: float) -> float:
 
 class TestDistances:
     @pytest.mark.parametrize('angle', [0.0, -0.3, 0.3])
-    def test_a_ball_above_or_within_a_table(self, angle: float) -> None:
-        model = collision_model(robot_from_urdf(arm()))
-        height = np.sin(-angle) * 1.0 + 0.2  # the top of the table is at z = -0.2
+    @pytest.mark.parametrize(('hand', 'half'), [(BALL, 0.0), (CAPSULE, 0.1)])
+    def test_a_hand_above_or_within_a_table(self, hand: str, half: float, angle: float) -> None:
+        model = collision_model(robot_from_urdf(arm(hand)))
+        height = np.sin(-angle) - half * np.cos(angle) + 0.2  # the top of the table is at z = -0.2
         assert distance(model, angle, 0.0) == pytest.approx(height - 0.05, abs=1e-4)
         assert model.pairs == (('base', 'lower'),)
-
-    def test_a_capsule_reaches_as_far_as_its_lower_end(self) -> None:
-        capsule = '<capsule radius="0.05" length="0.2"/>'
-        model = collision_model(robot_from_urdf(arm(hand=capsule)))
-        end = np.sin(0.3) - 0.1 * np.cos(0.3)
-        assert distance(model, -0.3, 0.0) == pytest.approx(end + 0.2 - 0.05, abs=1e-4)
 
     def test_a_robot_without_collision_bodies_is_always_free(self) -> None:
         bare = arm(base='').replace(f'<collision>{at_tip(BALL)}</collision>', '')

@@ -55,11 +55,9 @@ def test_vibration_has_the_frequency_of_the_linear_system_at_1_khz() -> None:
     """One substep of 1 ms, 16 samples a period: what is left is a few 1e-5."""
     plant = two_link_plant(lossless(), substeps=1)
     q = np.array([0.0, np.pi / 2])
-    arm = SHIPPED.parameters
-    inertia = np.diag([*arm.rotor, 0.0, 0.0])
-    coupling = arm.gamma * np.cos(q[1])
-    inertia[2:, 2:] = arm.beta + coupling * np.array([[2.0, 1.0], [1.0, 0.0]])
-    inertia[2, 2] += arm.alpha
+    arm, coupling = SHIPPED.parameters, SHIPPED.parameters.gamma * np.cos(q[1])
+    inertia = np.diag([*arm.rotor, arm.alpha, 0.0])
+    inertia[2:, 2:] += arm.beta + coupling * np.array([[2.0, 1.0], [1.0, 0.0]])
     spring = np.kron([[1.0, -1.0], [-1.0, 1.0]], np.diag(arm.stiffness))
     squared, shapes = np.linalg.eig(np.linalg.solve(inertia, spring))
     highest = int(np.argmax(squared))
