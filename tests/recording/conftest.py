@@ -8,7 +8,6 @@ from armid_ros.recording import BagWriter, Recording
 from armid_ros.recording.bag import Bag
 from armid_ros.recording.joint_state.encoder import joint_state_cdr
 from armid_ros.recording.message_types import JOINT_STATE
-from armid_ros.recording.source import DEFAULT
 import numpy as np
 import pytest
 
@@ -55,9 +54,9 @@ def sqlite_bag(path, messages, columns=', offered_qos_profiles TEXT'):
     return database
 
 
-def iter_raw(path, settings=DEFAULT):
+def iter_raw(path):
     """Yield all messages of a bag as raw CDR."""
-    with Bag(path, settings) as bag:
+    with Bag(path) as bag:
         yield from bag.messages()
 
 
