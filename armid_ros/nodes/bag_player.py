@@ -25,7 +25,6 @@ from armid_ros.robots import robot_from_urdf
 import numpy as np
 from rclpy.clock import Clock, ClockType
 from rclpy.duration import Duration
-from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.serialization import deserialize_message
 from rclpy.time import Time
@@ -38,8 +37,8 @@ from trajectory_msgs.msg import JointTrajectory
 class _JumpGuard:
     """Guard that passes a recorded trajectory only if it starts at the measured position."""
 
-    def __init__(self, node: Node, tolerance: float, timeout: float) -> None:
-        self.tolerance, self.timeout = tolerance, timeout
+    def __init__(self, node: ArmidNode) -> None:
+        self._node = node
         self.latest: dict[tuple[str, ...], tuple[JointState, float]] = {}
         self._limits: dict[str, float] = {}
         self._states = node.create_subscription(
@@ -67,7 +66,8 @@ class _JumpGuard:
             q = np.array([known.get(joint, np.nan) for joint in joints])
             new = np.isfinite(q)
             measured[new], seen[new] = q[new], arrived
-        lost = staleness(joints, seen, time.monotonic(), self.timeout)
+        timeout, tolerance = map(self._node.value, ('state_timeout', 'start_tolerance'))
+        lost = staleness(joints, seen, time.monotonic(), timeout)
         if lost:
             return f'trajectory: {self._states.topic_name}: {lost}; arm position unknown'
         speeds = reference.dq
@@ -78,7 +78,7 @@ class _JumpGuard:
         limits = [self._limits.get(joint, np.inf) for joint in joints]
         fastest = np.where(np.isfinite(limits), limits, top)
         first = (float(reference.t[0]), reference.q[0])
-        fault = jump_fault(joints, first, measured, fastest, self.tolerance)
+        fault = jump_fault(joints, first, measured, fastest, tolerance)
         return f'trajectory: {fault}; bring the arm to its first point' if fault else ''
 
     def _on_joint_states(self, message: JointState) -> None:
@@ -158,10 +158,7 @@ class BagPlayerNode(ArmidNode):
         self._descriptions = {n for n in types if n.endswith('robot_description')}
         self._states = self.resolve_topic_name('joint_states')
         self._has_states = any(self.resolve_topic_name(n) == self._states for n in types)
-        self._guard: _JumpGuard | None = None
-        if self._trajectories:
-            limits = self.value('start_tolerance'), self.value('state_timeout')
-            self._guard = _JumpGuard(self, *limits)
+        self._guard = _JumpGuard(self) if self._trajectories else None
         self._messages = self._read_messages()
         self._next: RawMessage | None = None
         self._read_next()
@@ -234,12 +231,9 @@ class BagPlayerNode(ArmidNode):
             )
 
     def changed(self, names: frozenset[str]) -> None:
-        """Apply changed parameters: rate of /clock, and limits for trajectories."""
+        """Apply a changed rate of /clock."""
         if 'clock_rate' in names:
             self._set_clock_rate()
-        if self._guard is not None:
-            self._guard.tolerance = self.value('start_tolerance')
-            self._guard.timeout = self.value('state_timeout')
 
     def _set_clock_rate(self) -> None:
         rate = self.value('clock_rate')
