@@ -214,21 +214,14 @@ class LearnedTorque(Effect):
         maps = tuple(TorqueMap.of_document(found[joint], joint) for joint in self.joints)
         return replace(self, maps=maps)
 
-    def torque(self, robot: Robot, q: FloatArray, dq: FloatArray) -> FloatArray:
-        """Return the learned torque (..., n) of all joints, zero for those without a map [N m]."""
-        tau = np.zeros(np.shape(q))
-        if self.maps:
-            loads = any(own.takes_load for own in self.maps)
-            load = holding_torque(robot, q) if loads else np.zeros(np.shape(q))
-            inputs = np.stack([q, dq, load], axis=-1)
-            for joint, own in zip(self.indices(robot.joints), self.maps, strict=True):
-                tau[..., joint] = own.torque(inputs[..., joint, :])
-        return tau
-
     def columns(self, motion: Motion, arm: Arm) -> FloatArray:
         """Return the learned torque of each joint as a regressor column, (N, n, P) [N m]."""
-        link = arm.link_motion(motion)
-        return joint_columns(self, motion, self.torque(arm.body, link.q, link.dq))
+        link, tau = arm.link_motion(motion), np.zeros_like(motion.q)
+        if self.maps:
+            inputs = np.stack([link.q, link.dq, holding_torque(arm.body, link.q)], axis=-1)
+            for joint, own in zip(self.indices(motion.joints), self.maps, strict=True):
+                tau[:, joint] = own.torque(inputs[:, joint])
+        return joint_columns(self, motion, tau)
 
 
 def scaled_inputs(inputs: FloatArray, knee: float) -> FloatArray:
