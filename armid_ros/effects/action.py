@@ -56,7 +56,7 @@ class DryFriction:
     upper: FloatArray
     load_share: FloatArray | None = None
 
-    def torque(self, dq: FloatArray, load: FloatArray | None = None) -> FloatArray:
+    def torque(self, dq: FloatArray, load: FloatArray) -> FloatArray:
         """
         Return the friction torque of each joint; at rest it is the mean of both levels.
 
@@ -64,13 +64,12 @@ class DryFriction:
         ----------
         dq : ndarray, shape (..., n)
             Joint velocities.
-        load : ndarray, shape (..., n), optional
-            Torque of the rigid body [N m], if friction depends on it.
+        load : ndarray, shape (..., n)
+            Torque of the rigid body [N m].
 
         """
-        half, middle = (self.upper - self.lower) / 2, (self.upper + self.lower) / 2
-        if load is not None:
-            half = half + self.widening(load)
+        half = (self.upper - self.lower) / 2 + self.widening(load)
+        middle = (self.upper + self.lower) / 2
         return np.asarray((half * np.sign(dq @ self.directions.T) + middle) @ self.directions)
 
     def largest(self, load: FloatArray) -> FloatArray:
