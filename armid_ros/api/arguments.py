@@ -72,7 +72,7 @@ def arm_of(arm: RobotLike, effects: str = USUAL) -> ArmModel:
 
 
 def with_effects(arm: ArmModel, names: str) -> ArmModel:
-    """Add those of the named effects, separated by commas, that the arm does not have yet."""
+    """Add the named effects (separated by commas) to an arm, except effects that it has."""
     for name in filter(None, parted(names)):
         effect = make_effect(name, arm.robot)
         if (effect.name, effect.joints) not in [(own.name, own.joints) for own in arm.effects]:
