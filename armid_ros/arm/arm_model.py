@@ -368,7 +368,7 @@ class ArmModel:
         return np.asarray(by_q @ change.q + by_dq @ change.dq + by_ddq @ change.ddq)
 
     def torque_before(self, effect: Effect, motion: Motion) -> FloatArray:
-        """Return the torque that a sensor effect turns into a reading, shape (N, n) [N m]."""
+        """Return the torque at the input of a sensor effect, along a motion, (N, n) [N m]."""
         tau = self.joint_torque(motion)
         for own, values in self._readings:
             if own == effect:

@@ -244,7 +244,7 @@ def add_effect(arm: ArmModel, effect: Effect, values: FloatArray) -> ArmModel:
 
 
 def _find_effect(arm: ArmModel, effect: Effect) -> tuple[int, list[int]] | None:
-    """Return the index of an effect in the arm and those of its parameters, or None."""
+    """Return the indices of an effect of an arm and of its parameters; None if missing."""
     wanted = [(p.name, p.joint) for p in effect.parameters(arm.robot)]
     for position, own in enumerate(arm.effects):
         if isinstance(effect, type(own)) and not own.shapes and not own.points:
