@@ -262,7 +262,7 @@ def without_days(series: Sequence[ParameterHistory]) -> list[ParameterHistory]:
 
 
 def _largest_change(series: ParameterHistory, spread: Spread) -> HistoryChange:
-    """Return the largest step of a parameter over time, or its trend if this fits as well."""
+    """Return the largest step of a parameter over time, or the trend if it fits as well."""
     split, count = _splits(series, spread), len(series.values)
     scores, trend = split.scores / spread.steps, split.trend / spread.trends
     best = int(np.argmax(scores))
