@@ -212,7 +212,7 @@ def diagnose(
 
 
 def _identified_from(model: Path, diagnosed: list[Path]) -> tuple[Path, ...]:
-    """Return the recordings that gave a model; empty if one of them is diagnosed."""
+    """Return the recordings that a model was identified from; empty if one is diagnosed."""
     from armid_ros.identification.output import identified_from, require_as_identified
 
     found = identified_from(model)

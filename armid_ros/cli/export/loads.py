@@ -109,7 +109,7 @@ def load_of(arm: ArmModel, joint: str | None = None, frame: str | None = None) -
 
 
 def _flange(joint: str, links: Collection[str]) -> str:
-    """Return the link whose name ends in tool0 or flange, or else the only one."""
+    """Return the link whose name ends in tool0 or flange; without one, the only given link."""
     # names that ROS-Industrial gives to the frame of a flange, after the prefix of an arm
     usual = [link for name in ('tool0', 'flange') for link in links if link.endswith(name)]
     if not usual and len(links) != 1:
