@@ -159,7 +159,7 @@ def diagnose(
 
 
 def _hardly_explained(result: Diagnosis, settings: DiagnosisSettings) -> bool:
-    """Return whether a residual above its limit remains, or no finding explains half of it."""
+    """Return whether a gap remains open, or no finding explains more than half of the gap."""
     largest = max((one.share for one in result.findings), default=0.0)
     return result.verdict in OPEN or largest <= settings.thresholds.open_share
 
@@ -172,7 +172,7 @@ def _of_spans(
     notes: Sequence[str],
     doubt: str,
 ) -> Diagnosis | None:
-    """Diagnose only the seconds in which a cause acts; None if they remain unexplained."""
+    """Diagnose only the time in which a cause acts; None if its residual stays unexplained."""
     settings, arm, prepared = explainer.settings, explainer.arm, explainer.prepared
     ranking = explanation.ranking
     spans = () if ranking is None else acting_spans(ranking, settings.thresholds)

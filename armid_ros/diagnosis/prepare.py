@@ -150,7 +150,7 @@ def repaired(
     baseline: Sequence[Recording],
     settings: DiagnosisSettings,
 ) -> tuple[list[Recording], list[Recording], list[Recording], list[str]]:
-    """Remove damaged samples from all recordings; return them with notes on each damage."""
+    """Remove damaged samples; return the repaired recordings, with notes on each damage."""
     notes: list[str] = []
     whole: list[list[Recording]] = []
     for part in (recordings, validate, baseline):

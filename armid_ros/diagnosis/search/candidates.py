@@ -140,7 +140,7 @@ class Causes:
             yield from (one for one in members if (one.name, one.joints) not in self.fitted)
 
     def _single_causes(self, effect: Effect, singles: Sequence[Effect]) -> Iterator[Cause]:
-        """Yield a cause for each single-joint effect, from the `effect` on all these joints."""
+        """Yield a cause for each single-joint effect, from one effect on all joints."""
         robot, start = self.nuisance.arm.robot, 0
         places: list[tuple[Effect, tuple[int, ...], list[int]]] = []
         for one in singles:
@@ -390,7 +390,7 @@ def line_search(
 
 def without_measurement(part: Trajectory, arm: ArmModel) -> Trajectory:
     """
-    Return a trajectory whose measured torque is replaced by that of a model.
+    Return a trajectory in which the torque of a model replaces the measured torque.
 
     Columns that contain the measured torque would explain any residual.
 

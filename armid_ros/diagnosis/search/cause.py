@@ -72,7 +72,7 @@ class Cause:
         return np.ones_like(diagnosed) if self.always or self.effect.lasting else diagnosed
 
     def at(self, values: FloatArray, robot: Robot) -> NamedEffect:
-        """Return the effect with these fitted values; its other parameters are zero."""
+        """Return the effect with the given fitted values and all other parameters zero."""
         whole = np.zeros(len(self.effect.parameters(robot)))
         whole[list(self.kept)] = values
         return NamedEffect(self.effect, self.kept, whole)

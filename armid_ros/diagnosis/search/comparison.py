@@ -168,7 +168,7 @@ class CauseComparison:
         return accepted, nuisance
 
     def _exchange_causes(self, accepted: list[CauseResult], nuisance: Nuisance) -> Accepted:
-        """Replace a cause by several others that resemble it, if these are likelier."""
+        """Replace an accepted cause by several similar causes if the result is likelier."""
         # the last cause was selected with all others in the model
         for k, one in enumerate(accepted[:-1]):
             ranking = self.rank_all(nuisance.without_cause(k))

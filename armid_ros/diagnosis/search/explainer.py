@@ -162,7 +162,7 @@ class Explainer:
 
     def _explain_since_identification(self, written: Misfit) -> Explanation:
         """
-        Find changes since the identification, if only the size of its residual is known.
+        Find changes since the identification from the misfit alone, without the baseline.
 
         Without its recordings, any cause may explain a part of this misfit; see `fit_causes`.
 

@@ -87,12 +87,12 @@ class Explanation:
         return problem is not None and problem.patches_body and problem.hyperparameters.body > 0.0
 
     def without(self, *names: int) -> Explanation:
-        """Move the causes with these indices to the minor causes, and refit the other causes."""
+        """Move causes, given by index, to the minor causes, and refit all other causes."""
         fewer = self.only([k for k in range(len(self.steps)) if k not in names])
         return replace(fewer, minor=(*self.minor, *(self.steps[k] for k in names)))
 
     def only(self, keep: Sequence[int]) -> Explanation:
-        """Return the explanation with some of its causes, refitted, in the given order."""
+        """Return the explanation with only the given causes, refitted in the given order."""
         assert self.problem is not None
         fitted = self.problem.fit([self.fitted.named[k] for k in keep])
         return replace(self, fitted=fitted, steps=tuple(self.steps[k] for k in keep))

@@ -364,7 +364,7 @@ class Nuisance:
         return found
 
     def moments(self, posterior: NuisancePosterior) -> tuple[FloatArray, FloatArray]:
-        """Return mean and covariance of all parameters; zero for those that are not fitted."""
+        """Return mean and covariance of all parameters; zero for parameters not fitted."""
         size = self.cross.shape[1]
         covariance = np.zeros((size, size))
         covariance[np.ix_(posterior.used, posterior.used)] = posterior.root.T @ posterior.root

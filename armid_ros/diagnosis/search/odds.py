@@ -105,7 +105,7 @@ class CauseInformation:
         pooled: bool = False,
     ) -> CauseInformation:
         """
-        Compute the Fisher information on causes that have equally many values.
+        Compute the Fisher information on causes with the same number of parameters.
 
         Each recording is a group; with `pooled`, the baseline and the diagnosed recordings are.
 

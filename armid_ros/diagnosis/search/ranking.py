@@ -83,7 +83,7 @@ class CauseResult:
 @dataclass(frozen=True)
 class RankedCause:
     """
-    Candidate cause with its log Bayes factor against the model without it.
+    Candidate cause with its log Bayes factor against the model without the cause.
 
     Attributes
     ----------

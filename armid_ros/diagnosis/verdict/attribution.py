@@ -45,12 +45,12 @@ class Attribution:
     gains: FloatArray
 
     def share(self, names: Sequence[int]) -> float:
-        """Return the share of the squared residual that these causes explain, at most 1."""
+        """Return the share of the squared residual that given causes explain, at most 1."""
         share = self.gains[list(names)].sum() / max(float(self.gap.sum()), 1e-300)
         return min(float(share), 1.0)
 
     def interval(self, names: Sequence[int], rng: np.random.Generator) -> tuple[float, float]:
-        """Return the 95 % interval of the share that these causes explain together."""
+        """Return the 95 % interval of the share that given causes explain together."""
         # with 500 resamples, the ends of the interval are accurate to a tenth of its width
         drawn = rng.integers(len(self.gap), size=(500, len(self.gap)))
         gains = self.gains[list(names)].sum(axis=0)[drawn].sum(axis=1)
@@ -133,7 +133,7 @@ def cross_validated(explanation: Explanation) -> Attribution:
     remaining, order = list(range(len(named))), list[int]()
 
     def squared_residual(causes: Sequence[int]) -> FloatArray:
-        """Return the squared held-out residual (B,) of each block, with only these causes."""
+        """Return the squared held-out residual (B,) of each block, with given causes only."""
         others = [spans[n] for n in range(len(named)) if n not in causes]
         absent = [k for span in others for k in range(span.start, span.stop)]
         squares = []

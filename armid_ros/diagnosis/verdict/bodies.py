@@ -80,7 +80,7 @@ def on_outer_link(explanation: Explanation) -> Explanation:
 
 def as_bodies(explanation: Explanation) -> tuple[Explanation, tuple[str, ...]]:
     """
-    Replace physically impossible inertias by possible ones near the description.
+    Replace physically impossible inertias by possible inertias near the description.
 
     The links have to fit the data as well as before. If this is impossible, the explanation is
     unchanged.

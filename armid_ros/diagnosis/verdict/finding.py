@@ -49,7 +49,7 @@ class Rival:
 @dataclass(frozen=True)
 class Finding:
     """
-    Effect that a diagnosis names, with values, rivals and the share that it explains.
+    Effect that a diagnosis names, with values, rivals and the explained share of the gap.
 
     Attributes
     ----------
@@ -158,7 +158,7 @@ class Finding:
         return f'To separate {names}, record {best}.'
 
     def place_of(self, joint: str) -> str:
-        """Return the body segment of a tie on this joint; without tie, the joint itself."""
+        """Return the body segment that is tied at a joint; without a tie, the joint name."""
         return next((tie.name for tie in self.ties if tie.joint == joint), joint)
 
 

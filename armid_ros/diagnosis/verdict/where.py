@@ -97,7 +97,7 @@ class Excess:
 def locate_explained(
     explanation: Explanation, evidence: Evidence, settings: DiagnosisSettings
 ) -> tuple[Where, ...]:
-    """Describe the residual that the named causes explain, in the joints in which they act."""
+    """Describe the residual that the named causes explain, for each joint."""
     before, after = (
         evidence.residuals(one.arm) for one in (explanation.reference, explanation.fitted)
     )
@@ -113,7 +113,7 @@ def locate_remaining_gap(
     settings: DiagnosisSettings,
     new: npt.NDArray[np.bool_],
 ) -> tuple[Where, ...]:
-    """Describe the remaining residual of joints in which it exceeds the limit."""
+    """Describe the remaining residual of each joint whose residual exceeds the limit."""
     residual = evidence.residuals(explanation.fitted.arm)
     losses, limits = evidence.chi2_per_row(residual), evidence.limits(residual, settings)
     gap = np.where(new, losses, np.where(losses > limits, losses - 1.0, 0.0))

@@ -112,7 +112,7 @@ def decide(
 
 
 def _refit(given_body: Excess | None, robot: Robot, floor: str) -> str:
-    """Return a sentence on the refit of body and friction, if their given values fit badly."""
+    """Return a sentence on the refit of body and friction if the given values fit badly."""
     if given_body is None or given_body.ratio.max() <= 1.0:
         return ''
     worst = int(np.argmax(given_body.ratio))
@@ -132,7 +132,7 @@ def larger(ratio: float) -> str:
 
 
 def sentence(finding: Finding, of: str = DIFFERENCE) -> str:
-    """Return a sentence with a cause, its values, and the share that it explains."""
+    """Return a sentence with a cause, its values, and the explained share of the gap."""
     text = f'{_subject(finding)} explains {percent(finding.share)} of {of}.'
     return text[:1].upper() + text[1:]
 
