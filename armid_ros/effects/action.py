@@ -86,7 +86,7 @@ class DryFriction:
 
 def direction(motion: Motion, joints: Sequence[int] | None = None) -> FloatArray:
     """
-    Return the direction of motion (-1 to 1) of joints, or of a shaft that they share.
+    Return the direction of motion (-1 to 1) of joints or of their common shaft.
 
     Parameters
     ----------
@@ -185,7 +185,7 @@ class Action:
 
     def effort(self, motors: Motion, links: Motion, load: FloatArray) -> FloatArray:
         """
-        Return the motor torque needed in addition to that of the rigid body, (N, n) [N m].
+        Return the motor torque needed in addition to the rigid-body torque, (N, n) [N m].
 
         Parameters
         ----------
@@ -212,7 +212,7 @@ class Action:
 
 
 def law_derivatives(law: TorqueLaw, motion: Motion) -> tuple[FloatArray, FloatArray]:
-    """Return the derivatives (N, n, n) of a torque function by q, and those by dq."""
+    """Return the derivatives (N, n, n) of a torque function by q, and by dq."""
     n = motion.n_joints
     size = 1e-6  # of the differences [rad, m, rad/s or m/s]
     slopes = np.empty((2, len(motion), n, n))

@@ -413,7 +413,7 @@ class Arm(Protocol):
         """Return the true joint torques along a recorded motion, (N, n) [N m]."""
 
     def torque_before(self, effect: Effect, motion: Motion) -> FloatArray:
-        """Return the torque that a sensor effect turns into a reading, shape (N, n) [N m]."""
+        """Return the torque at the input of a sensor effect, along a motion, (N, n) [N m]."""
 
     def torque_change(self, motion: Motion, change: Displacement) -> FloatArray:
         """Return how the joint torques change with a small change of the links' motion."""

@@ -386,7 +386,7 @@ def parse_effect(text: str, robot: Robot) -> tuple[Effect, FloatArray]:
 
 
 def _number(text: str, effect: Effect, key: str, number: str) -> float:
-    """Convert the text of a value to a number; raise a ModelError if it is none."""
+    """Convert the text of a value to a number; raise a ModelError if the text is no number."""
     try:
         value = float(number)
     except ValueError:
