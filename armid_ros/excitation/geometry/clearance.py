@@ -27,7 +27,7 @@ IntArray = npt.NDArray[np.intp]
 @dataclass(frozen=True)
 class NearPairs:
     """
-    The m pairs of bodies that are close to each other in some of N poses.
+    The m occurrences of two bodies close to each other, in N poses.
 
     Attributes
     ----------

@@ -172,7 +172,7 @@ def with_obstacles(collision: CollisionModel, obstacles: Sequence[Obstacle]) -> 
 
 
 def obstacles_alone(collision: CollisionModel, obstacles: Sequence[Obstacle]) -> CollisionModel:
-    """Return a collision model that checks the arm against obstacles only, not itself."""
+    """Return a collision model that ignores contacts between links: obstacles only."""
     geometry = collision.geometry.copy()
     geometry.removeAllCollisionPairs()
     return with_obstacles(replace(collision, geometry=geometry), obstacles)
