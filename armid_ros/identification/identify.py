@@ -324,7 +324,7 @@ def _fitted(
     settings: IdentificationSettings,
     rng: np.random.Generator,
 ) -> tuple[BaseParameters, FittedValues]:
-    """Return the identifiable base parameters, and a fit of those that the data determine."""
+    """Return the identifiable base parameters, and a fit of those excited by the data."""
     base, problem, recordings, used = data
     method, rigid = settings.least_squares, len(arm.robot.rigid_parameters)
     refitted = False
@@ -351,7 +351,7 @@ def _fit_quasi_static(
     method: Method,
     rng: np.random.Generator,
 ) -> tuple[FittedValues, tuple[str, ...]]:
-    """Fit weight and friction to slow motions; inertia is as described. Return fit and notes."""
+    """Fit weight and friction to slow motions with described inertias; also return notes."""
     base, problem, recordings, used = data
     problem = exact_at(problem, torques(arm, recordings, used), base.values(arm.theta))
     free = unidentifiable_directions(arm, arm.base_parameters(rng))

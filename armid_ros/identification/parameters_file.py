@@ -138,7 +138,7 @@ class ParameterFile:
 
     def regrouped_as(self, other: ParameterFile) -> ParameterFile:
         """
-        Return these parameters, and the base parameters of another file that they determine.
+        Add the base parameters of another file that the parameters of this file determine.
 
         A motion with less excitation groups more standard parameters. Its base parameters are
         combinations of the base parameters of a motion with more excitation.

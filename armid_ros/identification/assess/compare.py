@@ -187,7 +187,7 @@ def _single_changes(
 def _common_change(
     before: ParameterFile, after: ParameterFile, names: Sequence[ParameterName]
 ) -> tuple[FloatArray, FloatArray, float]:
-    """Return parameter changes, their covariance, and the p-value if nothing has changed."""
+    """Return parameter changes, their covariance, and the p-value of no change."""
     files = before, after
     difference = np.array([after.values[name][0] - before.values[name][0] for name in names])
     covariance = sum((one.covariance_of(names) for one in files), np.zeros(()))

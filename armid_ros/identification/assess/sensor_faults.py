@@ -330,7 +330,7 @@ def held_elsewhere(
     robot: Robot, recordings: Sequence[Recording], motions: Sequence[Motion]
 ) -> Iterator[Fault]:
     """
-    Yield undriven joints that are away from their modelled position, if torques depend on it.
+    Yield undriven joints away from their modelled position, if that position affects torques.
 
     If such a joint moves, or carries driven joints at another position, the arm differs from the
     model. The size of this error is the change of the described torque along the recorded motions

@@ -123,7 +123,7 @@ class ScoreStatistics:
 
     def size(self, some: slice) -> tuple[FloatArray, FloatArray]:
         """
-        Return the estimated sizes of some changes, with their covariance for white noise.
+        Return the estimated sizes of selected changes, with their covariance for white noise.
 
         The variance of a change is infinite if this window alone does not determine the change.
 
@@ -292,7 +292,7 @@ class ChangeSearch:
         return Estimate(candidate.parameters, values, covariance * usual)
 
     def _find_onset(self, residual_scale: float) -> Pieces[FoundChange | None]:
-        """Return the change with its start and cause; None while these are ambiguous."""
+        """Return the change with start and cause; None while start or cause is ambiguous."""
         # difference of log-likelihoods from which one explanation is clearly better
         clear = 5.0
         rows, blocks = [], list(self._blocks)

@@ -309,7 +309,7 @@ def _fit_links(
 
 
 def _walls_reached(parameters: FloatArray, box: Box) -> list[str]:
-    """Return the limits of its box that a link with given inertial parameters reaches."""
+    """Return the sides of a link's bounding box that its mass distribution reaches."""
     width = box[1] - box[0]
     largest = np.concatenate([width, width, 0.25 * width**2]) * parameters[0]
     near = box_conditions(box) @ parameters < _ACTIVE_SHARE * largest
@@ -318,7 +318,7 @@ def _walls_reached(parameters: FloatArray, box: Box) -> list[str]:
 
 
 def _far_from_described(robot: Robot, masses: FloatArray) -> tuple[str, ...]:
-    """Return a note on links whose mass, (n,) [kg], is far from that described; empty if none."""
+    """Return a note on links whose mass [kg] differs much from the description; else empty."""
     # ratio of a mass to the described one above which a note is given
     heavy = 3.0
     described = robot.rigid_parameters[::PER_LINK]

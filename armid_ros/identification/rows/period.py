@@ -73,7 +73,7 @@ def refined_period(positions: FloatArray, lag: int, where: slice) -> float:
 
 
 def _mean_change(positions: FloatArray, lag: int, where: slice) -> float:
-    """Return the mean square difference between positions (N, n) and those a lag later."""
+    """Return the mean square difference between positions (N, n) that are a lag apart."""
     end = min(where.stop, len(positions) - lag)
     gap = positions[where.start + lag : end + lag] - positions[where.start : end]
     return float(np.mean(gap**2))

@@ -234,7 +234,7 @@ class SpikeGate:
         return latest[-1] if latest else None
 
     def _in_time(self, sample: StreamSample) -> bool:
-        """Return whether a sample's stamp continues the stream, or confirms a new section."""
+        """Return whether a stamp continues the stream, or is the second after a time jump."""
         tail, stray, self._jumped = self._tail, self._jumped, None
         dt = 0.0 if tail is None else sample.t - tail.t
         longest = MAX_GAP * self._period

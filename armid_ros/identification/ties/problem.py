@@ -123,7 +123,7 @@ class InteractionProblem:
         return np.asarray(self.tau - self.known - self.columns @ theta)
 
     def sensitivity(self, theta: FloatArray) -> FloatArray:
-        """Return derivatives of the modelled torques by the motion, shape (N, n, 3 J)."""
+        """Return derivatives of the modelled torques by q, dq and ddq, shape (N, n, 3 J)."""
         spring = np.einsum('nipj,p->nij', self.columns_by_motion, theta)
         return np.asarray(self.known_by_motion + spring)
 
@@ -270,7 +270,7 @@ def _filtered_noise(used: Conditioning | None) -> tuple[FloatArray, FloatArray]:
 
 
 def _regressor_by_motion(robot: Robot, motion: Motion, kept: npt.NDArray[np.intp]) -> FloatArray:
-    """Return derivatives of chosen inertial columns by the motion, shape (N, n, P, 3, n)."""
+    """Return derivatives of P regressor columns by q, dq and ddq, shape (N, n, P, 3, n)."""
     h = 1e-5  # step of the central differences [rad or m]
     n = motion.n_joints
     result = np.empty((len(motion), n, len(kept), 3, n))
@@ -284,7 +284,7 @@ def _regressor_by_motion(robot: Robot, motion: Motion, kept: npt.NDArray[np.intp
 
 
 def _placed(by_own: FloatArray, count: int) -> FloatArray:
-    """Extend derivatives by one machine's motion with zeros for the other machine's."""
+    """Append zero derivatives by the motion of the other machine to those by one motion."""
     result = np.zeros((*by_own.shape[:-1], count))
     result[..., : by_own.shape[-1]] = by_own
     return result.reshape((*by_own.shape[:-2], 3 * count))
