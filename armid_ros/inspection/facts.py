@@ -234,7 +234,7 @@ class TrialFit:
     def of(
         cls, found: Identification, graded: Grade, recording: Recording, scale: FloatArray
     ) -> TrialFit:
-        """Assess a quick identification; `scale` is the ratio of effort to described torque."""
+        """Assess a trial fit; `scale` is the ratio of recorded effort to described torque."""
         robot, motions = found.arm.robot, [fit.motion for fit in found.training]
         score = Score.of(found.training)
         errors = score.joint_relative_error_percent
