@@ -71,7 +71,7 @@ class BaseParameters:
         self, standard: tuple[ParameterName, ...], columns: npt.NDArray[np.intp]
     ) -> BaseParameters:
         """
-        Express these base parameters by a longer list of standard parameters.
+        Express the base parameters by a longer list of standard parameters.
 
         Parameters
         ----------
