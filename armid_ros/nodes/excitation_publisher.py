@@ -374,7 +374,7 @@ class ExcitationPublisherNode(ArmidNode):
         self._controller.send_stop(write_trajectory(motion))
 
     def _current_ending(self) -> Ending | None:
-        """Return the last ended run; its stop is dropped if another client moves the arm."""
+        """Return the ended run or None; forget the stop if another client moves the arm."""
         ending = self._ending
         if ending is not None and self._controller.taken:
             self._ending = replace(ending, last=None) if ending.reason else None

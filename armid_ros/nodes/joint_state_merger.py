@@ -220,7 +220,7 @@ class JointStateMergerNode(ArmidNode):
         self._merge(tuple(n + k for k in some), stamp, np.vstack([torques, torques]))
 
     def _merge(self, some: tuple[int, ...], stamp: int, values: FloatArray) -> None:
-        """Merge values of some joints; publish samples that are complete now."""
+        """Merge new values of the joints `some`; publish samples with values of all joints."""
         n = len(self.joints)
         # a float has too few digits for seconds since 1970
         self._epoch_ns = self._epoch_ns or stamp

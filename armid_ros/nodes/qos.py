@@ -99,7 +99,7 @@ class MatchedSubscription:
         raw: bool = False,
         depth: int = DEPTH,
     ) -> None:
-        """Subscribe if the topic has publishers; otherwise `match` will."""
+        """Subscribe now if the topic has publishers; otherwise `match` subscribes later."""
         self._node = node
         self._message_type = message_type
         self._callback = callback

@@ -78,7 +78,7 @@ class StampDifference:
         return f'{"behind" if late > 0.0 else "ahead of"} {clock}'
 
     def of_results(self, topic: str) -> str:
-        """Return a warning if stamps, so also those of results, are over 10 s off the clock."""
+        """Return a warning if stamps of inputs and results are over 10 s off the clock."""
         # tf2 keeps ten seconds, so RViz cannot draw older results; up to 1000 messages in the
         # queue of a busy node are younger
         if abs(self._late) <= 10.0:
