@@ -37,7 +37,7 @@ SIZE = 3 + 2 * len(PER_JOINT)
 
 
 def unpack(parameters: TwoLinkParameters) -> FloatArray:
-    """Return the 13 tuned parameters as a vector: alpha, beta, gamma, and those of `PER_JOINT`."""
+    """Return the 13 tuned parameters as a vector: alpha, beta, gamma, then `PER_JOINT`."""
     joints = [getattr(parameters, field) for field, _, _ in PER_JOINT]
     return np.concatenate([[parameters.alpha, parameters.beta, parameters.gamma], *joints])
 
