@@ -253,7 +253,7 @@ def _errors(
 
 
 def _fit_at(problem: _Problem, x: FloatArray, free: npt.NDArray[np.bool_]) -> PositionFit:
-    """Return the finished fit at parameters x, with standard errors or why they are missing."""
+    """Return the fit with parameters x, their standard errors, and why errors are missing."""
     model, n, count = problem.model, problem.model.robot.n_joints, len(x)
     residuals = problem.residual(x)
     sigma = np.sqrt(np.mean(residuals**2, axis=0)) + 1e-9
