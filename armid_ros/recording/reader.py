@@ -131,7 +131,7 @@ def read_recording(
 
 
 def is_table(path: Path) -> bool:
-    """Return whether a path is a table; without the plug-in `tables`, any file but a bag is."""
+    """Return whether a path is a table; without the plug-in `tables`, whether it is no bag."""
     if find_spec(_TABLES) is None:
         return path.is_file() and not is_bag_file(path)
     from armid_ros.recording import tables

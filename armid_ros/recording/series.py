@@ -219,7 +219,7 @@ def _sorted(series: JointSamples, counts: Counter[str]) -> JointSamples:
 def _resampled(
     series: JointSamples, stamps: IntArray
 ) -> tuple[JointSamples, npt.NDArray[np.bool_], npt.NDArray[np.bool_]]:
-    """Interpolate samples at other times; return them, and masks of valid and measured ones."""
+    """Interpolate samples at N times; return N samples, and which are valid and measured."""
     if len(series) == len(stamps) and np.array_equal(series.stamps, stamps):
         everywhere = np.ones(len(stamps), np.bool_)
         return series, everywhere, everywhere
@@ -280,7 +280,7 @@ def _finite(
 
 def unwrapped(q: FloatArray) -> tuple[FloatArray, list[int]]:
     """
-    Remove jumps by full turns from the positions of joints that wrap around.
+    Remove jumps by full turns from joint positions; also return the joints with jumps.
 
     A joint is wrapped if its positions stay within one turn, and if each step above half a turn
     is about a full turn. The tolerance depends on the other steps of the joint.

@@ -128,7 +128,7 @@ class McapSource(Source):
     def _pieces(
         self, chunks: Sequence[Chunk], channels: Sequence[int]
     ) -> Iterator[tuple[int, bytes | mmap.mmap, IntArray]]:
-        """Yield messages of some channels in groups: first log time, buffer and byte positions."""
+        """Yield groups of messages of given channels: first time, buffer, byte positions."""
         data, loose = self._found.data, np.array(self._found.loose, np.int64)
         for contents in read_chunks(self._found, chunks, self._settings):
             offsets = self._possible(*messages_in(self._found, contents), channels)
@@ -160,7 +160,7 @@ class McapSource(Source):
         return self._counts
 
     def _possible(self, offsets: IntArray, rows: _Rows, wanted: Sequence[int]) -> IntArray:
-        """Return the byte positions of messages that are of some channels and have valid times."""
+        """Return the byte positions of messages in wanted channels with times before 2262."""
         channels = rows['channel']
         chosen = np.isin(channels, wanted) if len(wanted) != 1 else channels == wanted[0]
         late = (rows['log_time'] < 0) | (rows['publish_time'] < 0)
