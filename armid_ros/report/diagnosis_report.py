@@ -311,7 +311,7 @@ def overlay_section(diagnosis: Diagnosis, gap: Gap) -> Section:
 
 
 def _worst(diagnosis: Diagnosis, gap: Gap) -> int:
-    """Return the joint with the largest error over its floor, or else of the verdict."""
+    """Return the index of the joint with the largest gap, or that does not repeat."""
     if diagnosis.verdict != 'not_repeatable':
         return int(np.argmax(gap.chi2_before))
     # the floor contains the part of the torque that does not repeat
