@@ -148,7 +148,7 @@ def share_of(residual: FloatArray, torque: FloatArray) -> float:
 
 
 def _fit(x: FloatArray, residual: FloatArray, count: int) -> FloatArray:
-    """Fit a residual by at most ``count`` of L terms; return L factors, unused ones zero."""
+    """Fit a residual by at most `count` of L terms; return L factors, 0 for unused terms."""
     from sklearn.linear_model import orthogonal_mp
 
     size = np.sqrt(np.mean(x**2, axis=0))
