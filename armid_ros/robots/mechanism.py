@@ -188,7 +188,7 @@ class Mechanism:
         return np.asarray(-closing @ np.concatenate(apart))
 
     def _gap(self, data: pin.Data, q: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return vectors between the ends of all loops, (3 L,) [m], and their Jacobian."""
+        """Return vectors between both points of each loop, (3 L,) [m], and their Jacobian."""
         pin.computeJointJacobians(self.model, data, q)
         pin.updateFramePlacements(self.model, data)
         world, gaps, slopes = pin.LOCAL_WORLD_ALIGNED, [], []

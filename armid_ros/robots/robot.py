@@ -159,14 +159,14 @@ class Robot:
         return bool(own.prismatic[own.index(joint)])
 
     def body_of(self, joint: str) -> int:
-        """Return the index of the body that a joint moves; for a motor, the last such body."""
+        """Return the index of the body that a joint moves; for a motor, of its last body."""
         if self.mechanism is None or joint in self.moving:
             return self.moving.index(joint)
         return int(np.flatnonzero(self.mechanism.driven[:, self.index(joint)])[-1])
 
     @cached_property
     def tree(self) -> Robot:
-        """Robot in which all moving joints are driven; itself if no joints are coupled."""
+        """Robot with all moving joints driven; the same object if no joints are coupled."""
         if self.mechanism is None:
             return self
         own = [self.description.by_name[name] for name in self.moving]
