@@ -114,7 +114,7 @@ class Controller:
         self.feedback = feedback
 
     def in_initial_state(self) -> Controller:
-        """Return a controller in its initial state; the same object if it has no state."""
+        """Return a controller in the initial state; the same object if it is stateless."""
         return self
 
     def targets(self, desired: Motion, previous: FloatArray | None = None) -> Motion:
