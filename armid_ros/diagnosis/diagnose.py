@@ -153,7 +153,8 @@ def diagnose(
     if (result.verdict in OPEN or result.doubt) and settings.partner is None:
         groups = [*recordings, *validate], baseline
         apart = [one for group in groups for one in _with_unfitted_joints(arm, group, used)]
-        alone = mistaken_recordings(arm, apart, used)
+        # with a baseline, a mistake that needs fitted links is a change of the arm instead
+        alone = mistaken_recordings(arm, apart, used, refit=not baseline)
         return _bad_data(given, result.data, alone, result.notes) if alone else result
     return result
 

@@ -91,17 +91,20 @@ def mistaken_recordings(
     arm: ArmModel,
     recordings: Sequence[tuple[Recording, npt.NDArray[np.bool_]]],
     used: Conditioning,
+    *,
+    refit: bool = True,
 ) -> list[str]:
     """
     Return mistakes in joint names, signs or units of single recordings, with remedies.
 
     Each recording is paired with a mask of joints, (n,), in which it differs from the other
-    recordings. `check_data` finds a mistake that all recordings share.
+    recordings. `check_data` finds a mistake that all recordings share. Without `refit`, mistakes
+    that only fitted links reveal are not returned.
 
     """
     found = []
     for recording, joints in recordings:
-        mistake = find_mistake(arm.body, recording, used)
+        mistake = find_mistake(arm.body, recording, used, refit=refit)
         if mistake is not None and joints[mistake.joint] and mistake.of_data:
             found.append(f'{recording.source or "recording"}: {mistake.text}')
     return found
