@@ -16,7 +16,7 @@ from armid_ros.files import read_text, reading
 from armid_ros.motion import FloatArray
 from armid_ros.robots.description import parse_xml
 from armid_ros.robots.meshes import convex_bodies, find_mesh
-from armid_ros.robots.robot import Robot
+from armid_ros.robots.robot import description_name, Robot
 import coal
 import numpy as np
 import pinocchio as pin
@@ -369,11 +369,11 @@ def _link(robot: Robot, body: pin.GeometryObject) -> str:
 def _find_srdf(robot: Robot) -> Path | None:
     if robot.path is None:
         return None
-    stem = robot.path.name.removesuffix('.xacro').removesuffix('.urdf')
+    names = (description_name(robot.path), robot.name)
     for directory in (robot.path.parent, robot.path.parent.parent / 'srdf'):
         present = sorted(directory.glob('*.srdf'))
         for path in present:
-            if path.stem in (stem, robot.name):
+            if path.stem in names:
                 return path
         if len(present) == 1:
             return present[0]

@@ -29,7 +29,7 @@ from armid_ros.robots.description import (
     text_of,
 )
 from armid_ros.robots.mjcf import is_mjcf, urdf_of_mjcf
-from armid_ros.robots.robot import joint_fields, parse_gravity, Robot
+from armid_ros.robots.robot import description_name, joint_fields, parse_gravity, Robot
 from armid_ros.robots.selection import driven_joints, several_arms, standing_position
 from armid_ros.robots.xacro_expansion import expand_xacro
 import numpy as np
@@ -334,7 +334,7 @@ def _kinematic_urdf(description: Description, positions: Mapping[str, float]) ->
 
 def read_mounting(robot: Robot) -> tuple[float | None, Path] | None:
     """
-    Read the floor height from NAME.mounting.yaml beside NAME.urdf; None if there is none.
+    Read the floor height from NAME.mounting.yaml beside a description; None if there is none.
 
     Returns
     -------
@@ -351,8 +351,7 @@ def read_mounting(robot: Robot) -> tuple[float | None, Path] | None:
     """
     if robot.path is None:
         return None
-    stem = robot.path.name.removesuffix('.xacro').removesuffix('.urdf')
-    path = robot.path.with_name(f'{stem}.mounting.yaml')
+    path = robot.path.with_name(f'{description_name(robot.path)}.mounting.yaml')
     if not path.is_file():
         return None
     with reading(path, RobotError):
@@ -368,10 +367,7 @@ def read_mounting(robot: Robot) -> tuple[float | None, Path] | None:
 def _with_mechanism(text: str, path: Path) -> str:
     """Add the coupled joints of NAME.mechanism.yaml, if it exists, to the text of NAME.urdf."""
     # other readers of a URDF ignore the additional elements
-    name = path.name
-    for end in ('.xacro', '.urdf', '.xml'):
-        name = name.removesuffix(end)
-    path = path.with_name(f'{name}.mechanism.yaml')
+    path = path.with_name(f'{description_name(path)}.mechanism.yaml')
     if not path.is_file():
         return text
     with reading(path, RobotError):

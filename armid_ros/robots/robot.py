@@ -400,6 +400,14 @@ def joint_fields(joints: Sequence[Joint]) -> dict[str, Any]:
     }
 
 
+def description_name(path: Path) -> str:
+    """Return NAME of a description NAME.urdf, NAME.urdf.xacro or NAME.xml."""
+    name = path.name
+    for end in ('.xacro', '.urdf', '.xml'):
+        name = name.removesuffix(end)
+    return name
+
+
 def position_range(lower: FloatArray, upper: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Replace infinite position limits, (n,), by +-`UNLIMITED_HALF_RANGE`."""
     return (

@@ -394,7 +394,7 @@ class TestXacroIsAProgram:
 
 def floor_of(folder: Path, text: str | None) -> Any:
     """Return what the file beside a description states about its mounting."""
-    path = folder / 'arm.urdf'
+    path = folder / 'arm.xml'
     path.write_text(TWO_LINKS)
     if text is not None:
         (folder / 'arm.mounting.yaml').write_text(text)
