@@ -149,17 +149,13 @@ class Estimate:
 
     def index(self, name: str, joint: str = '') -> int:
         """Return the index of a parameter; raise ModelError if it is missing."""
-        for position, parameter in enumerate(self.parameters):
-            if parameter.name == name and parameter.joint == joint:
-                return position
-        joints = list(dict.fromkeys(one.joint for one in self.parameters))
-        if joint not in joints:
-            listed = ', '.join(filter(None, joints))
-            raise ModelError(f"no joint '{joint}'; joints are: {listed}{meant(joint, joints)}")
-        own = [one for one in self.parameters if one.joint == joint]
-        known = ', '.join(f'{p.name} [{p.joint}]' if p.joint else p.name for p in own)
-        guess = meant(name, [one.name for one in own])
-        raise ModelError(f"no parameter '{name}' of joint '{joint}'; parameters: {known}{guess}")
+        pairs = [(one.name, one.joint) for one in self.parameters]
+        if (name, joint) in pairs:
+            return pairs.index((name, joint))
+        own, what = [known for known, place in pairs if joint in ('', place)], 'parameters'
+        if not own:
+            own, name, what = list(dict.fromkeys(place for _, place in pairs)), joint, 'joints'
+        raise ModelError(f"no '{name}'; {what}: {', '.join(own)}{meant(name, own)}")
 
 
 def parameter_table(

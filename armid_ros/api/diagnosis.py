@@ -154,7 +154,9 @@ class DiagnosisResult(ShownModel):
         return draw_joints(self.arm.robot.joints, curves, 'residual torque [N m or N]')
 
     def _residuals(self) -> list[ResidualPart]:
-        return [(o.source, o.trajectory.t, o.measured - o.after) for o in self.core.overlays]
+        return [
+            (o.trajectory.source, o.trajectory.t, o.measured - o.after) for o in self.core.overlays
+        ]
 
     def to_dataframe(self) -> pandas.DataFrame:
         """Return the named effects as a pandas table, one row per parameter."""

@@ -4,16 +4,11 @@
 
 from __future__ import annotations
 
-import inspect
 import textwrap
-from typing import TYPE_CHECKING
 
 from armid_ros.cli import parameters
 from armid_ros.cli.terminal import say
 import click
-
-if TYPE_CHECKING:
-    from armid_ros.effects import Effect
 
 
 @click.command(epilog='Example: armid robots')
@@ -42,7 +37,10 @@ def effects(names: tuple[str, ...], as_json: bool) -> None:
     rows = [
         {
             'name': name,
-            'what it is': _law(effect) if names else effect.summary,
+            # the first sentence of the documentation has the equation
+            'what it is': ' '.join(str(effect.__doc__).partition('\n\n')[0].split())
+            if names
+            else effect.summary,
             'parameters': [_with_unit(q.name, q.unit) for q in effect.quantities],
             'shapes': [_with_unit(s.name, s.unit) for s in effect.shapes],
         }
@@ -60,11 +58,6 @@ def effects(names: tuple[str, ...], as_json: bool) -> None:
 
 def _say_wrapped(text: str) -> None:
     say(textwrap.fill(text, 80, subsequent_indent='    ', break_on_hyphens=False))
-
-
-def _law(effect: type[Effect]) -> str:
-    """Return the first sentence of the documentation of an effect, which has its equation."""
-    return ' '.join(str(inspect.getdoc(effect)).partition('\n\n')[0].split())
 
 
 def _with_unit(name: str, unit: str) -> str:

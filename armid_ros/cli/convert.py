@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -89,11 +88,8 @@ def _convert_tables(
     if out is None:
         say('nothing was written; give --out BAG without --dry-run to write a bag')
         return
-    write_recording(
-        out,
-        replace(recording, topic='/joint_states'),
-        robot_description=None if robot is None else robot.urdf,
-    )
+    urdf = None if robot is None else robot.urdf
+    write_recording(out, recording, robot_description=urdf)
     say(f'{out}: {len(recording)} samples of {recording.n_joints} joints')
 
 

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from pathlib import Path
 
 from armid_ros.arm import ArmModel, Misfit
 from armid_ros.arm.memoized_arm import memoized_arm, plain_arm
@@ -29,7 +30,7 @@ from armid_ros.diagnosis.verdict.remaining_misfit import (
 )
 from armid_ros.diagnosis.verdict.remarks import data_remarks, doubt_of_model, with_doubt
 from armid_ros.diagnosis.verdict.where import locate_explained, locate_remaining_gap
-from armid_ros.diagnosis.verdict.words import decide, names_and_places, percent
+from armid_ros.diagnosis.verdict.words import decide
 from armid_ros.errors import IdentificationError
 from armid_ros.estimate import name_in_words
 from armid_ros.identification.assess.data_faults import check_data, mistaken_recordings
@@ -203,7 +204,7 @@ def _of_spans(
     if _hardly_explained(found, settings):
         return None
     spans = tuple(one for one in spans if one.stop > one.start)
-    seconds = [f'{one.source} from {one.start:.1f} to {one.stop:.1f} s' for one in spans]
+    seconds = [f'{Path(x.source).name} from {x.start:.1f} to {x.stop:.1f} s' for x in spans]
     summary = f'In {", ".join(seconds)}: {found.summary} Other seconds were not diagnosed.'
     return replace(found, summary=summary, spans=spans)
 
@@ -240,18 +241,17 @@ def _as_diagnosis(
     excess = RemainingMisfit(explanation, both, before, arm, settings)
     evidence, patched = explanation.evidence, explanation.fitted.arm
     found, minor = findings(explanation, shares, arm, explainer.rng), minor_findings(explanation)
-    worse, residual_over_limit = excess.worse_joints(), excess.residual_over_limit()
-    resting = excess.at_rest()
+    worse, over, resting = excess.worse_joints(), excess.residual_over_limit(), excess.at_rest()
     laws = [] if explanation.measured else unlisted_laws(explanation, settings)
     least = settings.material * evidence.torque_rms
-    different = joints_that_do_not_repeat(explainer.prepared.floors, settings.thresholds, least)
-    not_repeating = tuple(arm.robot.joints[k] for k in different)
+    floors, joints = explainer.prepared.floors, arm.robot.joints
+    not_repeating = joints_that_do_not_repeat(joints, floors, settings.thresholds, least)
     explanation = explanation if found else replace(explanation, reference=explanation.fitted)
     gap = Gap.of(explanation, unseen)
     word = decide(
         found,
         not_repeating if explanation.measured else (),
-        [*residual_over_limit, *resting, *laws],
+        [*over, *resting, *laws],
         arm,
         NOISE if explanation.measured else explanation.floor,
         excess.given_body_over_limit(),
@@ -259,25 +259,16 @@ def _as_diagnosis(
         gap,
     )
     word, doubt = with_doubt(word, doubt, found, given, before)
-    worst = int(np.argmax([one.ratio.max() for one in residual_over_limit]))
-    new = np.max([np.zeros(arm.robot.n_joints), *(one.ratio for one in laws)], axis=0) > 1.0
-    left = locate_remaining_gap(explanation, both[worst], settings, new)
+    worst = int(np.argmax([one.ratio.max() for one in over]))
+    left = locate_remaining_gap(explanation, both[worst], settings, laws)
     places = locate_explained(explanation, unseen or evidence, settings) if found else left
     explainer.tell(1.0, word.word)
-    share = settings.thresholds.headline
-    small = [one for one in found if settings.everything and one.share < share]
+    small = [x for x in found if settings.everything and x.share < settings.thresholds.headline]
     remarks = _remarks(found, worse, explanation, word.word, doubt, explainer)
-    large = [one for one in minor if one.share > settings.thresholds.open_share]
-    contradicted = word.word == 'unknown' and unseen is not None and bool(large)
-    contradiction = [
-        f'The held-out recordings contradict {names_and_places([one])}, which explains '
-        f'{percent(one.share)} of the others.'
-        for one in large[:contradicted]
-    ]
     untested = explanation.untested if before is not None else ''
     return Diagnosis(
         verdict=word.word,
-        summary=' '.join([*(contradiction or [word.summary]), *remarks]),
+        summary=' '.join([word.summary, *remarks]),
         findings=tuple(one for one in found if one not in small),
         minor=(*small, *minor),
         where=places or locate_blocked_joints(arm, resting),
@@ -285,7 +276,7 @@ def _as_diagnosis(
         gap=gap,
         explanation=explanation.without_data(),
         arm=plain_arm(patched) if found and not worse else given,
-        data=tuple(evidence.data),
+        data=evidence.data,
         not_visible=_not_visible(explanation, found, explainer),
         refitted=explanation.refitted,
         notes=tuple(x for x in (*notes, untested, *of_bodies) if x and x not in remarks),
@@ -293,7 +284,7 @@ def _as_diagnosis(
         harmful=bool(found and worse),
         doubt=doubt,
         not_repeating=not_repeating,
-        contradicted=contradicted,
+        contradicted=word.contradicted,
     )
 
 
@@ -318,14 +309,14 @@ def _with_shares(
         noise = tuple(noise_floor(part, explanation.fitted.arm).sigma for part in data)
         sigma = tuple(np.maximum(one, explanation.misfit) for one in noise)
         unseen = Evidence(tuple(data), sigma, noise, explanation.evidence.varies)
-    every, rng = explanation.measured or settings.everything, explainer.rng.spawn(1)[0]
+    every = explanation.measured or settings.everything
     least = 0.0 if every else settings.thresholds.headline
-    explanation, shares = headline(explanation, unseen, least, settings, rng)
+    explanation, shares = headline(explanation, unseen, least, settings)
     untested = explainer.baseline is not None and bool(explanation.untested)
     whole = shares.share(range(len(explanation.steps)))
     if untested and whole <= settings.thresholds.open_share:
         nothing = explanation.without(*range(len(explanation.steps)))
-        explanation, shares = headline(nothing, unseen, least, settings, rng)
+        explanation, shares = headline(nothing, unseen, least, settings)
     return explanation, shares, unseen
 
 

@@ -59,9 +59,9 @@ def diagnose_ties(
     """
     arm, prepared, settings = explainer.arm, explainer.prepared, explainer.settings
     explainer = replace(explainer, baseline=None, misfit=None)
-    ties = _Ties(explainer, tuple(recordings), partner)
+    ties = _Ties(explainer, tuple(recordings))
     evidence = Evidence.over_noise(prepared.data, prepared.sigma)
-    named = ties.significant()
+    named = ties.significant(partner)
     if not named:
         problem = JointFit.over_noise(arm, evidence, explainer.rng).as_described()
         described = problem.fit()
@@ -95,16 +95,13 @@ class _Ties:
         The arm without ties, and its data.
     recordings : tuple of Recording
         Recordings of the arm, with the motion of the other machine.
-    partner : Partner
-        The other machine with the places of possible ties.
 
     """
 
     explainer: Explainer
     recordings: tuple[Recording, ...]
-    partner: Partner
 
-    def significant(self) -> list[NamedEffect]:
+    def significant(self, partner: Partner) -> list[NamedEffect]:
         """Return significant ties with their stiffness; ties with slack are returned as straps."""
         arm = self.explainer.arm
         tried: list[tuple[float, InteractionProblem, Interaction]] = []
@@ -129,7 +126,7 @@ class _Ties:
             found = identify_interaction(problem)
         named = list[NamedEffect]()
         for joint, stiffness in zip(problem.spring_joints, found.stiffness, strict=True):
-            effect = self.partner.tied(arm.robot, (joint,), slack=bool(slack))
+            effect = partner.tied(arm.robot, (joint,), slack=bool(slack))
             effect = effect.with_shape([slack]) if slack else effect
             values = stiffness * np.eye(len(effect.parameters(arm.robot)))[0]
             named.append(NamedEffect(effect, (0,), values))

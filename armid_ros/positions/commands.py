@@ -6,16 +6,14 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 from armid_ros import Robot
 from armid_ros.errors import RecordingError
-from armid_ros.files import reading
 from armid_ros.positions.loop import CommandedMotion
 from armid_ros.recording import ReadSettings, Recording
 from armid_ros.recording.bag import Bag
 from armid_ros.recording.columns import ColumnSettings
-from armid_ros.recording.message_types import JOINT_STATE, store_for
+from armid_ros.recording.message_types import JOINT_STATE
 from armid_ros.recording.reader import is_table, read_recording
 from armid_ros.recording.source import DEFAULT, listed, Topic
 import numpy as np
@@ -107,16 +105,15 @@ def _topic(path: Path, recording: Recording, name: str | None, settings: ReadSet
 def _controller_state(path: Path, robot: Robot, topic: Topic, settings: ReadSettings) -> Recording:
     """Read the reference positions in the state messages of a joint_trajectory_controller."""
     source, rows = f'{path}: {topic.name}', []
-    store = store_for(topic.message_type)
-    with Bag(path, settings) as bag, reading(source, RecordingError):
+    with Bag(path, settings) as bag:
         for block in bag.blocks(topic.name):
             for k in range(len(block)):
-                state: Any = store.deserialize_cdr(block.message(k), topic.type_name)
+                state = bag.decoded(topic, block.message(k))
                 point = state.reference if hasattr(state, 'reference') else state.desired
                 stamp, names = state.header.stamp, list(state.joint_names)
-                missing = set(robot.joints) - set(names)
+                missing = sorted(set(robot.joints) - set(names))
                 if missing:
-                    raise RecordingError(f'messages lack the joints {", ".join(sorted(missing))}')
+                    raise RecordingError(f'{source}: messages lack joints {", ".join(missing)}')
                 order = [names.index(joint) for joint in robot.joints]
                 q, dq = (np.array(x) for x in (point.positions, point.velocities))
                 if len(q) == len(names):
@@ -124,15 +121,11 @@ def _controller_state(path: Path, robot: Robot, topic: Topic, settings: ReadSett
                     rows.append((stamp.sec * 10**9 + stamp.nanosec, q[order], speed))
     if not rows:
         raise RecordingError(f'{source} has no messages with positions')
-    stamps, index = np.unique([row[0] for row in rows], return_index=True)
+    stamps, *both = (np.array(column) for column in zip(*rows, strict=True))
+    stamps, index = np.unique(stamps, return_index=True)
     sampled = 1e-9 * (stamps - stamps[0])
     t = np.arange(0.0, sampled[-1], 1e-3)  # the controller interpolates, too
-    q, dq = (
-        np.column_stack(
-            [np.interp(t, sampled, x) for x in np.array([rows[k][part] for k in index]).T]
-        )
-        for part in (1, 2)
-    )
+    q, dq = (np.column_stack([np.interp(t, sampled, x) for x in y[index].T]) for y in both)
     return Recording(
         joints=robot.joints, t=t, q=q, dq=dq, start_ns=int(stamps[0]), source=str(path)
     )

@@ -82,16 +82,12 @@ def fit_document(found: PositionFit, hints: Sequence[str] = ()) -> dict[str, Any
     }
 
 
-def _without_tool(found: PositionFit) -> bool:
-    mass, std = found.of('payload_m', found.arm.robot.joints[-1])
-    return bool(np.isfinite(std) and mass < 1.96 * std)
-
-
 def _reasons(found: PositionFit) -> dict[str, list[str]]:
-    """Return reasons why values are not determined, with names; not of the centre of no tool."""
-    reasons: dict[str, list[str]] = {}
+    """Return reasons why values are not determined, with their names."""
+    mass, std = found.of('payload_m', found.arm.robot.joints[-1])
+    absent, reasons = mass < 1.96 * std, dict[str, list[str]]()
     for one, reason in zip(found.parameters, found.reasons, strict=True):
-        if reason and not (_without_tool(found) and one.name.startswith('payload_center')):
+        if reason and not (absent and one.name.startswith('payload_center')):
             reasons.setdefault(reason, []).append(f'{one.words} {one.joint}'.strip())
     return reasons
 
@@ -122,9 +118,7 @@ def fit_summary(found: PositionFit, document: dict[str, Any], step: str) -> Summ
     ]
     center = [cell(f'payload_center_{a}', joints[-1]).split(' ± ')[0] for a in 'xyz']
     mass = cell('payload_m', joints[-1])
-    tool = f'{mass} kg at {", ".join(center)} m'
-    if _without_tool(found):
-        tool = f'none ({mass} kg)'
+    tool = f'none ({mass} kg)' if '<' in mass else f'{mass} kg at {", ".join(center)} m'
     title = f'command delay {cell("command_delay", factor=1e3)} ms, tool {tool}'
     lines = [f'{found.duration:.0f} s compared; links are taken as described']
     ratio, error = found.gain_ratio, found.gain_ratio_std

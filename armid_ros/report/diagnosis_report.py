@@ -264,7 +264,9 @@ def overlay_section(diagnosis: Diagnosis, gap: Gap) -> Section:
     shown = max(gap.overlays, key=size)
     t, measured, before, after = _of_recording(gap, shown, j)
     unit = robot.torque_units[j]
-    acting = [one for one in diagnosis.spans if one.source == shown.source and not one.whole]
+    acting = [
+        one for one in diagnosis.spans if one.source == shown.trajectory.source and not one.whole
+    ]
     marks = [(one.start, f'from {one.start:.1f} s', True) for one in acting]
     marks += [(one.stop, f'to {one.stop:.1f} s', False) for one in acting]
     band: FloatArray = np.full(len(t), 2.0 * shown.sigma[j])
@@ -280,7 +282,8 @@ def overlay_section(diagnosis: Diagnosis, gap: Gap) -> Section:
         'Measured and modelled',
         [
             Paragraph(
-                f'Joint with the largest error: {robot.joints[j]}, in recording {shown.source}.'
+                f'Joint with the largest error: {robot.joints[j]}, in recording '
+                f'{shown.trajectory.source}.'
             ),
             Chart.over_time(
                 t,
@@ -320,8 +323,9 @@ def _worst(diagnosis: Diagnosis, gap: Gap) -> int:
 
 def _of_recording(gap: Gap, shown: Overlay, joint: int) -> tuple[FloatArray, ...]:
     """Return times of a recording, and a joint's torque: measured, and from both models."""
-    here = shown.source, shown.trajectory.fold
-    own = [one for one in gap.overlays if (one.source, one.trajectory.fold) == here]
+    here = shown.trajectory.source, shown.trajectory.fold
+    parts = [(one, one.trajectory) for one in gap.overlays]
+    own = [one for one, part in parts if (part.source, part.fold) == here]
     curves = zip(*((one.measured, one.before, one.after) for one in own), strict=True)
     t = joined_time([one.trajectory.t for one in own])
     return t, *(joined([part[:, joint] for part in parts]) for parts in curves)
@@ -342,7 +346,7 @@ def whole_overlays(diagnosis: Diagnosis, recordings: Sequence[Recording]) -> Gap
     gap, explanation = diagnosis.gap, diagnosis.explanation
     if gap is None or explanation is None or not diagnosis.spans:
         return gap
-    firsts, overlays = {one.source: one for one in reversed(gap.overlays)}, []
+    firsts, overlays = {one.trajectory.source: one for one in reversed(gap.overlays)}, []
     for span in diagnosis.spans:
         first, read = firsts.get(span.source), [r for r in recordings if r.source == span.source]
         if first is None or not read:
@@ -353,5 +357,5 @@ def whole_overlays(diagnosis: Diagnosis, recordings: Sequence[Recording]) -> Gap
             before, after = (part.torque - part.residual(arm) for arm in arms)
             acts = (part.t >= span.start) & (part.t <= span.stop)
             after = np.where(acts[:, np.newaxis], after, before)
-            overlays.append(Overlay(span.source, part, part.torque, before, after, first.sigma))
+            overlays.append(Overlay(part, part.torque, before, after, first.sigma))
     return replace(gap, overlays=tuple(overlays) or gap.overlays)

@@ -402,10 +402,7 @@ def joint_fields(joints: Sequence[Joint]) -> dict[str, Any]:
 
 def description_name(path: Path) -> str:
     """Return NAME of a description NAME.urdf, NAME.urdf.xacro or NAME.xml."""
-    name = path.name
-    for end in ('.xacro', '.urdf', '.xml'):
-        name = name.removesuffix(end)
-    return name
+    return path.name.removesuffix('.xacro').removesuffix('.urdf').removesuffix('.xml')
 
 
 def position_range(lower: FloatArray, upper: FloatArray) -> tuple[FloatArray, FloatArray]:

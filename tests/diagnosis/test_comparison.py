@@ -41,7 +41,7 @@ def covariance(nuisance, hyperparameters, more=()):
     """Return the covariance of all informative rows, and which these are."""
     blocks, use = [], [np.any(x != 0.0, axis=2).ravel() for x in nuisance.columns]
     flat = [x.reshape(-1, x.shape[2]) for x in nuisance.columns]
-    rank, functions = nuisance.rank, nuisance.discrepancy.shape[1]
+    rank, functions = nuisance.base.rank, nuisance.discrepancy.shape[1]
     body = np.linalg.inv(nuisance.prior_precision)
     unit = np.repeat(MISFIT, functions)
     whole = np.concatenate(flat)

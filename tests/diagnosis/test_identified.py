@@ -10,6 +10,7 @@ from armid_ros.diagnosis.data.evidence import Evidence
 from armid_ros.diagnosis.data.trajectory import trajectories
 from armid_ros.diagnosis.search.cause import NamedEffect
 from armid_ros.diagnosis.search.joint_fit import JointFit
+from armid_ros.diagnosis.search.nuisance import Nuisance
 from armid_ros.effects import CATALOGUE
 from armid_ros.identification import identify, SignalSettings
 from armid_ros.identification.output import identification_document
@@ -58,7 +59,9 @@ def test_a_value_is_as_unsure_as_the_model_that_it_makes_up_for(bench):
         theta = bench.arm.theta
         theta[off] += rng.multivariate_normal(np.zeros(2), own)
         arm = bench.arm.with_theta(theta)
-        problem = JointFit.over_noise(arm, evidence, np.random.default_rng(0), told)
+        problem = JointFit.over_noise(arm, evidence, np.random.default_rng(0))
+        informed = Nuisance.of(problem.nuisance.rows, arm, np.random.default_rng(0), told)
+        problem = replace(problem, nuisance=informed)
         for fits, found in ((problem, errors), (problem.as_described(), as_exact)):
             estimate = fits.fit(named).estimate
             found.append((estimate.values[0] - 0.4) / estimate.std[0])

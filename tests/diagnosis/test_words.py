@@ -109,10 +109,8 @@ def test_what_does_not_repeat_has_to_matter(bench):
     closed = excess(bench, 0.5)
 
     def word(least):
-        different = [
-            bench.robot.joints[k]
-            for k in joints_that_do_not_repeat([floor] * 3, Thresholds(), least * one)
-        ]
+        floors, limits = [floor] * 3, Thresholds()
+        different = joints_that_do_not_repeat(bench.robot.joints, floors, limits, least * one)
         return decide((), different, [closed], bench.arm, FLOOR)
 
     assert word(0.1).word == 'not_repeatable'

@@ -190,8 +190,8 @@ def test_a_browser_draws_it_without_complaint(browser, charts_drawn, html):
 
 
 def test_seconds_of_a_cause_are_marked_in_the_curve_of_the_whole_recording(found, recordings):
-    source = found.gap.overlays[0].source
-    short = [one for one in found.gap.overlays if one.source == source]
+    source = found.gap.overlays[0].trajectory.source
+    short = [one for one in found.gap.overlays if one.trajectory.source == source]
     read = [replace(recordings[0], source=source)]
     some = replace(found, spans=(Span(source, 2.0, 3.0, False),))
     gap = whole_overlays(replace(some, gap=replace(found.gap, overlays=tuple(short))), read)

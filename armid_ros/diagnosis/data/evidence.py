@@ -230,16 +230,21 @@ def noise_floor(trajectory: Trajectory, arm: ArmModel) -> NoiseFloor:
 
 
 def joints_that_do_not_repeat(
-    floors: Sequence[NoiseFloor], thresholds: Thresholds, least: FloatArray
-) -> list[int]:
+    joints: Sequence[str],
+    floors: Sequence[NoiseFloor],
+    thresholds: Thresholds,
+    least: FloatArray,
+) -> tuple[str, ...]:
     """
-    Return the joints whose torque differs between equal periods of a motion, as indices.
+    Return the joints whose torque differs between equal periods of a motion.
 
     The difference is at low frequency and material, such as that of a contact in one period. The
     joint with the largest difference comes first.
 
     Parameters
     ----------
+    joints : sequence of str
+        Names of the joints.
     floors : sequence of NoiseFloor
         Noise of each trajectory.
     thresholds : Thresholds
@@ -254,12 +259,12 @@ def joints_that_do_not_repeat(
         if floor.period is not None
     ]
     if not ratios:
-        return []
+        return ()
     often = np.sum(np.array(ratios) >= thresholds.one_period, axis=0) >= max(1, len(ratios) / 2)
     mean = np.exp(np.mean(np.log(ratios), axis=0))
     if len(ratios) >= 3:
         often |= mean > thresholds.one_period_on_average
-    return [j for j in np.argsort(-mean).tolist() if often[j]]
+    return tuple(joints[j] for j in np.argsort(-mean) if often[j])
 
 
 def _difference(

@@ -22,6 +22,7 @@ from armid_ros.motion import FloatArray, Motion
 from armid_ros.robots import Robot
 import numpy as np
 import pinocchio as pin
+from scipy import linalg
 
 #: Rate at which a motion is evaluated [Hz]; the noise is scaled from the rate of rows.
 _RATE = 50.0
@@ -187,7 +188,4 @@ def basis_of(columns: FloatArray) -> FloatArray:
     """Return an orthonormal basis of the column space, without directions of rounding errors."""
     length = np.linalg.norm(columns, axis=0)
     columns = columns[:, length > 0.0] / length[length > 0.0]
-    if not columns.shape[1]:
-        return columns
-    basis, size, _ = np.linalg.svd(columns, full_matrices=False)
-    return np.asarray(basis[:, size > 1e-7 * size[0]])  # smaller ones are rounding errors
+    return np.asarray(linalg.orth(columns, rcond=1e-7)) if columns.size else columns

@@ -301,7 +301,7 @@ def _unexplained(nuisance: Nuisance, posterior: NuisancePosterior) -> Unexplaine
     residual = np.concatenate(
         [nuisance.residual_at(values, k) for k in range(len(rows.diagnosed))], axis=1
     ).T
-    columns = np.concatenate([x[:, :, : nuisance.rank] for x in nuisance.columns], axis=1)
+    columns = np.concatenate([x[:, :, : nuisance.base.rank] for x in nuisance.columns], axis=1)
     diagnosed = np.concatenate([np.full(len(p.rows), rows.diagnosed[p.fold]) for p in rows.data])
     return Unexplained(
         Motion(motions[0].joints, *arrays),

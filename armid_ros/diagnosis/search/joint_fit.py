@@ -85,13 +85,7 @@ class JointFit:
     spread: float = 0.0
 
     @classmethod
-    def over_noise(
-        cls,
-        arm: ArmModel,
-        evidence: Evidence,
-        rng: np.random.Generator,
-        known: FloatArray | None = None,
-    ) -> JointFit:
+    def over_noise(cls, arm: ArmModel, evidence: Evidence, rng: np.random.Generator) -> JointFit:
         """
         Return the least-squares problem with free rigid body and without discrepancy.
 
@@ -103,11 +97,9 @@ class JointFit:
             Recordings with their noise.
         rng : numpy.random.Generator
             Draws the random states from which base parameters are found.
-        known : ndarray, shape (P, P), optional
-            Fisher information on the parameters of the arm from its identification.
 
         """
-        nuisance = Nuisance.of(Rows.over_noise(evidence), memoized_arm(arm), rng, known)
+        nuisance = Nuisance.of(Rows.over_noise(evidence), memoized_arm(arm), rng)
         every = tuple(range(len(nuisance.columns)))
         hyperparameters = Hyperparameters(1.0, 0.0, 0.0, 1.0, CORRELATED_ROWS)
         return cls(nuisance.arm, nuisance, hyperparameters, every, patches_body=True)
@@ -165,7 +157,7 @@ class JointFit:
 
     def arm_at(self, named: Sequence[NamedEffect], means: FloatArray) -> ArmModel:
         """Return the arm with the named effects and, if `patches_body`, the fitted rigid body."""
-        change = means[: self.nuisance.rank]
+        change = means[: self.nuisance.base.rank]
         arm, base, theta = self.arm, self.nuisance.base, self.arm.theta
         if self.patches_body and np.any(change):
             arm = arm.with_theta(base.lift(base.values(theta) + change, theta))
@@ -188,7 +180,7 @@ class JointFit:
         rows = self.nuisance.rows
         nuisance = self.with_model(fitted.arm)
         means = fitted.means.copy()
-        means[: self.nuisance.rank] *= not self.patches_body
+        means[: self.nuisance.base.rank] *= not self.patches_body
         found = []
         for k in np.flatnonzero(rows.diagnosed).tolist():
             whole, start = nuisance.noise_at(means, self.hyperparameters, k), 0

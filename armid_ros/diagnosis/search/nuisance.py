@@ -139,21 +139,16 @@ class Nuisance:
             (np.array([x.T @ x for x, _ in pairs]), np.array([x.T @ y for x, y in pairs])),
         )
 
-    @property
-    def rank(self) -> int:
-        """Number of base parameters of rigid body and friction."""
-        return self.base.rank
-
     @cached_property
     def discrepancy(self) -> npt.NDArray[np.intp]:
         """Indices (n, f) of the f columns for the model discrepancy of each joint."""
         size = self.columns[0].shape[2]
-        return np.arange(self.rank, size).reshape(len(self.columns[0]), -1)
+        return np.arange(self.base.rank, size).reshape(len(self.columns[0]), -1)
 
     @cached_property
     def acting(self) -> list[list[tuple[npt.NDArray[np.intp], FloatArray]]]:
         """Nonzero columns of each joint in each recording: indices and values (M, c)."""
-        body = np.arange(self.rank)
+        body = np.arange(self.base.rank)
         places = [np.concatenate([body, own]) for own in self.discrepancy]
         return [
             [(place, x[:, place]) for place, x in zip(places, columns, strict=True)]
@@ -260,7 +255,9 @@ class Nuisance:
         unit = self.rows.amplitude[0]
         rigid = self.base.independent < len(self.arm.robot.rigid_parameters)
         scale = np.where(rigid, hyperparameters.body or 1.0, 1.0)
-        squares = np.diagonal(self.column_products[0], axis1=1, axis2=2).sum(axis=0)[: self.rank]
+        squares = np.diagonal(self.column_products[0], axis1=1, axis2=2).sum(axis=0)[
+            : self.base.rank
+        ]
         body = self.prior_precision / np.outer(scale, scale)
         body += _MIN_PRECISION * np.diag(np.where(squares > 0.0, squares, 1.0))
         shared = max(hyperparameters.shared, _MIN_PRECISION)
@@ -269,7 +266,7 @@ class Nuisance:
         others = np.concatenate([size.ravel(), *of_causes]) ** -2.0
         whole = linalg.block_diag(body, np.diag(others))
         fitted = np.ones(len(whole), dtype=bool)
-        fitted[: self.rank] = (hyperparameters.body > 0.0) | self.unset
+        fitted[: self.base.rank] = (hyperparameters.body > 0.0) | self.unset
         fitted[self.discrepancy.ravel()] = hyperparameters.shared > 0.0
         used = np.flatnonzero(fitted)
         return used, whole[np.ix_(used, used)]

@@ -14,7 +14,6 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import combinations, pairwise
-from pathlib import Path
 from typing import TypeAlias
 
 from armid_ros.diagnosis.search.cause import Cause
@@ -207,8 +206,9 @@ def acting_spans(ranking: Ranking, thresholds: Thresholds) -> tuple[Span, ...]:
     rows, result = nuisance.rows, []
     for number, (k, (a, b)) in enumerate(spans.items()):
         edges, t = own.edges[k], own.times[k]
-        name = Path(next(part.source for part in rows.data if part.fold == k)).name
-        whole = b - a == len(edges) - 1
+        name = next(part.source for part in rows.data if part.fold == k)
         start, stop = (float(t[min(edges[x], len(t) - 1)]) for x in (a, b))
-        result.append(Span(name or f'recording {number + 1}', start, stop, whole))
+        result.append(
+            Span(name or f'recording {number + 1}', start, stop, b - a == len(edges) - 1)
+        )
     return tuple(result)

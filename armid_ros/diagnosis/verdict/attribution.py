@@ -20,6 +20,7 @@ from armid_ros.diagnosis.search.explanation import Explanation
 from armid_ros.diagnosis.search.joint_fit import JointFit
 from armid_ros.diagnosis.search.nuisance import Nuisance
 from armid_ros.diagnosis.settings import DiagnosisSettings
+from armid_ros.identification.fitting.identifiability import HALF_WIDTH
 from armid_ros.motion import FloatArray
 import numpy as np
 
@@ -49,6 +50,11 @@ class Attribution:
         share = self.gains[list(names)].sum() / max(float(self.gap.sum()), 1e-300)
         return min(float(share), 1.0)
 
+    def worsens(self, cause: int) -> bool:
+        """Return whether a cause increases the squared residual significantly, at 95 %."""
+        gains = self.gains[cause]
+        return bool(gains.sum() + HALF_WIDTH * gains.std() * np.sqrt(len(gains)) < 0.0)
+
     def interval(self, names: Sequence[int], rng: np.random.Generator) -> tuple[float, float]:
         """Return the 95 % interval of the share that given causes explain together."""
         # with 500 resamples, the ends of the interval are accurate to a tenth of its width
@@ -60,11 +66,7 @@ class Attribution:
 
 
 def headline(
-    explanation: Explanation,
-    unseen: Evidence | None,
-    least: float,
-    settings: DiagnosisSettings,
-    rng: np.random.Generator,
+    explanation: Explanation, unseen: Evidence | None, least: float, settings: DiagnosisSettings
 ) -> tuple[Explanation, Attribution]:
     """
     Move causes that explain little to the minor causes; return the shares of the others.
@@ -72,8 +74,8 @@ def headline(
     Shares are cross-validated, and also measured on held-out recordings if there are any. A cause
     is minor if its larger share is below `least`, or its returned share below `inexact`, and no
     joint has a gap without it: a cause may act in some motions only. It is minor as well if it
-    increases one of the prediction errors significantly: the 95 % interval of its share is below
-    zero. The returned shares are those of held-out recordings if there are any.
+    increases one of the prediction errors significantly. The returned shares are those of held-out
+    recordings if there are any.
 
     Parameters
     ----------
@@ -85,8 +87,6 @@ def headline(
         Smallest share of a cause in the headline.
     settings : DiagnosisSettings
         Limits of a residual without gap.
-    rng : numpy.random.Generator
-        Resamples the time blocks.
 
     """
     if not explanation.steps:
@@ -104,10 +104,10 @@ def headline(
         limits = explanation.evidence.limits(explanation.residual, settings)
         opens = (fewer.chi2_per_row > limits) & (explanation.chi2_per_row <= limits)
         if not np.any(opens):
-            return headline(fewer, unseen, least, settings, rng)
-    worse = [k for k in causes if any(one.interval([k], rng)[1] < 0.0 for one in measured)]
+            return headline(fewer, unseen, least, settings)
+    worse = [k for k in causes if any(one.worsens(k) for one in measured)]
     if worse:
-        return headline(explanation.without(*worse), unseen, least, settings, rng)
+        return headline(explanation.without(*worse), unseen, least, settings)
     return explanation, held_out or fitted
 
 
@@ -170,7 +170,7 @@ def _folds(
     """
     rows = linear.rows
     part_of_arm = np.ones(linear.cross.shape[1], dtype=bool)
-    part_of_arm[: linear.rank] = problem.patches_body
+    part_of_arm[: linear.base.rank] = problem.patches_body
     part_of_arm[linear.discrepancy] = False
     for k in (k for k in problem.recordings if rows.diagnosed[k]):
         block, fold = block_rows([part for part in rows.data if part.fold == k])

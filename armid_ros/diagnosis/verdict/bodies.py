@@ -124,7 +124,7 @@ def as_bodies(explanation: Explanation) -> tuple[Explanation, tuple[str, ...]]:
 def _products(problem: JointFit, fitted: Fitted) -> tuple[FloatArray, float]:
     """Return inner products of the base parameters' columns and torque, and the row count."""
     nuisance, base = problem.nuisance, problem.nuisance.base
-    rank = nuisance.rank
+    rank = nuisance.base.rank
     then, now = (base.values(x.theta[: len(base.standard)]) for x in (problem.arm, fitted.arm))
     patched = problem.with_model(fitted.arm)
     products = np.zeros((rank + 1, rank + 1))

@@ -129,6 +129,7 @@ def _finding(finding: Finding) -> dict[str, Any]:
 def _gap(diagnosis: Diagnosis) -> dict[str, Any]:
     joints, units = diagnosis.arm.robot.joints, diagnosis.arm.robot.torque_units
     gap = diagnosis.gap
+    data = 'held-out' if gap and gap.predicted else 'the data it was found in'
 
     def table(name: str) -> dict[str, float]:
         rows = [] if gap is None else zip(joints, getattr(gap, name), strict=True)
@@ -141,7 +142,7 @@ def _gap(diagnosis: Diagnosis) -> dict[str, Any]:
         'after': table('after'),
         'noise_floor': table('floor'),
         'closed_fraction': gap.closed if gap else 0.0,
-        'data': gap.data if gap else 'none',
+        'data': data if gap else 'none',
     }
 
 

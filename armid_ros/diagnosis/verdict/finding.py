@@ -169,8 +169,6 @@ class Overlay:
 
     Attributes
     ----------
-    source : str
-        Name of the recording.
     trajectory : Trajectory
         Motion of the recording.
     measured, before, after : ndarray, shape (M, n)
@@ -180,7 +178,6 @@ class Overlay:
 
     """
 
-    source: str
     trajectory: Trajectory
     measured: FloatArray
     before: FloatArray
@@ -230,17 +227,16 @@ class Gap:
             Held-out recordings, weighted by the floor of the gap.
 
         """
-        before, after = explanation.reference.arm, explanation.fitted.arm
         evidence = explanation.evidence if unseen is None else unseen
-        residuals = [evidence.residuals(arm) for arm in (before, after)]
+        residuals = [
+            evidence.residuals(x.arm) for x in (explanation.reference, explanation.fitted)
+        ]
         overlays = []
         for part, sigma, given, patched in zip(
             evidence.data, evidence.sigma, *residuals, strict=True
         ):
             torque = part.torque
-            overlays.append(
-                Overlay(part.source, part, torque, torque - given, torque - patched, sigma)
-            )
+            overlays.append(Overlay(part, torque, torque - given, torque - patched, sigma))
         power = [evidence.power(rows) for rows in residuals]
         floor = evidence.power([np.broadcast_to(o.sigma, o.measured.shape) for o in overlays])
         excess = [np.maximum(own - floor, 0.0) / np.maximum(floor, 1e-24) for own in power]
@@ -255,11 +251,6 @@ class Gap:
             unseen is not None,
             tuple(overlays),
         )
-
-    @property
-    def data(self) -> str:
-        """Which recordings the residual is measured in: held-out or fitted."""
-        return 'held-out' if self.predicted else 'the data it was found in'
 
 
 @dataclass(frozen=True)

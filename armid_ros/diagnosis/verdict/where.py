@@ -14,7 +14,6 @@ from armid_ros.diagnosis.search.explanation import Explanation
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.motion import FloatArray, read_only
 import numpy as np
-import numpy.typing as npt
 
 
 @dataclass(frozen=True)
@@ -111,11 +110,12 @@ def locate_remaining_gap(
     explanation: Explanation,
     evidence: Evidence,
     settings: DiagnosisSettings,
-    new: npt.NDArray[np.bool_],
+    laws: Sequence[Excess],
 ) -> tuple[Where, ...]:
-    """Describe the remaining residual of each joint whose residual exceeds the limit."""
+    """Describe the remaining residual of each joint over its limit, or with an unlisted law."""
     residual = evidence.residuals(explanation.fitted.arm)
     losses, limits = evidence.chi2_per_row(residual), evidence.limits(residual, settings)
+    new = np.any([one.ratio > 1.0 for one in laws], axis=0)
     gap = np.where(new, losses, np.where(losses > limits, losses - 1.0, 0.0))
     return locate(explanation.given, evidence, residual, gap)
 

@@ -33,6 +33,7 @@ class Verdict(NamedTuple):
 
     word: Word
     summary: str
+    contradicted: bool = False  # whether held-out data contradict the best candidate
 
 
 def decide(
@@ -90,6 +91,10 @@ def decide(
     shown = bool(minor) and minor[0].share >= 0.01
     small = sentence(minor[0], DIFFERENCE if open_gap else 'the remaining error') if shown else ''
     if not findings:
+        if open_gap and gap is not None and gap.predicted and minor and minor[0].share > 0.5:
+            text = f'The held-out recordings contradict {names_and_places(minor[:1])}, which '
+            text += f'explains {percent(minor[0].share)} of the other recordings.'
+            return Verdict('unknown', text, contradicted=True)
         if open_gap:
             text = f'No effect in the catalogue explains {error}. It is {size}.'
             text += f' Best candidate: {small}' if small else ''

@@ -314,7 +314,7 @@ def _candidate_value(diagnosis: Diagnosis, trial: CauseResult) -> str:
 def gap_section(diagnosis: Diagnosis, gap: Gap) -> Section:
     """Return the section with each joint's torque error, without and with named effects."""
     usual_error, harmful = diagnosis.baseline, bool(diagnosis.harmful)
-    recordings = 'recordings not used for the fit' if gap.predicted else gap.data
+    recordings = 'recordings not used for the fit' if gap.predicted else 'the data it was found in'
     unpatched = ' The model in model.yaml does not have the named cause.' * harmful
     return Section(
         'Error of each joint',
