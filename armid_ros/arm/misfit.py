@@ -107,8 +107,8 @@ class Misfit:
         missing = [joint for joint in robot.joints if joint not in self.rms]
         if missing:
             raise ModelError(
-                f"the misfit of the model has no joint '{missing[0]}'; its joints are "
-                f'{", ".join(self.rms)}'
+                f"the model has no misfit of joint '{missing[0]}'; identify the arm again. "
+                f'Joints with a misfit: {", ".join(self.rms)}'
             )
         residual = np.array([self.rms[joint] for joint in robot.joints])
         if torque_rms is None or self.torque_rms is None:
@@ -134,11 +134,11 @@ def misfit_of_block(block: Any) -> Misfit:
                 raise ModelError(f'misfit: {", ".join(RowFilters._fields)} have to be positive')
             filters = RowFilters(found[0], found[1], round(found[2]))
     except (AttributeError, KeyError, TypeError) as fault:
-        raise ModelError(f'entry misfit of the model file is malformed: {fault}') from fault
+        raise ModelError(f"the entry 'misfit' of the model is malformed: {fault}") from fault
     if data not in _DATA:
         raise ModelError(f"misfit: 'data' is '{data}', but has to be {' or '.join(_DATA)}")
     if loud is not None and not loud.keys() >= rms.keys():
-        raise ModelError("misfit: a joint of 'rms' is missing in 'torque_rms'")
+        raise ModelError(f"misfit: 'torque_rms' lacks joint '{min(rms.keys() - loud.keys())}'")
     relative = finite(error, 'relative_error_percent of the misfit')
     return Misfit(data, rms, relative, loud, filters=filters)
 

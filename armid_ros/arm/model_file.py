@@ -285,7 +285,7 @@ def checked_model(text: str) -> dict[str, Any]:
     """
     document = load_yaml(text)
     if not isinstance(document, dict) or document.get('schema') != SCHEMA:
-        raise ModelError(f"the file is not an arm model: its 'schema' has to be {SCHEMA}")
+        raise ModelError(f"'schema' has to be {SCHEMA}; give a model.yaml of armid identify")
     strange = [key for key in document if key not in _KEYS]
     if strange:
         line = yaml_line(text, (strange[0],))
