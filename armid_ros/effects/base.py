@@ -92,7 +92,7 @@ class Effect(ABC):
         if len(values) != len(defaults):
             raise ModelError(
                 f'{self.name}: {len(values)} shape values were given, but {len(defaults)} are '
-                f'needed, {", ".join(s.name for s in self.shapes) or "none"} of each joint'
+                f'needed: for each joint {", ".join(s.name for s in self.shapes) or "none"}'
             )
         for index, value in enumerate(values):
             shape = self.shapes[index % len(self.shapes)]

@@ -156,7 +156,7 @@ def _unit(gravity: FloatArray) -> FloatArray:
     """Return the unit vector along gravity; raise a ModelError if gravity is zero."""
     length = np.linalg.norm(gravity)
     if not length > 0.0:
-        raise ModelError('effects on gravity need a model with gravity, but its gravity is zero')
+        raise ModelError('gravity is zero, so no effect can tilt or scale it; set --gravity')
     return np.asarray(gravity / length)
 
 

@@ -157,7 +157,7 @@ class TorqueMap:
         except (TypeError, ValueError) as error:
             raise ModelError(f'{torque_map}: {error}') from None
         if not np.all(np.isfinite(table)) or np.any(np.isnan(lengths)):
-            raise ModelError(f'{torque_map}: a number is not finite')
+            raise ModelError(f'{torque_map}: a number is not finite; learn the map again')
         size, knee = (
             finite(entry[key], f'{key} of the {torque_map}') for key in ('amplitude', 'knee')
         )
@@ -210,7 +210,7 @@ class LearnedTorque(Effect):
             return self
         lost = [joint for joint in self.joints if joint not in found]
         if lost:
-            raise ModelError(f"{self.name}: the model file has no map of joint '{lost[0]}'")
+            raise ModelError(f"{self.name}: model.yaml has no torque map of joint '{lost[0]}'")
         maps = tuple(TorqueMap.of_document(found[joint], joint) for joint in self.joints)
         return replace(self, maps=maps)
 

@@ -115,7 +115,7 @@ class Tied(Attached):
         def unknown(t: FloatArray) -> tuple[FloatArray, FloatArray]:
             raise ModelError(
                 f'{self.name} of {", ".join(self.joints)} needs the recorded motion of '
-                f'{self.partner or "its partner"}; remove it from the model to simulate'
+                f'{self.partner or "a partner"}; to simulate, remove {self.name} from the model'
             )
 
         return self.anchor or unknown
