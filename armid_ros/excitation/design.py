@@ -155,7 +155,7 @@ def design(
                 f"parameters, not of shape {prior.shape}, and cannot be used with criterion 'T'"
             )
         if not np.all(np.isfinite(prior)):
-            raise TrajectoryError('prior information: not all entries are finite numbers')
+            raise TrajectoryError('prior information: all entries have to be finite numbers')
 
     search = Search(problem, clearance, prior, rng.spawn(1)[0], progress)
     stopped = search.run()
@@ -203,7 +203,7 @@ def with_run_in(problem: DesignProblem, trajectory: FourierTrajectory) -> Excita
                 return run
             reason = f'in {run_in:.3g} s, {faults}'
         run_in *= 1.5
-    raise TrajectoryError(f'no run-in of the trajectory stays inside the limits: {reason}')
+    raise TrajectoryError(f'no start from rest keeps the limits: {reason}; try another --seed')
 
 
 def evaluate(

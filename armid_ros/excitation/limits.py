@@ -346,11 +346,11 @@ def _with_file(robot: Robot, path: Path) -> Robot:
         if not isinstance(entries, dict):
             raise TrajectoryError('the key joint_limits of MoveIt is missing, or has no mapping')
         if not entries.keys() & set(robot.joints):
-            raise TrajectoryError(f'the file has no limits for any of {", ".join(robot.joints)}')
+            raise TrajectoryError(f'joint_limits has none of the joints {", ".join(robot.joints)}')
         for j, joint in enumerate(robot.joints):
             entry = {} if entries.get(joint) is None else entries[joint]
             if not isinstance(entry, dict):
-                raise TrajectoryError(f'joint {joint}: its entry is not a mapping of limits')
+                raise TrajectoryError(f'the entry of joint {joint} is not a mapping of limits')
             if entry.get('has_position_limits'):
                 ends = [
                     finite(entry.get(key), f'{joint}: {key}')

@@ -224,7 +224,7 @@ def load_environment(path: str | Path, robot: Robot | None = None) -> tuple[Obst
             return _scene_obstacles(document, robot)
         # the obstacles of a list of mappings with the attributes of `Obstacle`
         if not isinstance(document, list):
-            raise TrajectoryError('the file has to be a list of obstacles, or a planning scene')
+            raise TrajectoryError('expected a list of obstacles, or a planning scene of MoveIt')
         found: list[Obstacle] = []
         known = tuple(Obstacle.__dataclass_fields__)
         for number, entry in enumerate(document, 1):
