@@ -63,8 +63,8 @@ def connected(scheduler: str | None, workers: int | None = None) -> Iterator[Cli
         other = {str(worker['packages']['armid_ros']) for worker in found} - {__version__}
         if other:
             raise FleetError(
-                f'--scheduler {scheduler}: its workers have armid_ros {", ".join(sorted(other))}, '
-                f'here it is {__version__}; install the same version'
+                f'--scheduler {scheduler}: workers have armid_ros {", ".join(sorted(other))}, but '
+                f'this computer has {__version__}; install one version everywhere'
             )
         yield client
 

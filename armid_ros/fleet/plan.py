@@ -310,7 +310,7 @@ def document(store: Store) -> dict[str, Any]:
         found: Mapping[str, Any] = json.loads(data.decode())
         if found['schema'] != SCHEMA:
             raise FleetError(
-                f'the file has the schema {found["schema"]}, not {SCHEMA}; name another --out'
+                f'schema {found["schema"]} is of another version, not {SCHEMA}; name another --out'
             )
     return dict(found)
 
