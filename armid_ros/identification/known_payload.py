@@ -210,8 +210,8 @@ def drive_gains(
     values, std, width = (np.array(one) for one in zip(*gains, strict=True))
     if not np.any(np.isfinite(std)):
         raise IdentificationError(
-            '--payload: no gain is determined; it needs the same motion with and without the '
-            'payload, and a payload that is heavy enough'
+            '--payload: no drive gain is determined; record one motion with and without the '
+            'payload, or use a heavier payload'
         )
     return DriveGains(arm.robot.joints, values, std, width)
 

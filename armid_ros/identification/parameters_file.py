@@ -201,7 +201,7 @@ def read_parameters(path: str | Path) -> ParameterFile:
             document = json.loads(text) if path.suffix == '.json' else load_yaml(text)
         except (ValueError, yaml.YAMLError) as error:
             reason = ' '.join(str(error).split())
-            raise ModelError(f'this file is neither JSON nor YAML: {reason}') from error
+            raise ModelError(f'the content is neither JSON nor YAML: {reason}') from error
         if not isinstance(document, dict) or document.get('schema') not in _SCHEMAS:
             raise ModelError(f"the key 'schema' has to be {' or '.join(_SCHEMAS)}")
         document = checked_model(text) if document['schema'] == MODEL else document
@@ -285,7 +285,7 @@ def parameters_of(source: str, document: dict[str, Any]) -> ParameterFile:
         name = ParameterName(str(row['name']), str(row['joint']), str(row['unit']))
         parameter = f'{name.name} of joint {name.joint}'
         if name in values:
-            raise ValueError(f'{parameter} is given twice')
+            raise ValueError(f'{parameter} is given twice; remove one of the entries')
         value = finite(row['value'], parameter)
         if row.get('std') is None:
             continue
@@ -367,7 +367,7 @@ def _covariance(rows: list[list[float]] | None, size: int) -> FloatArray | None:
     for index, row in enumerate(rows):
         matrix[index, : index + 1] = matrix[: index + 1, index] = row
     if not np.isfinite(matrix).all():
-        raise ValueError('the covariance contains a number that is not finite')
+        raise ValueError('a number of the covariance is not finite; identify the arm again')
     deviations = np.sqrt(np.maximum(np.diag(matrix), 0.0))
     largest = np.outer(deviations, deviations)
     # numbers in the file have 16 digits

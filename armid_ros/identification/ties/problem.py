@@ -175,7 +175,7 @@ def interaction_problem(
     """
     robot, other, ties = machines.robot, machines.other, machines.ties
     if motion.tau is None:
-        raise IdentificationError(f'{robot.name}: its motion has no torques to identify springs')
+        raise IdentificationError(f'{robot.name}: no torques to find stiffness; record the effort')
     if len(motion) != len(other_motion) or np.max(np.abs(motion.t - other_motion.t)) > 1e-6:
         raise IdentificationError(
             f'the motions of {robot.name} and {other.name} have to be on one time base'

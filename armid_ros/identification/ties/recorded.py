@@ -64,7 +64,7 @@ def recorded_interaction_problem(
 
     """
     if recording.tau is None:
-        raise IdentificationError(f'{recording.source}: topic {recording.topic} has no effort')
+        raise IdentificationError(f'{recording.source}: no effort on {recording.topic}; record it')
     together = recorded_together(recording, other_recording, machines.other, machines.ties)
     settings = SignalSettings()
     both = _one_machine(together)
@@ -148,7 +148,7 @@ def stacked(problems: Sequence[InteractionProblem]) -> InteractionProblem:
 
     """
     if any(part.rigid != problems[0].rigid for part in problems):
-        raise IdentificationError('a gap-free section has too little motion for free inertias')
+        raise IdentificationError('a section has too little motion to fit inertias; record longer')
     joined = {name: np.concatenate([getattr(part, name) for part in problems]) for name in STACKED}
     return replace(problems[0], **joined)  # type: ignore[arg-type]
 
