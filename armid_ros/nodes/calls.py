@@ -66,8 +66,8 @@ def call_publisher(node: str, action: str, speed: float | None, timeout: float) 
         executor.spin_until_future_complete(future, max(end - time.monotonic(), 0.1))
         if not future.done():
             raise TrajectoryError(
-                f'{name} did not answer the call of {action} within {timeout:g} s; whether it '
-                'was executed is unknown'
+                f'{name} did not answer the call of {action} within {timeout:g} s; the node may '
+                'still execute the call, so watch the arm'
             )
         answer = future.result()
     finally:

@@ -236,7 +236,7 @@ class ExcitationPublisherNode(ArmidNode):
             return self.log(f'stopped {elapsed:.2f} s after the start')
         ending = self._current_ending()
         if ending is None:
-            raise TrajectoryError('no excitation is running')
+            raise TrajectoryError('no excitation is running; ~/start starts one')
         if ending.last is None:
             raise TrajectoryError(f'{ending.reason}; stop the arm with the client that moves it')
         now, limits = self._arm.now(), map(self.value, ('tracking_tolerance', 'stopping'))
@@ -293,11 +293,11 @@ class ExcitationPublisherNode(ArmidNode):
         """Raise a TrajectoryError if the arm may move: checks of a path would block the node."""
         self._require_no_run()
         if self._ending is not None and self._ending.reason:
-            raise TrajectoryError('whether the arm is at rest after its stop is not yet known')
+            raise TrajectoryError('the arm may still move after a stop; try again in a second')
 
     def _loaded(self, path: str) -> Excitation:
         if not path:
-            raise TrajectoryError('a running node cannot design an excitation; name a file')
+            raise TrajectoryError('a running node designs no excitation; set an excitation.yaml')
         return checked(load_excitation(path), self._planner, path)
 
     def close(self) -> None:
@@ -435,7 +435,7 @@ class ExcitationPublisherNode(ArmidNode):
     def _on_experiment(self, message: String) -> None:
         """Load an excitation from the topic experiment; only ~/start runs it."""
         if self._waiting:
-            raise TrajectoryError('an excitation begins soon; the new excitation is ignored')
+            raise TrajectoryError('an excitation begins soon; send the new excitation later')
         self._require_rest()
         excitation = read_excitation(message.data, self._experiments.topic_name)
         self._excitation = checked(excitation, self._planner, self._experiments.topic_name)

@@ -143,7 +143,7 @@ class IdentificationRunNode(ArmidNode):
             self._complete = now
         try:
             if now - self._complete > _GONE:
-                raise ArmidError(f'{self._step}, but {" and ".join(self._missing())} ended')
+                raise ArmidError(f'{" and ".join(self._missing())} ended in step: {self._step}')
             while self._wait[1]():
                 self._wait = next(self._script)
                 if self._wait[0] != self._step:
@@ -192,8 +192,8 @@ class IdentificationRunNode(ArmidNode):
         )
         if self._missing():
             raise ArmidError(
-                f'{" and ".join(self._missing())} did not start within patience, '
-                f'{self.value("patience"):g} s'
+                f'{" and ".join(self._missing())} did not start within '
+                f'{self.value("patience"):g} s; start them, or increase the parameter patience'
             )
         if self.value('rehearse'):
             yield from self._run_excitation('rehearse')

@@ -190,8 +190,8 @@ class JointStateMergerNode(ArmidNode):
             if not known:
                 there = sorted({name for part in parts for name in part.interface_names})
                 raise RecordingError(
-                    f"no joint of effort_topic has the interface '{interface}'; its interfaces "
-                    f'are {", ".join(there)}'
+                    f"no joint of effort_topic has '{interface}'; set the parameter "
+                    f'effort_interface to {" or ".join(there)}'
                 )
         else:
             names, values = self._effort_names, getattr(message, 'data', None)
@@ -213,8 +213,8 @@ class JointStateMergerNode(ArmidNode):
         some = [k for k, name in enumerate(called) if math.isfinite(known.get(name, math.nan))]
         if not some:
             raise RecordingError(
-                f'a message has torques of {", ".join(known)}, but of none of the joints '
-                f'{", ".join(called)}'
+                f'torques of {", ".join(known)} were received, but none of the joints '
+                f'{", ".join(called)}; correct the parameter effort_joints or joints'
             )
         torques = np.array([known[called[k]] for k in some]) * self._gains[some]
         self._merge(tuple(n + k for k in some), stamp, np.vstack([torques, torques]))

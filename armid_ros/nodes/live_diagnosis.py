@@ -358,7 +358,7 @@ class LiveDiagnosisNode(ListeningNode):
     def _require(self, *, diagnosed: bool = False) -> LiveDiagnosis:
         """Return the schedule; raise an error if there is no robot or no diagnosis yet."""
         if self.live is None:
-            raise IdentificationError('the robot is not known: no robot_description was received')
+            raise IdentificationError('no robot_description was received; set the parameter robot')
         if diagnosed and self.live.latest is None:
             raise IdentificationError('no diagnosis is complete so far')
         return self.live

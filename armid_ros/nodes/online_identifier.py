@@ -131,7 +131,7 @@ class OnlineIdentifierNode(ListeningNode):
         """Write estimate, arm model and URDF to files; return the answer of the service."""
         identifier = self._require()
         if not identifier.samples:
-            raise IdentificationError('no sample was used so far, so no file was written')
+            raise IdentificationError('no joint state was used so far, so no file was written')
         folder = Path(self.value('save_to') or _FOLDER).expanduser()
         refuse_replacing(folder, FILES)
         robot, estimate = identifier.arm.robot, identifier.estimate()
@@ -355,7 +355,7 @@ class OnlineIdentifierNode(ListeningNode):
     def _require(self) -> OnlineIdentifier:
         """Return the identifier; raise an error if the robot is not known yet."""
         if self.identifier is None:
-            raise IdentificationError('the robot is not known: no robot_description was received')
+            raise IdentificationError('no robot_description was received; set the parameter robot')
         return self.identifier
 
 

@@ -99,7 +99,7 @@ class RecorderNode(ArmidNode):
     def start(self) -> str:
         """Start a new bag; RecordingError if one is open or it cannot be created."""
         if self._writer is not None:
-            raise RecordingError(f'a recording into {self._writer.path} is already under way')
+            raise RecordingError(f'{self._writer.path} is being recorded; ~/stop ends it')
         name = self.value('bag') or f'armid_{datetime.now():%Y_%m_%d-%H_%M_%S}'
         # The path of the first bag must not exist; bags of later ~/start calls get a number.
         path = Path(name).expanduser()
@@ -120,7 +120,7 @@ class RecorderNode(ArmidNode):
     def stop(self) -> str:
         """Close the bag; return a text with its path and number of messages."""
         if self._writer is None:
-            raise RecordingError('no recording is under way')
+            raise RecordingError('no recording is under way; ~/start begins one')
         for subscription in self._subscriptions_by_topic.values():
             subscription.close()
         self._subscriptions_by_topic.clear()

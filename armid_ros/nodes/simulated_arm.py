@@ -215,7 +215,7 @@ class SimulatedArmNode(ArmidNode):
         with reading("parameter 'start'", RobotError):
             start = numbers(self.value('start'))
             if start and len(start) != n:
-                raise RobotError(f'the start pose has {len(start)} numbers, the arm {n} joints')
+                raise RobotError(f'the start pose has {len(start)} numbers, but needs {n}')
         return make_simulated_arm(
             self._with_effects(self.value('effects')),
             rng=np.random.default_rng(self.value('seed')),

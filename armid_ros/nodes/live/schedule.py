@@ -204,7 +204,7 @@ class LiveDiagnosis:
 
         """
         if self.proposed is None:
-            raise IdentificationError('no effect is proposed, so none can be accepted')
+            raise IdentificationError('no effect is proposed on ~/model, so none can be accepted')
         self.accepted = self.proposed
         if self._baseline and self.latest is not None:
             self._baseline = (self.latest.window,)
@@ -221,7 +221,7 @@ class LiveDiagnosis:
 
         """
         if self.proposed is None:
-            raise IdentificationError('no effect is proposed, so none can be rejected')
+            raise IdentificationError('no effect is proposed on ~/model, so none can be rejected')
         self._rejected.add(self.named[0])
         self._clear_proposal()
 
