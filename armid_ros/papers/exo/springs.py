@@ -240,7 +240,7 @@ class OnlineInteraction:
         n = robot.n_joints
         if len(self._own.t) < 2 or len(self._far.t) < 2:
             raise IdentificationError(
-                f'too few joint states of {robot.name} or {other.name} in the time window'
+                f'too few joint states of {robot.name} or {other.name}; check both topics'
             )
         begin = self._own.t[0]
         rows = np.array(self._own.rows)

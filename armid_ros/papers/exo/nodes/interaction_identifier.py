@@ -172,7 +172,7 @@ class InteractionIdentifierNode(ArmidNode):
         for name, part in zip(fields, parts, strict=True):
             if len(part) != len(message.name):
                 raise RecordingError(
-                    f'{len(message.name)} joint names but {len(part)} values of {name}'
+                    f'a message has {len(message.name)} names, but {len(part)} values of {name}'
                 )
         signal = np.concatenate([part[order] for part in parts])
         if not np.all(np.abs(signal) <= MAX_MAGNITUDE):
@@ -181,7 +181,7 @@ class InteractionIdentifierNode(ArmidNode):
             )
         stamp = message.header.stamp
         if stamp.sec < 0 or stamp.nanosec >= 10**9:
-            raise RecordingError(f'invalid timestamp: {stamp.sec} s, {stamp.nanosec} ns')
+            raise RecordingError(f'a stamp is invalid: {stamp.sec} s, {stamp.nanosec} ns')
         if self._epoch is None:
             self._epoch = stamp.sec
         good = gate.take(float(stamp.sec - self._epoch) + 1e-9 * stamp.nanosec, signal)

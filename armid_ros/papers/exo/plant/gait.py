@@ -129,7 +129,7 @@ def read_gait(path: Path | None = None) -> Gait:
         raise TrajectoryError(f'{path}: every row must have four finite numbers')
     if len(rows) < 2 * _HARMONICS + 1:
         raise TrajectoryError(
-            f'{path}: {len(rows)} rows; a gait cycle needs at least {2 * _HARMONICS + 1}'
+            f'{path}: a gait cycle needs {2 * _HARMONICS + 1} rows or more, not {len(rows)}'
         )
     return Gait.fit(rows[:, 0], np.radians(rows[:, 1:]))
 
