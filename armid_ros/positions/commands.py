@@ -120,7 +120,7 @@ def _controller_state(path: Path, robot: Robot, topic: Topic, settings: ReadSett
                     speed = dq[order] if len(dq) == len(q) else np.zeros(len(order))
                     rows.append((stamp.sec * 10**9 + stamp.nanosec, q[order], speed))
     if not rows:
-        raise RecordingError(f'{source} has no messages with positions')
+        raise RecordingError(f'{source} has no positions; name another topic in --commands')
     stamps, *both = (np.array(column) for column in zip(*rows, strict=True))
     stamps, index = np.unique(stamps, return_index=True)
     sampled = 1e-9 * (stamps - stamps[0])
