@@ -55,9 +55,7 @@ def decompressed(stored: _Buffer, compression: str, size: int, settings: ReadSet
     else:
         stated = int(lz4.frame.get_frame_info(stored)['content_size']) or -1
     if stated not in (-1, size):  # -1: the frame states no size
-        raise ValueError(
-            f'the header of the chunk states {stated} bytes of content, but the bag states {size}'
-        )
+        raise ValueError(f'the damaged chunk states {stated} bytes of content instead of {size}')
     settings.require(size, 'a chunk')
     if not size:
         return b''
@@ -67,9 +65,9 @@ def decompressed(stored: _Buffer, compression: str, size: int, settings: ReadSet
         decompressor = lz4.frame.LZ4FrameDecompressor()
         content = bytes(decompressor.decompress(stored, max_length=size))
         if not decompressor.eof and decompressor.decompress(b'', max_length=1):
-            raise ValueError(f'the chunk has more than the {size} bytes that the bag states')
+            raise ValueError(f'the damaged chunk has more than {size} bytes')
     if len(content) != size:
-        raise ValueError(f'the chunk has {len(content)} bytes, but the bag states {size}')
+        raise ValueError(f'the damaged chunk has {len(content)} bytes instead of {size}')
     return content
 
 

@@ -91,7 +91,7 @@ def read_accelerations(
         topic = bag.topic_of(IMU, topic).name
         messages = [b.message(k) for b in bag.blocks(topic) for k in range(len(b))]
     if not messages:
-        raise RecordingError(f'{path}: {topic} has no messages')
+        raise RecordingError(f'{path}: {topic} has no messages; record again')
     order = BYTE_ORDERS.get(messages[0][:2])
     if order is None or len(messages[0]) < 16:
         raise RecordingError(

@@ -123,7 +123,7 @@ def read_waypoints(
             cdr = block.message(len(block) - 1)
     where = f'{path}: {chosen.name}'
     if not cdr:
-        raise RecordingError(f'{where}: the topic has no messages')
+        raise RecordingError(f'{where}: the topic has no messages; record again')
     with reading(where, RecordingError):
         found = waypoints_of(bag.decoded(chosen, cdr))
     missing = [joint for joint in joints if joint not in found.joints]

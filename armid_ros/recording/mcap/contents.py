@@ -132,7 +132,7 @@ def _content(found: FileMap, chunk: Chunk, settings: ReadSettings) -> bytes | me
     if chunk.compression:
         content: bytes | memoryview = decompressed(stored, chunk.compression, chunk.size, settings)
     elif len(stored) != chunk.size:
-        raise ValueError(f'the chunk has {len(stored)} bytes, but the bag states {chunk.size}')
+        raise ValueError(f'the damaged chunk has {len(stored)} bytes instead of {chunk.size}')
     else:
         content = stored
     if settings.check_crc and zlib.crc32(content) != chunk.crc:

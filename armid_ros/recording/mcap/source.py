@@ -47,7 +47,7 @@ class McapSource(Source):
         super().__init__(path, settings)
         with open_regular(path, RecordingError) as stream:
             if not stream.seek(0, 2):
-                raise RecordingError(f'{path}: the file is empty')
+                raise RecordingError(f'{path}: the file is empty; record again')
             try:
                 data = mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ)
             except OSError as error:

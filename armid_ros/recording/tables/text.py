@@ -178,7 +178,8 @@ def _numbers(
     if wrong:
         j, k, cell = wrong[0]
         raise RecordingError(
-            f"{path}: line {first_line + k}, column {names[j]}: '{cell}' is not a number"
+            f"{path}: line {first_line + k}, column {names[j]}: '{cell}' is not a number; correct "
+            'the cell, or leave the cell empty'
         )
     words: dict[str, Sequence[str]] = {
         names[j]: [of.get(k, '') for k in range(len(values))] for j, of in texts.items()
