@@ -200,8 +200,8 @@ def _closing_range(
             break
     else:
         raise RobotError(
-            'a loop does not close around the position of its driven joints nearest to zero, or '
-            'its passive joints are beyond their limits there'
+            'a closed loop of the description does not close with its driven joints near zero, or '
+            'only with passive joints beyond their limits; correct its points or these limits'
         )
     ends[:, own] = (start + share / 1.1 * (ends - start))[:, own]
     within = [np.maximum(lower, ends[0]), np.minimum(upper, ends[1])]

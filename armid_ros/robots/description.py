@@ -200,7 +200,7 @@ def parse_description(root: ElementTree.Element) -> Description:
         name = _name(element, links)
         links[name] = _inertial(element, name)
     if not links:
-        raise RobotError('not a URDF: it has no links')
+        raise RobotError('not a URDF: <robot> has no links')
     joints: dict[str, Joint] = {}
     for element in root.findall('joint'):
         name = _name(element, joints)
@@ -232,7 +232,7 @@ def _loop(element: ElementTree.Element, links: Iterable[str], joints: Mapping[st
     if len(ends) != 2 or not passive or unknown:
         raise RobotError(
             'a <loop> needs two points of links and the passive movable joints that close it'
-            + (f"; '{unknown[0]}' is not among those of the file" if unknown else '')
+            + (f"; '{unknown[0]}' is not among the links and joints" if unknown else '')
         )
     return Loop((ends[0][0], ends[1][0]), (ends[0][1], ends[1][1]), passive)
 
@@ -286,7 +286,7 @@ def _check_tree(links: Iterable[str], joints: Iterable[Joint]) -> None:
 def _name(element: ElementTree.Element, taken: Iterable[str]) -> str:
     name = element.get('name')
     if not name:
-        raise RobotError(f'a <{element.tag}> has no name')
+        raise RobotError(f'a <{element.tag}> of the URDF has no name; add name="..."')
     if name in taken:
         raise RobotError(f"two {element.tag}s are named '{name}'")
     return name

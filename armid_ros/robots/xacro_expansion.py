@@ -83,14 +83,14 @@ def expand_xacro(path: Path, arguments: Mapping[str, str], packages: Mapping[str
         raise RobotError(f'{path}: xacro: cannot be started: {error.strerror}') from error
     if -done.returncode in (signal.SIGPROF, signal.SIGXCPU, signal.SIGKILL):
         raise RobotError(
-            f'{path}: xacro did not finish within {TIME_LIMIT:g} s of processor time and '
-            f'{MEMORY_LIMIT >> 20} MiB'
+            f'{path}: xacro did not finish within {TIME_LIMIT:g} s of processor time or '
+            f'{MEMORY_LIMIT >> 20} MiB of memory; does a macro call itself without end?'
         )
     answer: dict[str, Any] = {}
     with suppress(ValueError):  # the process ended without an answer
         answer = json.loads(done.stdout)
     if 'text' not in answer:
-        reason = answer.get('error') or f'did not finish within {MEMORY_LIMIT >> 20} MiB'
+        reason = answer.get('error') or f'needs more than {MEMORY_LIMIT >> 20} MiB of memory'
         raise RobotError(f'{path}: xacro: {reason}')
     return str(answer['text'])
 
