@@ -63,7 +63,7 @@ def plan_zero(
     trajectory = _tour(careful, inside, chosen, hold)
     faults = trajectory_faults(arm, limits, trajectory, planner.clearance)
     if faults:
-        raise TrajectoryError(f'the tour is not allowed: {faults}; try another --seed')
+        raise TrajectoryError(f'no path through all poses: {faults}; try another --seed')
     settings = replace(settings, period=trajectory.period, harmonics=trajectory.harmonics)
     core = evaluate(DesignProblem.of(model, settings, rng), trajectory)
     return ExcitationResult(core, arm, scene, seed=seed)
@@ -95,7 +95,7 @@ def _poses(
         reason = next(filter(None, map(planner.fault, drawn)))
         raise TrajectoryError(
             f'only {len(free)} of {len(drawn)} random poses are allowed, and {count} are needed: '
-            f'{reason}'
+            f'{reason}; ask for fewer --poses, or enlarge the free space'
         )
     sides = [Motion.of_states(robot.joints, free, side, 0.0) for side in (-1.0, 1.0)]
     columns = np.concatenate([model.effect_columns(side) for side in sides], axis=1)
@@ -141,7 +141,7 @@ def _tour(
         if not planner.fault(over):
             parts += [pose + bump * (over - pose), rest]
     if not np.array_equal(now, poses[0]):
-        raise TrajectoryError(f'no return path from the poses was found: {reason}')
+        raise TrajectoryError(f'no return path was found: {reason}; try another --seed')
     q = np.roll(np.concatenate(parts), count // 2, axis=0)  # begins and ends in a rest
     q = np.concatenate([q, np.tile(q[-1], (-len(q) % int(rate), 1))])  # whole seconds
     period = len(q) / rate
