@@ -21,7 +21,7 @@ import numpy as np
 @dataclass(frozen=True)
 class MotionGate:
     """
-    Safety check that each motion passes before it is sent to the arm in a run.
+    Safety check of each motion before the motion is sent to the arm.
 
     Attributes
     ----------
@@ -80,7 +80,7 @@ class MotionGate:
 
     def deviation(self, monitor: PoseMonitor, begun: float) -> tuple[FloatArray, FloatArray]:
         """
-        Return position and velocity of each joint relative to the run, when they were measured.
+        Return position and velocity errors of each joint at the time of the measurement.
 
         Parameters
         ----------
@@ -313,7 +313,7 @@ class Ending:
     def _held(
         self, last: Motion, monitor: PoseMonitor, now: float, tolerance: float
     ) -> tuple[Ending, Motion | None, str]:
-        """Hold a blocked arm at its measured position if this step of the set point is allowed."""
+        """Hold a blocked arm at the measured position if the step of the set point is allowed."""
         ending, measured, elapsed = replace(self, blocked=False), monitor.q, now - self.sent
         begin = self.gate.run.at([self.sent - self.begun])
         over = elapsed >= last.t[-1]

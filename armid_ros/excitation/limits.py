@@ -60,7 +60,7 @@ class Limits:
     prismatic: npt.NDArray[np.bool_]
 
     def __post_init__(self) -> None:
-        """Freeze the limits; raise a TrajectoryError if a joint cannot move within them."""
+        """Freeze the limits; raise a TrajectoryError if a joint cannot move within the limits."""
         n = len(self.joints)
         for limit in ('lower', 'upper', 'velocity', 'acceleration', 'torque'):
             values = read_only(getattr(self, limit))

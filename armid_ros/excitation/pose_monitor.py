@@ -261,7 +261,7 @@ class PoseMonitor:
         )
 
     def _contradicted(self, source: _Source, state: _State, seen: float) -> str:
-        """Return a message if a state contradicts the last one of its own or of another sender."""
+        """Return a message if a state contradicts the last state of any sender."""
         fault = self._unreachable(source, state, source.states[-1]) if source.states else ''
         if fault or (source.states and source.states[-1].arrived >= seen):
             return fault
@@ -269,7 +269,7 @@ class PoseMonitor:
         return self._unreachable(source, state, others)
 
     def _unreachable(self, source: _Source, state: _State, last: _State) -> str:
-        """Return a message if a new position is too far from the last, or its stamp too old."""
+        """Return a message if a position is too far from the last one, or a stamp too old."""
         if state.stamp_ns and state.stamp_ns <= last.stamp_ns:
             back = (last.stamp_ns - state.stamp_ns) * 1e-9
             return (

@@ -22,7 +22,7 @@ import numpy.typing as npt
 @dataclass(frozen=True)
 class Run:
     """
-    Excitation with an approach from the start pose and a return to it.
+    Excitation with an approach from the start pose and a return to the start pose.
 
     Attributes
     ----------
@@ -132,7 +132,7 @@ def plan_run(
     seed: int = 0,
 ) -> Run:
     """
-    Plan a run: from the present pose to the excitation, along it, and back.
+    Plan a run: approach from the present pose, excitation, and return.
 
     Parameters
     ----------

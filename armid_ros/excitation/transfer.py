@@ -30,7 +30,7 @@ class Transfer(Reference):
         super().__post_init__()
 
     def at(self, t: npt.ArrayLike) -> Motion:
-        """Return the motion at given times (N,) [s]; the arm rests before and after it."""
+        """Return the motion at given times (N,) [s]; the arm rests before and after the motion."""
         return self.sample(np.clip(np.asarray(t, dtype=float), 0.0, self.duration))
 
     def lasting(self, duration: float) -> Transfer:

@@ -179,7 +179,7 @@ def obstacles_alone(collision: CollisionModel, obstacles: Sequence[Obstacle]) ->
 
 
 def body_name(collision: CollisionModel, number: int) -> str:
-    """Return the name of a collision body for messages: its link, joint or obstacle."""
+    """Return the link, joint or obstacle of a collision body, as its name in messages."""
     body = collision.geometry.geometryObjects[number]
     frame = int(body.parentFrame)
     link = str(collision.robot.model.frames[frame].name)

@@ -286,7 +286,7 @@ def floor_obstacles(
 
 
 def _why_not_standing(collision: CollisionModel, up: FloatArray) -> str:
-    """Return why an arm cannot stand on its base plane; empty if it can."""
+    """Return why an arm cannot stand on the plane of its base; empty if possible."""
     normal = np.array([0.0, 0.0, 1.0])
     if up[2] < np.cos(np.pi / 4.0):
         return 'gravity does not pull it onto its base plane'

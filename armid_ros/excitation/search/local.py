@@ -51,7 +51,7 @@ class _OutOfTime(Exception):
 
 class Search:
     """
-    Search for the trajectory with least cost; if stopped, it keeps the best so far.
+    Search for the trajectory with least cost; an early stop keeps the best trajectory.
 
     Parameters
     ----------
@@ -132,7 +132,7 @@ class Search:
         return ''
 
     def keep_best(self, trajectory: FourierTrajectory) -> float:
-        """Return the cost of a feasible trajectory, and keep the trajectory if it is the best."""
+        """Return the cost of a feasible trajectory; keep the trajectory with the least cost."""
         problem, prior = self.problem, self.prior
         matrix = problem.recorded(trajectory, problem.settings.n_periods).matrix
         cost = problem.criterion.cost(matrix if prior is None else matrix + prior)
