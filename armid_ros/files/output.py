@@ -349,7 +349,7 @@ def is_plan(path: Path) -> bool:
 
 
 def is_own(path: Path) -> bool:
-    """Return whether this package wrote a file or bag, such as a report or planned motion."""
+    """Return whether armid_ros wrote a file or bag, such as a report or planned motion."""
     if path.is_dir():
         return is_plan(path)
     if not path.name.endswith(_MARKED_SUFFIXES):

@@ -139,7 +139,7 @@ def staged(
     out: Path, replaced: Collection[str] = (), spared: Collection[Path] = ()
 ) -> Iterator[Staged]:
     """
-    Create a staging folder for a result; it is deleted at the end of the `with` block.
+    Create a staging folder for a result; delete the folder after the `with` block.
 
     Parameters
     ----------
@@ -168,7 +168,7 @@ def staged(
 
 
 def _exchange(first: Path, second: Path) -> None:
-    """Exchange the names of two folders in one step; OSError if this is not supported."""
+    """Exchange the names of two folders in one step; OSError if the system cannot do so."""
     at_fdcwd, rename_exchange = -100, 2  # constants of the system call renameat2(2)
     rename = getattr(ctypes.CDLL(None, use_errno=True), 'renameat2', None)
     if rename is None:
