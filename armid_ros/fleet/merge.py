@@ -108,7 +108,7 @@ class FleetFit:
 
     @classmethod
     def of(cls, normal: NormalEquations, job: Job) -> FleetFit | None:
-        """Fit parameters to normal equations; return None if these contain too few samples."""
+        """Fit parameters to normal equations; return None for too few samples."""
         base, kept = identifiable_base(job.theory, normal)
         if normal.counts.sum() < 2 * base.rank:
             return None
@@ -236,7 +236,7 @@ class BagSummary:
 
 def prepare(bag: BagFile, job: Job, bags_of_arm: int = 1) -> BagSummary | Refused:
     """
-    Read a bag and compress it to normal equations; return a `Refused` if this is impossible.
+    Return the normal equations of a bag, or a `Refused` if the bag cannot be used.
 
     Parameters
     ----------

@@ -189,7 +189,7 @@ def write_arm(
 
 def arm_is_done(store: Store, arm: str, bags: Sequence[BagFile], job: Job) -> list[Refused] | None:
     """
-    Return the refused bags if the stored estimate is from exactly these bags, else None.
+    Return the refused bags if the stored estimate is from exactly the given bags.
 
     Returns
     -------
