@@ -114,7 +114,7 @@ class ArmWatch:
 
     def fault_on_path(self, q: FloatArray, effort: FloatArray, largest: FloatArray) -> str:
         """
-        Return why an arm does not follow its path; empty if it does.
+        Return why an arm does not follow its path; empty for an arm that follows.
 
         A joint is off its planned position, or three of its efforts in a row are too large.
 

@@ -54,7 +54,7 @@ class _JumpGuard:
         self._limits = dict(zip(robot.joints, robot.velocity_limit.tolist(), strict=True))
 
     def objection(self, cdr: bytes) -> str:
-        """Return why a recorded trajectory must not be sent; empty if it may be sent."""
+        """Return why a recorded trajectory must not be sent; empty if nothing is wrong."""
         try:
             reference = waypoints_of(deserialize_message(cdr, JointTrajectory))
         except ArmidError as error:

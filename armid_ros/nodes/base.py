@@ -71,7 +71,7 @@ class ArmidNode(Node):
     table: ClassVar[tuple[NodeParameter, ...]]
 
     def __init__(self, name: str, **kwargs: Any) -> None:
-        """Create the node; other arguments are those of rclpy's Node."""
+        """Create the node; `kwargs` are the arguments of rclpy's Node."""
         super().__init__(name, **kwargs)
         self.complaints = Complaints(self.get_logger())
         self.ends: Callable[[], bool] = lambda: False
@@ -128,7 +128,7 @@ class ArmidNode(Node):
 
     @property
     def missing_clock(self) -> str:
-        """Return why there is no simulated time; empty if there is, or if it is not used."""
+        """Return why /clock is missing; empty if it is there or not used."""
         clock = self.get_clock()
         if not clock.ros_time_is_active:
             return ''
@@ -285,7 +285,7 @@ class ArmidNode(Node):
 
     def set_parameters_atomically(self, parameter_list: list[Parameter]) -> SetParametersResult:
         """
-        Set parameters as rclpy does; log those that are rejected.
+        Set parameters as rclpy does; log the rejected parameters.
 
         Parameters with unchanged values are accepted, so that dumped parameters can be loaded
         again. An integer is accepted for a float.

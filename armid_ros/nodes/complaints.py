@@ -41,7 +41,7 @@ class Complaints:
         self.defects = 0
 
     def add(self, kind: str, text: str) -> None:
-        """Count a rejected input; log the message if it is new."""
+        """Count a rejected input; log the message unless it was logged before."""
         self.counts[kind] += 1
         self.latest = text
         self.fresh = True

@@ -177,7 +177,7 @@ class IdentificationRunNode(ArmidNode):
                 self._program.kill()
 
     def _stop_all(self) -> None:
-        """Stop the run, then the recording, if this node has started them."""
+        """Stop the run, then the recording, unless another node has started them."""
         for node in sorted(self._begun):
             if self._callers[node, 'stop'].service_is_ready():
                 self._stops.append(self._call(node, 'stop'))

@@ -76,7 +76,7 @@ class JointStateMergerNode(ArmidNode):
     )
 
     def __init__(self, **kwargs: Any) -> None:
-        """Create the node; other arguments are those of rclpy's Node."""
+        """Create the node; `kwargs` are the arguments of rclpy's Node."""
         super().__init__('joint_state_merger', **kwargs)
         self.joints: tuple[str, ...] = ()
         self._published = 0
@@ -234,7 +234,7 @@ class JointStateMergerNode(ArmidNode):
             self._published += 1
 
     def _stamp_ns(self, stamp: Any) -> int:
-        """Return a message's time stamp [ns]; if it is zero, the time of reception."""
+        """Return a message's time stamp [ns], or the time of reception if the stamp is zero."""
         return stamp.sec * 10**9 + stamp.nanosec or self.get_clock().now().nanoseconds
 
 

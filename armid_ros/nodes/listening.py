@@ -65,7 +65,7 @@ class ListeningNode(ArmidNode):
     joint_states: MatchedSubscription
 
     def __init__(self, name: str, **kwargs: Any) -> None:
-        """Create the node; other arguments are those of rclpy's Node."""
+        """Create the node; `kwargs` are the arguments of rclpy's Node."""
         super().__init__(name, **kwargs)
         self.robot: Robot | None = None
         self.received = self.last_stamp_ns = 0
@@ -123,7 +123,7 @@ class ListeningNode(ArmidNode):
 
     def report(self, reason: str, text: str = '') -> None:
         """
-        Count and log faulty joint states; name their publishers if these may be the cause.
+        Count and log faulty joint states; name publishers that may be the cause.
 
         Parameters
         ----------
@@ -145,7 +145,7 @@ class ListeningNode(ArmidNode):
             self.publish_diagnostics()
 
     def take_joint_states(self, data: bytes) -> None:
-        """Decode a serialised joint state; process it if it is valid."""
+        """Decode a serialised joint state; process valid joint states."""
         self.received += 1
         self.freshness.mark_received()
         self.last_stamp_ns = header_stamp(data)

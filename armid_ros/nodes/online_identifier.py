@@ -165,7 +165,7 @@ class OnlineIdentifierNode(ListeningNode):
             print(text, file=sys.stderr)  # the logger is closed if a signal ends the node
 
     def publish_estimate(self) -> None:
-        """Publish the estimate if it has changed."""
+        """Publish the estimate if joint states were used since the last call."""
         identifier = self.identifier
         if identifier is None or identifier.samples in (0, self._published):
             return
@@ -284,7 +284,7 @@ class OnlineIdentifierNode(ListeningNode):
         self._begin(self._described(urdf))
 
     def _on_model(self, message: String) -> None:
-        """Restart the identification with the effects of a received model, if these are new."""
+        """Restart the identification if a received model has new effects."""
         # Effects from the parameters are kept, even if the model lacks them.
         before = self._require()
         arm = read_model(message.data, before.arm.robot, 'model')
@@ -332,7 +332,7 @@ class OnlineIdentifierNode(ListeningNode):
             publisher.publish(message)
 
     def _begin(self, identifier: OnlineIdentifier) -> None:
-        """Continue with this identifier; models that arrive later do not remove its effects."""
+        """Start with an identifier whose effects stay if later models lack them."""
         self._own_effects = identifier.arm.effects
         self._adopt(identifier)
 

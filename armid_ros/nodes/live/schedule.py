@@ -24,7 +24,7 @@ NAMING_VERDICTS = ('named', 'ambiguous', 'partial')
 
 class LiveDiagnosis:
     """
-    Schedule of repeated diagnoses of a moving arm, with the model that they propose.
+    Schedule of repeated diagnoses of a moving arm, with the proposed model.
 
     Parameters
     ----------
@@ -157,7 +157,7 @@ class LiveDiagnosis:
 
     def take(self, answer: Answer) -> bool:
         """
-        Process a diagnosis, unless it is outdated.
+        Process a diagnosis, unless it belongs to an earlier model or motion.
 
         Returns
         -------

@@ -66,7 +66,7 @@ class SampleWindow:
     @property
     def frozen(self) -> bool:
         """
-        Whether positions are stuck: they are constant while efforts vary.
+        Whether positions are constant while efforts vary.
 
         The efforts of an arm at rest are constant except for noise. If no position changes while
         an effort varies over half of its range in motion, the positions are not measured.

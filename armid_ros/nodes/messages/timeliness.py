@@ -41,7 +41,7 @@ class Freshness:
         return self.silence > 0.5  # joint states below 2 Hz are not usable for identification
 
     def trouble(self) -> str:
-        """Return a text on how long messages have been missing; empty if they arrive."""
+        """Return a text on how long messages have been missing; empty if messages arrive."""
         return f'{self._kind} stopped {self.silence:.1f} s ago' if self.stopped else ''
 
 
