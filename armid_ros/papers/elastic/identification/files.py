@@ -168,7 +168,7 @@ def _experiments(
 def _common(
     path: str | Path, names: Sequence[str], stamps: Sequence[npt.NDArray[np.int64]]
 ) -> npt.NDArray[np.int64]:
-    """Return the time stamps [us] that all topics share; RecordingError if these are too few."""
+    """Return the time stamps [us] that all topics share; RecordingError for too few stamps."""
     common: npt.NDArray[np.int64] = reduce(np.intersect1d, stamps)
     # smallest share of samples with a common timestamp on all topics
     if len(common) < 0.9 * max(map(len, stamps)):

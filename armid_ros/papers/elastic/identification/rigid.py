@@ -115,7 +115,7 @@ def fit_rigid(runs: Sequence[ElasticRun]) -> RigidFit:
 
 
 def _rows(run: ElasticRun, source: str) -> list[Regression]:
-    """Return the filtered regression of an experiment; [] if it is too short for the filter."""
+    """Return the filtered regression of an experiment; [] for an experiment that is too short."""
     motor, link = run.motor, run.link
     assert motor.tau is not None
     dt = float(motor.t[-1] - motor.t[0]) / (len(motor) - 1)

@@ -49,7 +49,7 @@ from scipy.optimize import least_squares
 @dataclass(frozen=True, eq=False)
 class Tuning:
     """
-    Parameters fitted to closed-loop step responses, and the responses simulated with them.
+    Parameters fitted to closed-loop step responses, and the simulated responses.
 
     Attributes
     ----------
@@ -227,7 +227,7 @@ class TwoInertiaIdentification:
 
     @property
     def parameters(self) -> TwoLinkParameters:
-        """Return the tuned parameters; without tuning, those fitted to the frequency responses."""
+        """Return the tuned parameters; without tuning, the fit to the frequency responses."""
         return self.untuned if self.tuning is None else self.tuning.parameters
 
 

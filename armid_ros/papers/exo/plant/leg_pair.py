@@ -179,7 +179,7 @@ def leg_pair(
 
 
 def assumed_stiffness(stiffness: npt.ArrayLike | None) -> FloatArray:
-    """Return the given strap stiffness, or that of ``assumptions.yaml`` [N/m]."""
+    """Return the given strap stiffness, or the stiffness in `assumptions.yaml` [N/m]."""
     assumed = read_assumptions()['interaction_stiffness'].value
     return np.asarray(assumed if stiffness is None else stiffness, dtype=float)
 
