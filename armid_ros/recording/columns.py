@@ -40,7 +40,7 @@ _OPTIONS = {'rate_hz': '--rate', 'effort_scale': '--effort-scale or --current-ga
 @dataclass(frozen=True)
 class ColumnSettings:
     """
-    Columns and units of recorded quantities; each one that is None is guessed from the file.
+    Columns and units of recorded quantities; values of None are guessed from the file.
 
     Attributes
     ----------

@@ -72,7 +72,7 @@ def decompressed(stored: _Buffer, compression: str, size: int, settings: ReadSet
 
 
 class _Zstd(threading.local):
-    """Decompressor for zstd, kept by each thread because creating it takes long."""
+    """Decompressor for zstd, one for each thread because its creation takes long."""
 
     def __init__(self) -> None:
         self.decompressor = zstandard.ZstdDecompressor()

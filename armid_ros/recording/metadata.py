@@ -65,7 +65,7 @@ def bag_information(
     topics: Sequence[Topic], file_name: str | None, start_ns: int, end_ns: int
 ) -> dict[str, Any]:
     """
-    Return the content of metadata.yaml, without its top-level key, as a dictionary.
+    Return the entries below the top-level key of metadata.yaml as a dictionary.
 
     Parameters
     ----------
