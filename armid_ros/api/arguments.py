@@ -96,7 +96,7 @@ def drivable(arm: RobotLike) -> ArmModel:
 def recordings_of(
     recordings: RecordingLike | Sequence[RecordingLike], robot: Robot, *, required: bool = False
 ) -> list[Recording]:
-    """Return recordings as a list; those given as paths are read."""
+    """Return recordings as a list; read recordings that are given as paths."""
     several = recordings if isinstance(recordings, Iterable) else [recordings]
     several = [recordings] if isinstance(recordings, RecordingLike) else list(several)
     if required and not several:

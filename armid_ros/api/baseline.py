@@ -27,7 +27,7 @@ def baseline_recordings(
     diagnosed: Sequence[Recording],
 ) -> list[Recording]:
     """
-    Return the baseline recordings: the given ones, else those that the model is identified from.
+    Return the given baseline, or by default the recordings that identified the model.
 
     The default baseline is empty if one of its recordings is diagnosed.
 
