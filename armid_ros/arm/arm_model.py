@@ -176,7 +176,7 @@ class ArmModel:
         return replace(self, robot=self.robot.with_inertias(parts[0]), values=tuple(parts[1:]))
 
     def values_of(self, effect: Effect) -> FloatArray:
-        """Return the parameter values of an effect; zeros if the arm does not have it."""
+        """Return the parameter values of an effect; zeros for an effect that the arm lacks."""
         for own, values in zip(self.effects, self.values, strict=True):
             if own == effect:
                 return values
@@ -204,7 +204,7 @@ class ArmModel:
 
     @property
     def body(self) -> Robot:
-        """Return the rigid body including effects that change it, such as a payload."""
+        """Return the rigid body with all effects that change its inertia, such as a payload."""
         assert self._acting.robot is not None
         return self._acting.robot
 

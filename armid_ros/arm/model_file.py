@@ -356,7 +356,7 @@ def _require(content: Mapping[str, Any], keys: Collection[str], part: str) -> No
 
 
 def _name(row: Any) -> str:
-    """Return the parameter name in an entry of model.yaml; empty if it is not a mapping."""
+    """Return the parameter name in an entry of model.yaml; empty for a malformed entry."""
     return str(row.get('name')) if isinstance(row, dict) else ''
 
 
