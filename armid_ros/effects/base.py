@@ -270,7 +270,7 @@ class Effect(ABC):
         return self
 
     def referred_to(self, temperatures: Mapping[str, float]) -> Self:
-        """Return the effect with given reference temperatures [degC], if it has any."""
+        """Return the effect with given reference temperatures [degC], if it depends on them."""
         return self
 
     @abstractmethod

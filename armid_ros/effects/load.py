@@ -118,7 +118,7 @@ class Payload(_LinkBody):
 
     def spread(self, robot: Robot) -> FloatArray:
         """
-        Return the parameters of the largest expected payload: it has the mass of the arm.
+        Return the parameters of the largest expected payload, with the mass of the arm.
 
         First moments and inertia are proportional to the mass.
 

@@ -47,7 +47,7 @@ class JointSpring(JointLaw):
 @dataclass(frozen=True)
 class SoftLimit(JointLaw):
     """
-    Elastic stops at both ends of the joint range: they push back beyond a position.
+    Elastic stops at both ends of the joint range, with a torque beyond a position.
 
     tau = k_up max(q - q_up, 0) - k_low max(q_low - q, 0), zero between q_low and q_up. Confounded
     with a hardening joint_spring; motion outside the bumpers distinguishes them.

@@ -21,7 +21,7 @@ from scipy.signal import butter, lfilter, sosfiltfilt
 
 @dataclass(frozen=True)
 class LateReading(TorqueReading):
-    """Base class of torque readings that are late: their error grows with the torque's rate."""
+    """Base class of late torque readings, with an error proportional to the torque's rate."""
 
     def columns(self, motion: Motion, arm: Arm) -> FloatArray:
         """
