@@ -88,7 +88,7 @@ def payloads_of(
     texts: Sequence[str], recordings: Sequence[Recording], robot: Robot
 ) -> Mapping[str, Robot]:
     """
-    Return the robot model with its payload for each recording made with one, by path.
+    Return for each recording with a payload, by path, the robot model with this payload.
 
     Raises
     ------

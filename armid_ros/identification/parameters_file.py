@@ -212,7 +212,7 @@ def read_parameters(path: str | Path) -> ParameterFile:
 
 
 def _identification_of(path: Path, model: Mapping[str, Any]) -> ParameterFile | None:
-    """Read the identification.json beside a model.yaml; None if it is of another model."""
+    """Read the identification.json beside a model.yaml; None for the file of another model."""
     # identification.json has the base parameters of the model and their covariance. It is of this
     # model if the model reproduces the value of every base parameter.
     file = path.with_name('identification.json')
@@ -242,7 +242,7 @@ def _identification_of(path: Path, model: Mapping[str, Any]) -> ParameterFile | 
 
 def read_misfit(path: str | Path, arm: ArmModel) -> Misfit | None:
     """
-    Read a model's residual on its training data; None if it is unknown.
+    Read the misfit of a model from a result of armid identify; None if unknown.
 
     Parameters
     ----------

@@ -200,10 +200,10 @@ class Comparison:
     @property
     def factors(self) -> dict[str, float]:
         """
-        Return each joint's median ratio of new to old parameters, if these ratios agree.
+        Return each joint's median ratio of new to old parameters; empty if the ratios differ.
 
         No load and no wear multiplies masses and friction of all joints by several times: the
-        torques of one result are in another unit, or currents. Empty if the ratios differ.
+        torques of one result are in another unit, or currents.
 
         """
         # smallest z-score of a value whose ratio is used, smallest number of ratios, and share of

@@ -92,7 +92,7 @@ def sensor_faults(
 
 
 def _jumps(robot: Robot, recording: Recording) -> Iterator[Fault]:
-    """Yield a fault for the first impossible jump of a position after which it stays there."""
+    """Yield a fault for the first jump of a position that is too fast for the joint."""
     if len(recording) < 2:
         return
     # a step is no motion if it is ten times as fast as the limit and as 99 % of all steps

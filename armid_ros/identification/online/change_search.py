@@ -240,7 +240,7 @@ class ChangeSearch:
 
     def take(self, block: Block, residual_scale: float) -> Pieces[FoundChange | None]:
         """
-        Add a block; return a change of the arm if one is significant, else None.
+        Add a block; return a significant change of the arm, or None.
 
         Parameters
         ----------

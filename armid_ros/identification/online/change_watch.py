@@ -230,7 +230,7 @@ class ChangeWatch:
         return np.vstack([directions, np.zeros((more, directions.shape[1]))])
 
     def _queue(self, end: float | None) -> None:
-        """Queue the present block for the change search; start the search if it is idle."""
+        """Queue the present block for the change search; start an idle search."""
         assert self._open is not None
         self._open.end = end
         self._queued.append(self._open)

@@ -168,7 +168,7 @@ class OnlineIdentifier:
         self, t: float, q: npt.ArrayLike, dq: npt.ArrayLike | None, tau: npt.ArrayLike
     ) -> OnlineSample | None:
         """
-        Update the estimate with one joint state; return its torque prediction if used.
+        Update the estimate with a joint state; return the predicted torque of a used one.
 
         Parameters
         ----------
@@ -217,7 +217,7 @@ class OnlineIdentifier:
         return self.__dict__
 
     def _process(self, sample: StreamSample) -> OnlineSample | None:
-        """Filter a valid joint state; return its torque prediction, or None if it is not used."""
+        """Filter a valid joint state; return the predicted torque, or None for an unused one."""
         if sample.begins:
             self._filter.restart('position_step')
         self._checks.take(sample.t)

@@ -301,7 +301,7 @@ class CausalFilter:
         return list(np.vander(inside, len(place)) @ factors)
 
     def _learn_period(self, dt: float) -> None:
-        """Collect a time step [s]; after 20 of them, set the period and create the filter."""
+        """Collect a time step [s]; after 20 steps, set the period and create the filter."""
         if dt > 0.0:
             self._intervals.append(dt)
         if len(self._intervals) < 20:  # too few for a median

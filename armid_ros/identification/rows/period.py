@@ -10,7 +10,7 @@ import numpy as np
 
 def find_period(t: FloatArray, positions: FloatArray) -> tuple[int, slice] | None:
     """
-    Find a period of recorded positions; return it with the repeating samples, or None.
+    Return a period of recorded positions, with the repeating samples; None without a period.
 
     Parameters
     ----------

@@ -337,7 +337,7 @@ def filtered_columns(
 
 
 def _as_slice(indices: npt.NDArray[np.intp]) -> Samples:
-    """Return adjacent indices as a slice, which avoids a copy; else return them unchanged."""
+    """Return adjacent indices as a slice, which avoids a copy; return other indices unchanged."""
     adjacent = len(indices) and np.array_equal(indices, indices[0] + np.arange(len(indices)))
     return slice(int(indices[0]), int(indices[-1]) + 1) if adjacent else indices
 

@@ -93,7 +93,7 @@ def check_recordings(recordings: Sequence[Recording]) -> None:
 
 def two_senders(recording: Recording) -> str:
     """
-    Return a message if positions alternate like those of two senders, else ''.
+    Return a message if positions alternate as if from two senders, else ''.
 
     A sample has another sender than its neighbours if some joint is far from both neighbours, and
     these are near each other. Such samples form a separate track; values of a faulty encoder are

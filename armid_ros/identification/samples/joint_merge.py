@@ -81,7 +81,7 @@ class JointMerger:
 
     def take(self, joints: tuple[int, ...], t: float, values: FloatArray) -> list[Moment]:
         """
-        Add a sample of some joints; return the samples of all joints that it completes.
+        Add a sample of several joints; return all samples that are now complete.
 
         Parameters
         ----------

@@ -276,7 +276,7 @@ class NoiseLevel:
         self._count += 1
 
     def settle(self, period: float, count: int = WINDOW) -> bool:
-        """Update the typical prediction errors once a window is full; return whether it was."""
+        """Update the typical prediction errors after a full window; return whether updated."""
         if self._count < count:
             return False
         window, self._count = self._window[: self._count], 0
@@ -291,12 +291,12 @@ class NoiseLevel:
         return True
 
     def _use(self, period: float, size: FloatArray, white: FloatArray) -> None:
-        """Set the typical prediction errors to those of a window, but at least the resolution."""
+        """Set the typical prediction errors from a window, but at least to the resolution."""
         allowed = quantile(period, len(size))
         self.model = ErrorModel(period, np.maximum(size, self._least(period)), white, allowed)
 
     def _remember(self, size: FloatArray, white: FloatArray) -> None:
-        """Store the typical prediction errors of a window; overwrite those of the oldest one."""
+        """Store the typical prediction errors of a window; overwrite the oldest window."""
         place = self._seen % len(self._sizes)
         self._sizes[place], self._shares[place] = size, white
         self._seen += 1

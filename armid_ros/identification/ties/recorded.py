@@ -174,7 +174,7 @@ def band_of_motion(
     margin: float = 2.0,
 ) -> Conditioning:
     """
-    Reduce the pass band of filters to that of the motion, unless the user has set it.
+    Reduce the pass band of filters to the band of the motion, unless set by the user.
 
     Parameters
     ----------
