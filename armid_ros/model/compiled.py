@@ -89,7 +89,7 @@ class BodyOfKernel(Structure):
 
 @cache
 def kernel() -> ctypes.CDLL | None:
-    """Load the compiled kernel; return None if it was not compiled."""
+    """Load the compiled kernel; return None without a compiled kernel."""
     found = find_spec('armid_ros.model._kernel')
     if found is None or found.origin is None:
         return None
