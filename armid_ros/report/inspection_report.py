@@ -142,7 +142,7 @@ def headline(remarks: Sequence[Remark], found: LinkCheck | None) -> tuple[str, .
 
 
 def _wrong_mass(found: LinkCheck, k: int) -> str:
-    """Return words on the error of a link's mass; '' if it is not significant."""
+    """Return words on the significant error of a link's mass, else ''."""
     change, reach = found.measured_mass[k] - found.mass[k], HALF_WIDTH * found.mass_std[k]
     if not abs(change) > reach:
         return ''
@@ -294,7 +294,7 @@ def _curves_section(found: Inspection) -> Section:
 
 
 def joint_heads(found: Inspection) -> tuple[str, ...]:
-    """Return the heads of the joint table's columns; with units, if they are all the same."""
+    """Return the heads of the joint table's columns, with units if all joints share them."""
     alike, unit = len(set(found.units)) == 1, found.units[0]
     length, speed, torque = (
         f' [{one}]' if alike else '' for one in (unit, f'{unit}/s', 'N' if unit == 'm' else 'N m')

@@ -152,7 +152,7 @@ def parameter_folds(
 
 
 def estimate_text(value: float, std: float) -> tuple[str, str]:
-    """Format a value and its 95 % half-width; 'includes 0' if it is insignificant."""
+    """Format a value and its 95 % half-width, or 'includes 0' for insignificant values."""
     number, reach = measured(value, HALF_WIDTH * std)
     return (number if not std or abs(value) > HALF_WIDTH * std else 'includes 0'), reach
 

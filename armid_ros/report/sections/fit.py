@@ -156,7 +156,7 @@ def forward_section(
     labels: tuple[str, str] = ('description', 'identified'),
 ) -> Section:
     """
-    Return the section with position errors of two simulated models under recorded torques.
+    Return the section with position errors of two models, simulated with recorded torques.
 
     Parameters
     ----------
