@@ -161,8 +161,9 @@ class Causes:
     @cached_property
     def _predicted(self) -> list[Trajectory]:
         """Return the trajectories with modelled instead of measured torque."""
-        arm = self.nuisance.arm
-        return [without_measurement(part, arm) for part in self.nuisance.rows.data]
+        # columns that contain the measured torque would explain any residual
+        arm, data = self.nuisance.arm, self.nuisance.rows.data
+        return [replace(x, motion=x.motion.with_torque(arm.torque(x.motion))) for x in data]
 
     def _columns(self, effect: Effect) -> list[FloatArray]:
         """Return the regressor columns of an effect in each trajectory, (M, n, p)."""
@@ -386,13 +387,3 @@ def line_search(
         options={'maxiter': 9},
     )
     return at(found.x) if -found.fun > gain(shape) else shape
-
-
-def without_measurement(part: Trajectory, arm: ArmModel) -> Trajectory:
-    """
-    Return a trajectory in which the torque of a model replaces the measured torque.
-
-    Columns that contain the measured torque would explain any residual.
-
-    """
-    return replace(part, motion=part.motion.with_torque(arm.torque(part.motion)))

@@ -208,7 +208,6 @@ def acting_spans(ranking: Ranking, thresholds: Thresholds) -> tuple[Span, ...]:
         edges, t = own.edges[k], own.times[k]
         name = next(part.source for part in rows.data if part.fold == k)
         start, stop = (float(t[min(edges[x], len(t) - 1)]) for x in (a, b))
-        result.append(
-            Span(name or f'recording {number + 1}', start, stop, b - a == len(edges) - 1)
-        )
+        name, whole = name or f'recording {number + 1}', b - a == len(edges) - 1
+        result.append(Span(name, start, stop, whole))
     return tuple(result)

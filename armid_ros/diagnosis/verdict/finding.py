@@ -228,9 +228,8 @@ class Gap:
 
         """
         evidence = explanation.evidence if unseen is None else unseen
-        residuals = [
-            evidence.residuals(x.arm) for x in (explanation.reference, explanation.fitted)
-        ]
+        fits = explanation.reference, explanation.fitted
+        residuals = [evidence.residuals(one.arm) for one in fits]
         overlays = []
         for part, sigma, given, patched in zip(
             evidence.data, evidence.sigma, *residuals, strict=True

@@ -93,8 +93,8 @@ def decide(
     if not findings:
         if open_gap and gap is not None and gap.predicted and minor and minor[0].share > 0.5:
             text = f'The held-out recordings contradict {names_and_places(minor[:1])}, which '
-            text += f'explains {percent(minor[0].share)} of the other recordings.'
-            return Verdict('unknown', text, contradicted=True)
+            share = percent(minor[0].share)
+            return Verdict('unknown', f'{text}explains {share} of the others.', contradicted=True)
         if open_gap:
             text = f'No effect in the catalogue explains {error}. It is {size}.'
             text += f' Best candidate: {small}' if small else ''
