@@ -210,7 +210,7 @@ def drive_gains(
     values, std, width = (np.array(one) for one in zip(*gains, strict=True))
     if not np.any(np.isfinite(std)):
         raise IdentificationError(
-            '--payload: no drive gain is determined; record one motion with and without the '
+            '--payload: no gain of a drive is determined; record one motion with and without the '
             'payload, or use a heavier payload'
         )
     return DriveGains(arm.robot.joints, values, std, width)

@@ -109,7 +109,7 @@ def _forward_score(
     """Simulate an arm driven by recorded torques, with feedback from a nominal model."""
     motion = next(iter(segments(recording, used)), None)
     if motion is None:
-        raise IdentificationError(f'{recording.source}: record longer without a gap in time')
+        raise IdentificationError(f'{recording.source}: no stretch is long enough; record longer')
     motion = motion.select(motion.t <= motion.t[0] + duration)
     reference = replace(motion, t=motion.t - motion.t[0])
     # With slower feedback, the friction of a light joint dominates. No model predicts to the
