@@ -68,7 +68,7 @@ def database(folder):
 def read(path):
     """Read a bag in both ways."""
     recording = read_recording(path, joints=JOINTS, settings=SETTINGS)
-    count = sum(1 for _ in iter_raw(path, SETTINGS))
+    count = sum(1 for _ in iter_raw(path))
     return recording, count
 
 

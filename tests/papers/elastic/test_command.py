@@ -8,7 +8,7 @@ import json
 from armid_ros.papers.elastic.identification.files import read_runs
 from armid_ros.recording.elastic import write_runs
 from armid_ros.robots import load_robot
-from armid_ros.simulation.sensors import LinkAccelerometers
+from armid_ros.simulation.sensors import accelerometer_readings
 import numpy as np
 import pytest
 
@@ -27,8 +27,8 @@ def read(folder):
 
 def test_experiments_without_steps_leave_out_the_tuning(runs, truth, tmp_path) -> None:
     robot = load_robot('two_link_elastic')
-    sensors = LinkAccelerometers(robot, np.outer([0.4, 0.4], [1.0, 0.0, 0.0]))
-    runs = [replace(run, felt=sensors.readings(run.link)) for run in runs[:4]]
+    places = np.outer([0.4, 0.4], [1.0, 0.0, 0.0])
+    runs = [replace(x, felt=accelerometer_readings(robot, x.link, places)) for x in runs[:4]]
     write_runs(tmp_path / 'resonances', runs, robot)
     said = armid('elastic', tmp_path / 'resonances', '--out', tmp_path / 'out').stdout
     assert 'antiresonance' in said
