@@ -293,9 +293,7 @@ class ExcitationPublisherNode(ArmidNode):
         """Raise a TrajectoryError if the arm may move: checks of a path would block the node."""
         self._require_no_run()
         if self._ending is not None and self._ending.reason:
-            raise TrajectoryError(
-                'the arm may not yet be at rest after its stop; try again in a second'
-            )
+            raise TrajectoryError('the arm may not be at rest after its stop; try again soon')
 
     def _loaded(self, path: str) -> Excitation:
         if not path:
