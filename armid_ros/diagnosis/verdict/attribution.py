@@ -74,8 +74,8 @@ def headline(
     Shares are cross-validated, and also measured on held-out recordings if there are any. A cause
     is minor if its larger share is below `least`, or its returned share below `inexact`, and no
     joint has a gap without it: a cause may act in some motions only. It is minor as well if it
-    increases one of the prediction errors significantly. The returned shares are those of held-out
-    recordings if there are any.
+    increases one of the prediction errors significantly, or if its returned share is below
+    -`inexact`. The returned shares are those of held-out recordings if there are any.
 
     Parameters
     ----------
@@ -105,7 +105,7 @@ def headline(
         opens = (fewer.chi2_per_row > limits) & (explanation.chi2_per_row <= limits)
         if not np.any(opens):
             return headline(fewer, unseen, least, settings)
-    worse = [k for k in causes if any(one.worsens(k) for one in measured)]
+    worse = [k for k in causes if stated[k] < -inexact or any(x.worsens(k) for x in measured)]
     if worse:
         return headline(explanation.without(*worse), unseen, least, settings)
     return explanation, held_out or fitted
