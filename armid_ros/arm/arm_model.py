@@ -14,11 +14,11 @@ from armid_ros.effects import (
     Action,
     Displacement,
     Effect,
-    law_derivatives,
     merge_actions,
     parse_effect,
     TorqueReading,
 )
+from armid_ros.effects.action import law_derivatives
 from armid_ros.effects.timing import smoothed
 from armid_ros.errors import ModelError
 from armid_ros.estimate import ParameterName

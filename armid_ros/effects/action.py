@@ -210,6 +210,11 @@ class Action:
             tau += self.link_torque(links.t, links.q, links.dq)
         return tau
 
+    def torque_derivatives(self, motion: Motion) -> tuple[FloatArray, FloatArray]:
+        """Return the derivatives (N, n, n) of `torque` by q, and by dq."""
+        assert self.torque is not None
+        return law_derivatives(self.torque, motion)
+
 
 def law_derivatives(law: TorqueLaw, motion: Motion) -> tuple[FloatArray, FloatArray]:
     """Return the derivatives (N, n, n) of a torque function by q, and by dq."""

@@ -20,7 +20,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from armid_ros.arm import ArmModel
-from armid_ros.effects import law_derivatives
 from armid_ros.excitation.fourier import fourier_basis, FourierTrajectory, MARGIN
 from armid_ros.excitation.geometry.clearance import ClearanceModel
 from armid_ros.excitation.problem import DesignProblem, parameter_mask
@@ -328,6 +327,6 @@ def _torque_slopes(arm: ArmModel, motion: Motion) -> tuple[FloatArray, FloatArra
     if action.inertia is not None:
         by_ddq = by_ddq + action.inertia
     if action.torque is not None:
-        more = law_derivatives(action.torque, motion)
+        more = action.torque_derivatives(motion)
         by_q, by_dq = by_q + more[0], by_dq + more[1]
     return by_q, by_dq, by_ddq
