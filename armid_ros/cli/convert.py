@@ -88,8 +88,7 @@ def _convert_tables(
     if out is None:
         say('nothing was written; give --out BAG without --dry-run to write a bag')
         return
-    urdf = None if robot is None else robot.urdf
-    write_recording(out, recording, robot_description=urdf)
+    write_recording(out, recording, robot_description=None if robot is None else robot.urdf)
     say(f'{out}: {len(recording)} samples of {recording.n_joints} joints')
 
 

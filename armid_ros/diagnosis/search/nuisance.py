@@ -255,9 +255,8 @@ class Nuisance:
         unit = self.rows.amplitude[0]
         rigid = self.base.independent < len(self.arm.robot.rigid_parameters)
         scale = np.where(rigid, hyperparameters.body or 1.0, 1.0)
-        squares = np.diagonal(self.column_products[0], axis1=1, axis2=2).sum(axis=0)[
-            : self.base.rank
-        ]
+        rank = self.base.rank
+        squares = np.diagonal(self.column_products[0], axis1=1, axis2=2).sum(axis=0)[:rank]
         body = self.prior_precision / np.outer(scale, scale)
         body += _MIN_PRECISION * np.diag(np.where(squares > 0.0, squares, 1.0))
         shared = max(hyperparameters.shared, _MIN_PRECISION)
@@ -266,7 +265,7 @@ class Nuisance:
         others = np.concatenate([size.ravel(), *of_causes]) ** -2.0
         whole = linalg.block_diag(body, np.diag(others))
         fitted = np.ones(len(whole), dtype=bool)
-        fitted[: self.base.rank] = (hyperparameters.body > 0.0) | self.unset
+        fitted[:rank] = (hyperparameters.body > 0.0) | self.unset
         fitted[self.discrepancy.ravel()] = hyperparameters.shared > 0.0
         used = np.flatnonzero(fitted)
         return used, whole[np.ix_(used, used)]

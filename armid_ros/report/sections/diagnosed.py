@@ -344,12 +344,10 @@ def gap_bars(diagnosis: Diagnosis, gap: Gap) -> BarChart:
             rows.append((name, [Bar(0.0, 'floor', 'not judged')]))
             continue
         unit, least = robot.torque_units[joint], max(float(gap.floor[joint]), 1e-12)
-        bars = [Bar(1.0, 'floor', '')]
-        for role, _, errors in reversed(roles):
+        bars = []
+        for role, _, errors in roles:
             error, ratio = float(errors[joint]), float(errors[joint]) / least
-            bars.insert(
-                0, Bar(ratio, role, f'{digits(ratio)} times usual ({digits(error)} {unit})')
-            )
-        rows.append((name, bars))
+            bars.append(Bar(ratio, role, f'{digits(ratio)} times usual ({digits(error)} {unit})'))
+        rows.append((name, [*bars, Bar(1.0, 'floor', '')]))
     legend = [(role, label) for role, label, _ in roles]
     return BarChart(rows, [*legend, ('floor', 'usual error of the joint')])
