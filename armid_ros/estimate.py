@@ -152,10 +152,10 @@ class Estimate:
         pairs = [(one.name, one.joint) for one in self.parameters]
         if (name, joint) in pairs:
             return pairs.index((name, joint))
-        own, what = [known for known, place in pairs if joint in ('', place)], 'parameters'
-        if not own:
-            own, name, what = list(dict.fromkeys(place for _, place in pairs)), joint, 'joints'
-        raise ModelError(f"no '{name}'; {what}: {', '.join(own)}{meant(name, own)}")
+        own = [f'{one} {place}'.rstrip() for one, place in pairs if joint in ('', place)]
+        known = own or list(dict.fromkeys(place for _, place in pairs if place))  # the joints
+        guess = meant(name if own else joint, known)
+        raise ModelError(f"no '{name}' of joint '{joint}'; known: {', '.join(known)}{guess}")
 
 
 def parameter_table(

@@ -37,9 +37,8 @@ def effects(names: tuple[str, ...], as_json: bool) -> None:
     rows = [
         {
             'name': name,
-            # the first sentence of the documentation has the equation
             'what it is': ' '.join(str(effect.__doc__).partition('\n\n')[0].split())
-            if names
+            if names and effect.__module__.startswith('armid_ros.')
             else effect.summary,
             'parameters': [_with_unit(q.name, q.unit) for q in effect.quantities],
             'shapes': [_with_unit(s.name, s.unit) for s in effect.shapes],

@@ -13,6 +13,7 @@ import os
 from pathlib import Path
 import signal
 import sys
+import threading
 import tomllib
 from typing import Any
 
@@ -110,7 +111,8 @@ class Commands(click.Group):
     def invoke(self, ctx: click.Context) -> Any:
         """Run a command and print its notes; for bad input print an error message."""
         # SIGTERM interrupts as Ctrl-C does, so that excite keeps its best design
-        signal.signal(signal.SIGTERM, signal.default_int_handler)
+        if threading.current_thread() is threading.main_thread():
+            signal.signal(signal.SIGTERM, signal.default_int_handler)
         try:
             result = super().invoke(ctx)
             _print_notes(ctx)

@@ -110,8 +110,8 @@ def load_of(arm: ArmModel, joint: str | None = None, frame: str | None = None) -
 
 def _flange(joint: str, links: Collection[str]) -> str:
     """Return the link whose name ends in tool0 or flange; without one, the only given link."""
-    # names that ROS-Industrial gives to the frame of a flange, after the prefix of an arm
-    usual = [link for name in ('tool0', 'flange') for link in links if link.endswith(name)]
+    # names of ROS-Industrial, after the prefix of an arm; 'flange' comes before 'sensor_flange'
+    usual = [x for end in ('tool0', 'flange') for x in sorted(links, key=len) if x.endswith(end)]
     if not usual and len(links) != 1:
         raise ModelError(
             f"the link at the flange of joint '{joint}' is unknown: name it with --frame; "
