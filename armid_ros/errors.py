@@ -21,12 +21,7 @@ def meant(name: str, names: Iterable[str]) -> str:
 
 
 def visible(text: str) -> str:
-    """
-    Replace control characters in a text by escapes, so that it is safe for a terminal.
-
-    Names come from files and messages; their escape sequences must not control the terminal.
-
-    """
+    """Return a text with its control characters escaped, which is safe to print on a terminal."""
     if text.isprintable():
         return text
     return ''.join(c if c.isprintable() or c in '\n\t' else repr(c)[1:-1] for c in text)
@@ -57,7 +52,7 @@ class RobotError(ArmidError):
 
 
 class RecordingError(ArmidError):
-    """Error of a recording that is unreadable or does not fit the robot."""
+    """Error for a recording that cannot be read, or that does not fit the robot."""
 
 
 class ModelError(ArmidError):
@@ -65,7 +60,7 @@ class ModelError(ArmidError):
 
 
 class TrajectoryError(ArmidError):
-    """Error of a trajectory that violates limits, or that cannot be found."""
+    """Error for a trajectory that violates limits, or if no valid trajectory is found."""
 
 
 class IdentificationError(ArmidError):
@@ -81,4 +76,4 @@ class OutputError(ArmidError):
 
 
 class FleetError(ArmidError):
-    """Error that prevents a run over a fleet from starting or continuing."""
+    """Error that prevents a run over a fleet of arms from starting or continuing."""

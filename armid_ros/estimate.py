@@ -54,7 +54,7 @@ class ParameterName:
 
     @property
     def rigid(self) -> bool:
-        """Whether the parameter is inertial, or a sum that starts with an inertial one."""
+        """Whether the parameter is inertial, or a sum whose first term is inertial."""
         return _RIGID.match(self.name) is not None
 
 
@@ -107,7 +107,7 @@ class Estimate:
     covariance: FloatArray
 
     def __post_init__(self) -> None:
-        """Make the arrays read-only; raise ModelError if they do not fit the parameters."""
+        """Make the arrays read-only; raise ModelError unless each parameter has a value."""
         count = len(self.parameters)
         object.__setattr__(self, 'values', read_only(self.values))
         object.__setattr__(self, 'covariance', read_only(self.covariance))
@@ -118,7 +118,7 @@ class Estimate:
             )
 
     def __repr__(self) -> str:
-        """Return the first values with standard deviations, in at most ten lines."""
+        """Return a text of at most ten lines: the first parameters with standard deviations."""
         rows = [
             f'  {(p.joint + " ") if p.joint else ""}{p.name} {value:.4g} ± {std:.2g} {p.unit}'
             for p, value, std in zip(self.parameters, self.values, self.std, strict=True)
@@ -133,12 +133,12 @@ class Estimate:
         return np.asarray(np.sqrt(np.diag(self.covariance)))
 
     def interval(self, confidence: float = 0.95) -> FloatArray:
-        """Return the confidence interval of each parameter, lower and upper end, (P, 2)."""
-        reach = NormalDist().inv_cdf(0.5 + confidence / 2.0) * self.std
-        return np.column_stack([self.values - reach, self.values + reach])
+        """Return the confidence interval of each parameter, lower and upper end, shape (P, 2)."""
+        half_width = NormalDist().inv_cdf(0.5 + confidence / 2.0) * self.std
+        return np.column_stack([self.values - half_width, self.values + half_width])
 
     def __getitem__(self, key: str | tuple[str, str]) -> float:
-        """Return the value of a parameter, or of an effect that has only one parameter."""
+        """Return a value by name, or by (name, joint), of a parameter or one-parameter effect."""
         name, joint = (key, '') if isinstance(key, str) else key
         own = [
             k
@@ -148,14 +148,15 @@ class Estimate:
         return float(self.values[own[0] if len(own) == 1 else self.index(name, joint)])
 
     def index(self, name: str, joint: str = '') -> int:
-        """Return the index of a parameter; raise ModelError if it is missing."""
+        """Return the index of the parameter with a name and joint; raise ModelError if missing."""
         pairs = [(one.name, one.joint) for one in self.parameters]
         if (name, joint) in pairs:
             return pairs.index((name, joint))
         own = [f'{one} {place}'.rstrip() for one, place in pairs if joint in ('', place)]
         known = own or list(dict.fromkeys(place for _, place in pairs if place))  # the joints
         guess = meant(name if own else joint, known)
-        raise ModelError(f"no '{name}' of joint '{joint}'; known: {', '.join(known)}{guess}")
+        place, kind = f" of joint '{joint}'" if joint else '', 'parameters' if own else 'joints'
+        raise ModelError(f"no parameter '{name}'{place}; known {kind}: {', '.join(known)}{guess}")
 
 
 def parameter_table(
@@ -174,11 +175,11 @@ def parameter_table(
     ]
 
 
-def measured(value: float, reach: float) -> tuple[str, str]:
-    """Return a value and its interval's half-width as texts, rounded to the same decimal."""
-    if not (math.isfinite(reach) and reach > 0.0):
+def measured(value: float, half_width: float) -> tuple[str, str]:
+    """Return a value and the half-width of its interval as texts, with equally many decimals."""
+    if not (math.isfinite(half_width) and half_width > 0.0):
         return f'{value:.4g}', '0'
-    decimals = max(0, 1 - math.floor(math.log10(reach)))
-    if decimals > 7 or max(abs(value), reach) >= 1e7:
-        return f'{value:.3g}', f'{reach:.2g}'
-    return f'{value:z.{decimals}f}', f'{reach:.{decimals}f}'
+    decimals = max(0, 1 - math.floor(math.log10(half_width)))
+    if decimals > 7 or max(abs(value), half_width) >= 1e7:
+        return f'{value:.3g}', f'{half_width:.2g}'
+    return f'{value:z.{decimals}f}', f'{half_width:.{decimals}f}'

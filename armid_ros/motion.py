@@ -37,7 +37,7 @@ def freeze(instance: object, *names: str) -> None:
 
 
 def freeze_samples(where: str, samples: Any, *names: str) -> None:
-    """Make arrays of joint samples read-only; RecordingError unless of shape (N, n)."""
+    """Make the named arrays of `samples` read-only; RecordingError unless of shape (N, n)."""
     freeze(samples, 't', *names)
     expected = (len(samples.t), len(samples.joints))
     for name in names:
@@ -56,7 +56,7 @@ def freeze_samples(where: str, samples: Any, *names: str) -> None:
 
 
 def selected(instance: object, samples: Samples, *names: str) -> dict[str, Any]:
-    """Return selected samples of array attributes, by name; missing arrays stay None."""
+    """Return the named arrays of an object at the selected samples; missing arrays stay None."""
     arrays = {name: getattr(instance, name) for name in names}
     return {name: None if array is None else array[samples] for name, array in arrays.items()}
 
@@ -110,7 +110,7 @@ class Temperatures:
         freeze(self, 't', 'values')
 
     def at(self, t: npt.ArrayLike) -> FloatArray:
-        """Interpolate temperatures at N times, (N, n) [degC]; constant beyond the readings."""
+        """Return the temperatures at times `t`, linearly interpolated, shape (N, n) [degC]."""
         return np.column_stack([np.interp(np.ravel(t), self.t, one) for one in self.values.T])
 
 
@@ -182,7 +182,7 @@ class Motion:
         return len(self.joints)
 
     def select(self, samples: Samples) -> Motion:
-        """Return the motion with selected samples only; times are unchanged."""
+        """Return the motion at selected samples only; the times of these samples are unchanged."""
         partner = None if self.partner is None else self.partner.select(samples)
         arrays = selected(self, samples, 't', 'q', 'dq', 'ddq', 'tau')
         return replace(self, **arrays, partner=partner)

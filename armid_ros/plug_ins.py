@@ -49,7 +49,7 @@ def plug_ins(kind: str) -> dict[str, EntryPoint]:
 
 def load_plug_in(entry: EntryPoint) -> Any:
     """
-    Import the command or module that an entry point of a plug-in names.
+    Import and return the command or module of a plug-in, which its entry point names.
 
     Raises
     ------
@@ -66,6 +66,6 @@ def load_plug_in(entry: EntryPoint) -> Any:
     except Exception as error:  # a package of another author may raise any error
         package = entry.dist.name if entry.dist else entry.module
         raise ArmidError(
-            f'{package}: its plug-in {entry.value} cannot be imported: {type(error).__name__}: '
+            f'{package}: the plug-in {entry.value} cannot be imported: {type(error).__name__}: '
             f'{error}; repair or uninstall the package'
         ) from error
