@@ -147,7 +147,7 @@ class HistoryChange:
 @dataclass(frozen=True)
 class Judged:
     """
-    Steps and trends of the parameters of one arm over time, with their significance.
+    Significance of steps and trends over time in the parameters of one arm.
 
     Attributes
     ----------
@@ -172,7 +172,7 @@ def judge(
     kinds: Sequence[tuple[Sequence[ParameterHistory], Mapping[tuple[str, str], Spread]]],
 ) -> list[Judged]:
     """
-    Test the parameters of all arms for steps and trends over time.
+    Test the parameters of all arms for steps and trends over time; return a result per arm.
 
     Parameters
     ----------
@@ -211,7 +211,7 @@ def significant(judged: Judged, alpha: float) -> tuple[HistoryChange, ...]:
 
 
 def wear(series: ParameterHistory, spread: Spread) -> tuple[float, float]:
-    """Return the fitted linear change of a parameter per month, and its standard deviation."""
+    """Return the linear trend of a parameter per month, and the trend's standard deviation."""
     slope, std, _ = _line(series.days, series.values, 1.0 / _variances(series, spread)[0])
     return slope * MONTH, std * spread.trends * MONTH
 
@@ -223,17 +223,17 @@ def spreads(series: Sequence[ParameterHistory]) -> dict[tuple[str, str], Spread]
         group = [one for one in series if one.name == name]
         freedom = _prior_freedom(group, found)
         own = {key: replace(found[key], prior_freedom=freedom) for key in found if key[0] == name}
-        steps, trends = _lasting(group, own)
+        steps, trends = _inflation(group, own)
         found |= {key: replace(one, steps=steps, trends=trends) for key, one in own.items()}
     return found
 
 
 def without_days(series: Sequence[ParameterHistory]) -> list[ParameterHistory]:
     """
-    Subtract from estimates the daily deviation that all arms share, such as by temperature.
+    Return the series without the deviation of each day that all arms share.
 
     The shared deviation is proportional to the size of the parameter, as for friction that falls
-    with temperature. It is found by a median polish. Days on which few arms have bags are
+    with temperature. A median polish estimates it. Days on which few arms have bags are
     unchanged.
 
     """
@@ -262,7 +262,7 @@ def without_days(series: Sequence[ParameterHistory]) -> list[ParameterHistory]:
 
 
 def _largest_change(series: ParameterHistory, spread: Spread) -> HistoryChange:
-    """Return the largest step of a parameter over time, or the trend if it fits as well."""
+    """Return the most significant step of a parameter, or its trend if that fits as well."""
     split, count = _splits(series, spread), len(series.values)
     scores, trend = split.scores / spread.steps, split.trend / spread.trends
     best = int(np.argmax(scores))
@@ -277,7 +277,7 @@ def _largest_change(series: ParameterHistory, spread: Spread) -> HistoryChange:
 
 
 def _p(score: float, freedom: float, tried: int) -> float:
-    """Return the p-value of the largest of `tried` z-scores."""
+    """Return the p-value of `score`, the largest of `tried` z-scores, by Bonferroni."""
     # lower bound of the p-value, which underflows for larger scores
     return min(1.0, tried * max(float(tail(score**2, 1, freedom)), 1e-300))
 
@@ -297,7 +297,7 @@ class _Splits(NamedTuple):
 
 
 def _splits(series: ParameterHistory, spread: Spread) -> _Splits:
-    """Fit a step at each possible place, and a straight line, to the estimates."""
+    """Fit a step after each value of a series, and a straight line to all values."""
     variance, freedom = _variances(series, spread)
     std = np.sqrt(variance)
     # outliers are clipped to three standard deviations around the median of five bags
@@ -346,7 +346,7 @@ def _prior_freedom(
     group: Sequence[ParameterHistory], found: Mapping[tuple[str, str], Spread]
 ) -> float:
     """
-    Return the prior degrees of freedom of the variances of arms, by empirical Bayes.
+    Return prior degrees of freedom for the variances of single arms, by empirical Bayes.
 
     The logarithms of variance ratios have the variance trigamma(d_a / 2) + trigamma(d_0 / 2). The
     degrees of freedom of one series are d_a, and the equation is solved for d_0. Only scatter
@@ -371,14 +371,14 @@ def _prior_freedom(
 
 
 def _ratio(series: ParameterHistory, spread: Spread) -> float:
-    """Return the ratio of a history's variance to that expected from all arms."""
+    """Return the variance of one series divided by the variance expected from all arms."""
     stated = series.std[1:] ** 2 + series.std[:-1] ** 2 + 2.0 * spread.std**2
     squares = np.diff(series.values) ** 2 / np.maximum(stated, 1e-300)
     return max(float(np.median(squares)) / MEDIAN_SQUARE, 1e-100)
 
 
 def _freedom(bags: int) -> float:
-    """Return the degrees of freedom of a variance estimated from successive differences."""
+    """Return the degrees of freedom of a variance estimated from `bags` successive values."""
     # a line through simulated series of white noise; right to 6 % from 4 to 80 bags
     return 0.8 + 0.31 * bags
 
@@ -394,7 +394,7 @@ def _variances(series: ParameterHistory, spread: Spread) -> tuple[FloatArray, fl
     return shrunk, min(both, spread.freedom + freedom)
 
 
-def _lasting(
+def _inflation(
     group: Sequence[ParameterHistory], found: dict[tuple[str, str], Spread]
 ) -> tuple[float, float]:
     """Return inflation factors (at least 1) for the steps and the trends of healthy arms."""
@@ -418,7 +418,7 @@ def _lasting(
 
 
 def _line(days: FloatArray, x: FloatArray, weights: FloatArray) -> tuple[float, float, float]:
-    """Fit a weighted line; return slope, standard deviation of the slope, and first value."""
+    """Fit a weighted line; return the slope, its standard deviation, and the first day's value."""
     total = weights.sum()
     middle, mean = weights @ days / total, weights @ x / total
     deviation = days - middle

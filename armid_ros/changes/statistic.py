@@ -19,7 +19,7 @@ def tail(
     square: npt.ArrayLike, rank: npt.ArrayLike, freedom: npt.ArrayLike = np.inf
 ) -> FloatArray:
     """
-    Return the p-value of a quadratic form of scores, if nothing changed.
+    Return the p-value of `square`, a quadratic form of z-scores, if nothing changed.
 
     Parameters
     ----------
@@ -39,12 +39,12 @@ def tail(
 
 def limits(chance: float, rank: FloatArray, freedom: FloatArray) -> FloatArray:
     """
-    Return the thresholds that quadratic forms exceed by chance with a given probability, (k,).
+    Return the thresholds of quadratic forms for a false alarm probability, shape (k,).
 
     Parameters
     ----------
     chance : float
-        Probability that the quadratic form exceeds its threshold, if nothing changed.
+        Probability that a quadratic form exceeds its threshold, if nothing changed.
     rank, freedom : ndarray, shape (k,)
         Degrees of freedom of each quadratic form, and of its noise variance.
 
@@ -56,7 +56,7 @@ def limits(chance: float, rank: FloatArray, freedom: FloatArray) -> FloatArray:
 
 def two_means(x: FloatArray, weights: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     """
-    Return weighted means of values before and after each possible change point.
+    Return the weighted means of values before and after each possible change point.
 
     Parameters
     ----------
@@ -78,7 +78,7 @@ def two_means(x: FloatArray, weights: FloatArray) -> tuple[FloatArray, FloatArra
 
 
 def beyond_chance(chances: Sequence[float] | FloatArray, allowed: float) -> list[bool]:
-    """Return whether each p-value is significant at a family-wise error rate (Holm 1979)."""
+    """Return whether each p-value is significant at a family-wise error rate, by Holm (1979)."""
     beyond = [False] * len(chances)
     for tried, index in enumerate(np.argsort(chances)):
         if chances[index] > allowed / (len(chances) - tried):
