@@ -40,22 +40,22 @@ USUAL = ','.join(USUAL_EFFECTS)
 
 
 def robot_of(robot: RobotLike) -> Robot:
-    """Return the robot of a model, or load the robot that a name or path denotes."""
+    """Return a robot unchanged; convert a model, a shipped name or a path to a robot."""
     return arm_of(robot, effects='').robot
 
 
 def is_model(path: str | Path) -> bool:
-    """Return whether a path names a model.yaml rather than a robot description."""
+    """Return whether a path has the suffix of a model file, .yaml or .yml."""
     if not isinstance(path, str | Path):
         raise RobotError(
-            f'a {type(path).__name__} was given in place of a robot; the robot comes before the '
-            'recordings'
+            f'the first argument is a {type(path).__name__}, not a robot; give the robot before '
+            'the recordings'
         )
     return Path(path).suffix in ('.yaml', '.yml')
 
 
 def source_of(robot: Robot) -> str:
-    """Return how result files refer to a robot: by shipped name, path or own name."""
+    """Return the robot's name for result files: its shipped name, else its path or own name."""
     for name in shipped_robots():
         if robot.path == shipped_path(name):
             return name
@@ -63,7 +63,7 @@ def source_of(robot: Robot) -> str:
 
 
 def arm_of(arm: RobotLike, effects: str = USUAL) -> ArmModel:
-    """Return an arm model; a robot without a model gets effects, by default friction."""
+    """Return an arm model; a robot without a model gets `effects`, names with commas."""
     if isinstance(arm, ArmModel):
         return arm
     if not isinstance(arm, Robot) and is_model(arm):
@@ -72,7 +72,7 @@ def arm_of(arm: RobotLike, effects: str = USUAL) -> ArmModel:
 
 
 def with_effects(arm: ArmModel, names: str) -> ArmModel:
-    """Add the named effects (separated by commas) to an arm, except effects that it has."""
+    """Add the named effects (separated by commas) to an arm, unless the arm has them already."""
     for name in filter(None, parted(names)):
         effect = make_effect(name, arm.robot)
         if (effect.name, effect.joints) not in [(own.name, own.joints) for own in arm.effects]:
@@ -87,7 +87,7 @@ def drivable(arm: RobotLike) -> ArmModel:
     if others:
         kept = ', '.join(repr(joint) for joint in model.robot.joints if joint not in others)
         raise TrajectoryError(
-            f'{arm}: {", ".join(others)} belong to no arm; choose the driven joints with '
+            f'{arm}: driven joints belong to no arm: {", ".join(others)}; choose the joints with '
             f'ar.load_robot({str(arm)!r}, joints=[{kept}])'
         )
     return model
@@ -100,7 +100,7 @@ def recordings_of(
     several = recordings if isinstance(recordings, Iterable) else [recordings]
     several = [recordings] if isinstance(recordings, RecordingLike) else list(several)
     if required and not several:
-        raise RecordingError('no recordings: give at least one bag, table or Recording')
+        raise RecordingError('no recording was given: give at least one bag, table or Recording')
     for one in several:
         if not isinstance(one, RecordingLike):
             raise RecordingError(
@@ -111,15 +111,15 @@ def recordings_of(
     for recording in read:
         if recording.joints != robot.joints:
             raise RecordingError(
-                f'{recording.source or "recording"}: its joints are '
-                f'{", ".join(recording.joints)}, but those of {robot.name} are '
-                f'{", ".join(robot.joints)}; read the recording with that robot'
+                f'{recording.source or "recording"}: the joints of the recording are '
+                f'{", ".join(recording.joints)}, but the joints of {robot.name} are '
+                f'{", ".join(robot.joints)}; read the recording with this robot'
             )
     return read
 
 
 def with_unique_sources(*groups: list[Recording]) -> tuple[list[Recording], ...]:
-    """Append numbers to equal source names of recordings, except paths of existing files."""
+    """Append numbers to equal source names of recordings, except names of existing files."""
     taken: Counter[str] = Counter()
     named = [list(group) for group in groups]
     for group in named:

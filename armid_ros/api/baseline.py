@@ -27,7 +27,7 @@ def baseline_recordings(
     diagnosed: Sequence[Recording],
 ) -> list[Recording]:
     """
-    Return the given baseline, or by default the recordings that identified the model.
+    Return the baseline recordings; by default the recordings that identified the model.
 
     The default baseline is empty if one of its recordings is diagnosed.
 

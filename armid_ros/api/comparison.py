@@ -71,11 +71,11 @@ class ComparisonResult(Shown):
         return self.core.document()
 
     def page(self, origin: ResultOrigin = DEFAULT_ORIGIN) -> str:
-        """Return the text of report.html."""
+        """Return the text of report.html, with the changed parameters and residuals."""
         return compare_report(self.core, origin)
 
     def summary(self) -> Summary:
-        """Return a summary of the changes, the most significant first."""
+        """Return the terminal summary of the changes, the most significant first."""
         rows = change_rows(self.core)
         first, *more = change_sentences(self.core)
         then = 'diagnose' if self.anything or self.core.unusable else 'identify'

@@ -214,7 +214,7 @@ class DiagnosisResult(ShownModel):
         ]
 
     def with_residual(self, seed: int) -> DiagnosisResult:
-        """Learn a map of the unexplained residual torque; note the reason of a failure."""
+        """Add a learned map of the unexplained residual torque, or a note why there is none."""
         if self.verdict not in OPEN:
             note = f'nothing is learned for the verdict {self.verdict.replace("_", " ")}'
             return replace(self, notes=(*self.notes, note))
@@ -231,7 +231,7 @@ class DiagnosisResult(ShownModel):
         return replace(self, residual=found, notes=(*self.notes, *why))
 
     def with_extras(self, residual: bool, seed: int, progress: Progress) -> DiagnosisResult:
-        """Learn the residual if requested, simulate held-out recordings, plan the next motion."""
+        """Add simulations of held-out recordings, the next motion, and a map if `residual`."""
         result = self
         if residual:
             progress(1.0, 'learning the residual')
@@ -254,7 +254,7 @@ class DiagnosisResult(ShownModel):
         return replace(result, next_run=run, no_run='; '.join(why))
 
     def _steps(self, model: str) -> list[str]:
-        """Return the next steps for the user, with commands that name the path of the model."""
+        """Return the next steps for the user; their commands contain `model`, the model's path."""
         worse = dict.fromkeys(joint for pair in self.forward for joint in pair.worse)
         learned = self.residual is not None
         steps = next_steps(self.core, self.next_run, self.no_run, model, tuple(worse), learned)
@@ -319,7 +319,7 @@ def diagnose(
     progress: Progress | None = None,
 ) -> DiagnosisResult:
     """
-    Find the effects that a model lacks, or that have changed.
+    Find the effects that a model lacks, or whose parameters have changed.
 
     Parameters
     ----------
@@ -426,13 +426,13 @@ def require_residual() -> None:
         from armid_ros.residual import require_libraries
     except ModuleNotFoundError:
         raise IdentificationError(
-            'learning a residual needs armid_ros.residual, which this installation does not have'
+            'learning a residual needs armid_ros.residual, which is missing; reinstall armid_ros'
         ) from None
     require_libraries()
 
 
 def _attempt(name: str, make: Callable[[], _Made]) -> tuple[_Made | None, tuple[str, ...]]:
-    """Call a function; return its result, or None and a note with the reason of failure."""
+    """Return the result of `make()` and no note, or None and a note why `name` is missing."""
     try:
         return make(), ()
     except Exception as error:  # the diagnosis itself is valid after any error

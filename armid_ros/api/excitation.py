@@ -134,7 +134,7 @@ class ExcitationResult(Shown):
 
     @cached_property
     def start_reason(self) -> str:
-        """Return why the start pose is not zero; empty if it is zero or chosen by the user."""
+        """Return why the start pose is not zero; empty if it is zero or was given by the user."""
         if self.given_start is not None:
             return ''
         robot, nearest = self.arm.robot, self.planner.zero_pose
@@ -150,7 +150,7 @@ class ExcitationResult(Shown):
 
     @cached_property
     def run(self) -> Run:
-        """Return the run: approach, trajectory and return; TrajectoryError if no path is found."""
+        """Return approach, trajectory and return as one run; TrajectoryError if none is found."""
         excitation = self.core.excitation
         return plan_run(excitation, self.planner, self.start, WAYPOINT_RATE, seed=self.seed)
 
@@ -247,7 +247,7 @@ class ExcitationResult(Shown):
         return document
 
     def summary(self) -> Summary:
-        """Return the terminal summary: identifiable parameters, and the share of limits in use."""
+        """Return the terminal summary: identifiable parameters, and used share of joint limits."""
         robot, shares = self.arm.robot, self.core.robot_limits_used(self.arm)
         rows = [
             (joint, *(f'{100 * share[k]:.0f} %' for share in shares.values()))

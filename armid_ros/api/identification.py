@@ -133,7 +133,7 @@ class IdentificationResult(ShownModel):
 
     @property
     def misfit(self) -> Misfit:
-        """Return the rms residual on the recordings by joint, with the information matrix."""
+        """Return the rms residual of each joint in the recordings, and the information matrix."""
         known = parameters_of(self.arm.robot.name, self.document())
         information = known.information(self.arm.parameters)
         unusable = self.grade == 'unusable'
@@ -154,7 +154,7 @@ class IdentificationResult(ShownModel):
         return grade(self.core, self.description, self.recordings, self.validation, self.held_out)
 
     def predict(self, recordings: RecordingLike | Sequence[RecordingLike]) -> tuple[Fit, ...]:
-        """Predict the torques of other recordings."""
+        """Predict the torques of other recordings; return a `Fit` per section of valid samples."""
         return self.core.predict(recordings_of(recordings, self.arm.robot, required=True))
 
     def plot(self) -> npt.NDArray[np.object_]:
@@ -175,7 +175,7 @@ class IdentificationResult(ShownModel):
         return draw_joints(self.arm.robot.joints, curves, 'torque [N m or N]')
 
     def __getitem__(self, key: tuple[str, str]) -> float:
-        """Return the value of an effect or parameter on a joint: ['viscous_friction', 'elbow']."""
+        """Return an effect or parameter by name and joint, as `['viscous_friction', 'elbow']`."""
         return self.estimate[key]
 
     def to_dataframe(self) -> pandas.DataFrame:
@@ -237,7 +237,7 @@ class IdentificationResult(ShownModel):
         return document
 
     def summary(self, every: bool = False) -> Summary:
-        """Return the terminal summary: errors, friction, warnings, next step; or all values."""
+        """Return the terminal summary: errors, friction, next step; all parameters if `every`."""
         core, estimate, joints = self.core, self.estimate, self.arm.robot.joints
         others = self.graded.reasons[1:]
         held_out = [fit for fits in self.validation.values() for fit in fits]
@@ -281,7 +281,7 @@ class IdentificationResult(ShownModel):
         )
 
     def _parameters(self) -> list[str]:
-        """Return a text table of the parameters, estimated and described."""
+        """Return the lines of a table of all parameters, with estimated and described values."""
         estimate, links = self.estimate, self.arm.robot.links
         described = self.core.base.values(self.description.theta)
         rows = []

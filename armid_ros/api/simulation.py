@@ -100,7 +100,7 @@ def reference_of(
     settings: ReadSettings = DEFAULT,
 ) -> Reference:
     """
-    Convert a trajectory, or a file that has one, to the reference of a simulated arm.
+    Convert a trajectory or trajectory file to the reference motion of a simulated arm.
 
     Parameters
     ----------

@@ -101,7 +101,7 @@ class Shown(ABC):
         """Return the terminal summary of the result."""
 
     def with_step(self, origin: ResultOrigin, robot: Robot | None = None) -> ResultOrigin:
-        """Return the origin with the next command and, if a robot is given, its name."""
+        """Return the provenance with the next command and, if given, the name of the robot."""
         shown, known = self.summary(), origin if robot is None else origin.of(source_of(robot))
         step = origin.step or ''.join(shown.steps[:1]) or f'armid {shown.then}'
         return replace(known, step=step)
@@ -131,7 +131,7 @@ class Shown(ABC):
         return document
 
     def save(self, folder: str | Path) -> Path:
-        """Write the result's files to a folder; OutputError if it contains other files."""
+        """Write the result's files to a folder; OutputError if the folder has other files."""
         with staged(Path(folder)) as result:
             self.fill(result.folder)
             with result_folder(Path(folder), self.schema):
@@ -143,7 +143,7 @@ class Shown(ABC):
         return '\n'.join(self.summary().text())
 
     def _repr_html_(self) -> str:
-        """Return HTML for a notebook: the report in a frame, or the summary if there is none."""
+        """Return HTML for a notebook: the report in a frame, or the summary without a report."""
         try:
             page = self.page()
         except ArmidError:  # a design without a trajectory has no page

@@ -242,7 +242,7 @@ def test_residuals_are_a_table_of_every_joint(model, found):
 @pytest.mark.parametrize('ask', [ar.identify, ar.diagnose])
 @pytest.mark.parametrize(
     ('recordings', 'said'),
-    [([], 'no recordings'), (None, "'None'.*Recording"), (3, "'3'"), ([None], "'None'")],
+    [([], 'no recording was'), (None, "'None'.*Recording"), (3, "'3'"), ([None], "'None'")],
 )
 def test_no_recording_is_said(arm, ask, recordings, said):
     with pytest.raises(ar.ArmidError, match=said):
