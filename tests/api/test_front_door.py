@@ -191,7 +191,7 @@ def test_a_recording_is_a_motion_whose_torque_an_arm_predicts(arm, runs):
     np.testing.assert_allclose(arm.torque(motion), motion.tau, atol=0.05)
     bare = ar.Recording(joints=runs[0].joints, t=runs[0].t, q=runs[0].q).motion(cutoff=20.0)
     assert bare.tau is None and bare.ddq.shape == bare.q.shape
-    with pytest.raises(ar.ArmidError, match='no stretch'):
+    with pytest.raises(ar.ArmidError, match='no section'):
         runs[0].select(slice(50)).motion()
 
 

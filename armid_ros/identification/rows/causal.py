@@ -36,7 +36,7 @@ MAX_MAGNITUDE = 1e6
 
 
 def check_gap(samples: int) -> None:
-    """Raise an error if the longest gap to be interpolated is below 1 sample."""
+    """Raise an error if the longest gap to interpolate, in samples, is below 1."""
     if samples < 1:
         raise IdentificationError(
             f'the longest gap to interpolate across, {samples} samples, has to be 1 or more'
@@ -67,16 +67,16 @@ class TripleLag:
 
     @property
     def delay(self) -> float:
-        """Delay of slow signals by the filter [s]."""
+        """Delay of the filter for slow signals [s]."""
         return 3.0 / self.pole
 
     def reset(self) -> None:
-        """Forget all samples; the next sample is the initial output."""
+        """Clear the state of the filter; the next sample becomes the initial output."""
         self._state = None
 
     def update(self, dt: float, signal: FloatArray) -> FloatArray:
         """
-        Filter the next sample of all signals; return the filtered values.
+        Filter the next sample of all signals; return the outputs of the three lags, shape (3, m).
 
         Parameters
         ----------
@@ -222,7 +222,7 @@ class CausalFilter:
         self, t: float, q: npt.ArrayLike, dq: npt.ArrayLike | None, tau: npt.ArrayLike
     ) -> FloatArray | None:
         """
-        Return a valid joint state as one array: positions, velocities if used, torques.
+        Return a joint state as an array of positions, velocities if used, and torques, or None.
 
         Parameters
         ----------
@@ -255,7 +255,7 @@ class CausalFilter:
         return signal
 
     def advance(self, t: float, signal: FloatArray) -> CausalMotion | None:
-        """Filter the signals of a joint state; return None until the filter has settled."""
+        """Filter a joint state; return the filtered motion, None until the filter has settled."""
         dt = 0.0 if self._last is None else t - self._last
         longest = self.max_gap * self.period if self.period else np.inf
         if self._last is not None and not 0.0 < dt <= longest:
@@ -282,7 +282,7 @@ class CausalFilter:
         return CausalMotion(t, value[:n], dq[:n], ddq[:n], value[-n:])
 
     def _missing(self, t: float, dt: float, signal: FloatArray) -> list[FloatArray]:
-        """Return interpolated samples for a gap of `dt` [s] before a sample."""
+        """Return interpolated samples for a gap of `dt` [s] before a sample; empty if no gap."""
         # A straight line would have no acceleration in the gap. A cubic goes through the sample
         # after the gap and three samples before it. Their distances equal the gap, so the cubic
         # has hardly more noise than the samples.
@@ -325,7 +325,7 @@ class CausalFilter:
 @dataclass(frozen=True)
 class RowNoise:
     """
-    Noise of filtered torques (regression rows), relative to the noise of samples.
+    Noise of filtered torques (regression rows), relative to the noise of unfiltered samples.
 
     Noise of samples, of standard deviation s and density s^2 T, has the variance s^2 T B after a
     filter H. The noise bandwidth B of the filter is the integral of |H|^2 over all frequencies.
@@ -360,12 +360,12 @@ class RowNoise:
         return cls(bandwidth, gain, gain / (period * row_pole * float(np.max(response))))
 
     def independent(self, step: float) -> float:
-        """Return how many independent observations a row equals, `step` s after the last row."""
+        """Return the number of independent observations, at most 1, in a row per `step` s."""
         return min(1.0, self.bandwidth * step)
 
 
 def sensor_noise(robot: Robot, given: tuple[float, ...] | None) -> FloatArray:
-    """Return the torque noise of each joint (n,): as given, or a share of its torque limit."""
+    """Return the torque noise of each joint, (n,): `given`, or 1 % of the torque limit."""
     if given is not None:
         noise = np.array(given, dtype=np.float64)
         if noise.shape != (robot.n_joints,):

@@ -250,7 +250,7 @@ def check_positions(robot: Robot, source: str, lowest: FloatArray, highest: Floa
 
 
 def position_problem(robot: Robot, lowest: FloatArray, highest: FloatArray) -> str:
-    """Return a message on the joint farthest outside its position limits; empty if none is far."""
+    """Return a message on the joint farthest beyond its position limits; empty if none is far."""
     # largest excess of positions over the limits that is no wrong unit: two turns of a joint that
     # a controller lets spin [rad], or one metre [m]
     turning, sliding = 4.0 * np.pi, 1.0
@@ -300,7 +300,7 @@ def beyond_limits(robot: Robot, recordings: Sequence[Recording]) -> tuple[str, .
 
 def torque_factors(arm: ArmModel, motions: Sequence[Motion]) -> tuple[FloatArray, FloatArray]:
     """
-    Return ratio and correlation of measured and modelled torque for each joint.
+    Return the ratio and the correlation of measured to modelled torque for each joint.
 
     An offset is fitted too, and friction if the model has no effects. With effects, only samples
     in motion are used, as friction holds a joint at rest with any torque.
@@ -340,7 +340,7 @@ def joined(motions: Sequence[Motion]) -> Motion:
 
 def unit_of(factor: float, of_joints: Sequence[float] = (), near_force: float = 1.2) -> str:
     """
-    Return torque units that explain a factor of measured over expected torque; empty if none.
+    Return the torque units that explain a ratio of measured to expected torque; '' if none.
 
     Parameters
     ----------
@@ -366,5 +366,5 @@ def unit_of(factor: float, of_joints: Sequence[float] = (), near_force: float = 
 
 
 def residual_of_fit(values: FloatArray, columns: FloatArray) -> FloatArray:
-    """Return values (N, ...) minus their least-squares fit by columns (N, k)."""
+    """Return the residual of a least-squares fit of values, (N, ...), by columns, (N, k)."""
     return np.asarray(values - columns @ np.linalg.lstsq(columns, values, rcond=None)[0])

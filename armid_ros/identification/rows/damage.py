@@ -32,7 +32,7 @@ def without_damage(
     recordings: Sequence[Recording], used: Conditioning
 ) -> tuple[list[Recording], tuple[str, ...]]:
     """
-    Replace damaged samples of recordings by interpolation; return notes as well.
+    Replace damaged samples of recordings by interpolation; return recordings and notes.
 
     A torque sample is damaged if it changes the filtered torque by more than noise does. Before
     any fit, the noise is assumed as a share of the spread of the torque. A recording without
@@ -77,7 +77,7 @@ def without_damage(
 
 def impossible_excursions(t: FloatArray, x: FloatArray, floor: FloatArray) -> list[Excursion]:
     """
-    Return jumps of signals, with a return, that no real motion or torque can make.
+    Return jumps of signals away and back that no real motion or torque can cause.
 
     A `SpikeGate` finds them with the prediction errors and ranges of the whole recording. It
     processes only samples that differ too much from their prediction, and the samples after them.
@@ -130,7 +130,7 @@ def _suspects(
     t: FloatArray, x: FloatArray, floor: FloatArray
 ) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.bool_], ErrorModel]:
     """
-    Find samples that are not on the straight line through the two samples before.
+    Find samples that are off the straight line through the two previous samples.
 
     Returns for each sample the first sample of its stretch, (N,), and whether a signal is off its
     line by more than the largest allowed error, (N,); then the prediction errors in the noisiest

@@ -10,7 +10,7 @@ import numpy as np
 
 def find_period(t: FloatArray, positions: FloatArray) -> tuple[int, slice] | None:
     """
-    Return a period of recorded positions, with the repeating samples; None without a period.
+    Return the period of recorded positions [samples] and the samples that repeat, or None.
 
     Parameters
     ----------
@@ -66,14 +66,14 @@ def find_period(t: FloatArray, positions: FloatArray) -> tuple[int, slice] | Non
 
 
 def refined_period(positions: FloatArray, lag: int, where: slice) -> float:
-    """Refine a period [samples] by a parabola through mismatches at three lags."""
+    """Return a period [samples], refined by a parabola through mismatches at three lags."""
     before, least, after = (_mean_change(positions, lag + shift, where) for shift in (-1, 0, 1))
     bend = before - 2.0 * least + after
     return lag + float(0.5 * (before - after) / bend) if 0.0 < bend < np.inf else float(lag)
 
 
 def _mean_change(positions: FloatArray, lag: int, where: slice) -> float:
-    """Return the mean square difference between positions (N, n) that are a lag apart."""
+    """Return the mean square difference of positions, (N, n), that are `lag` samples apart."""
     end = min(where.stop, len(positions) - lag)
     gap = positions[where.start + lag : end + lag] - positions[where.start : end]
     return float(np.mean(gap**2))

@@ -86,7 +86,7 @@ class Regression(Stretch):
 
     @property
     def target(self) -> FloatArray:
-        """Return the measured torque minus the constant, for the fit of the columns, (M, n)."""
+        """Return the measured torque minus the constant, shape (M, n), which the columns fit."""
         return np.asarray(self.tau - self.constant)
 
     def torque(self, values: FloatArray) -> FloatArray:
@@ -205,7 +205,7 @@ class Score:
 
     @staticmethod
     def of(fits: Sequence[Fit]) -> Score:
-        """Return the torque errors over all informative samples of gap-free sections."""
+        """Return the torque errors of fits, without samples at which friction may hold a joint."""
         names = 'residual', 'tau', 'informative'
         return Score.of_rows(*(np.concatenate([getattr(f, one) for f in fits]) for one in names))
 
@@ -213,7 +213,7 @@ class Score:
     def of_rows(
         residual: FloatArray, tau: FloatArray, informative: npt.NDArray[np.bool_]
     ) -> Score:
-        """Return the errors of torques over their informative samples, from residuals (N, n)."""
+        """Return the torque errors at informative samples, from residuals and torques, (N, n)."""
         errors, lengths = (np.linalg.norm(informative * x, axis=0) for x in (residual, tau))
         count, whole = np.maximum(informative.sum(axis=0), 1), np.linalg.norm(lengths)
         return Score(
@@ -240,7 +240,7 @@ def by_stretch(problem: Sequence[Stretch], rows: FloatArray) -> list[FloatArray]
 
 
 def predictions(arm: ArmModel, recordings: Sequence[Recording], used: Conditioning) -> list[Fit]:
-    """Return measured and predicted torque of a model for each gap-free section."""
+    """Return measured and predicted torque for each gap-free section of recordings."""
     found = []
     for recording in recordings:
         for motion in segments(recording, used):
@@ -256,7 +256,7 @@ def _rows(
     rest: npt.NDArray[np.bool_],
     unsure: npt.NDArray[np.bool_],
 ) -> tuple[Motion, npt.NDArray[np.bool_]]:
-    """Decimate motion and torque of a section; also return which samples are informative."""
+    """Return decimated motion and torque of a section, and a mask of samples not at rest."""
     kept = np.array(decimated_samples(len(motion), used), dtype=np.intp)
     assert motion.tau is not None
     tau = decimate(bridged(motion.tau, unsure), used)

@@ -53,7 +53,7 @@ _MIN_SAMPLES = 4
 @dataclass(frozen=True)
 class SignalSettings:
     """
-    Position cut-off and decimation set by the user; None is chosen from recordings.
+    Position cut-off and decimation set by the user; if None, chosen from the recordings.
 
     Attributes
     ----------
@@ -118,7 +118,7 @@ class Conditioning:
     @property
     def smooth_stride(self) -> int:
         """
-        Largest stride at which smooth functions of filtered positions have to be computed.
+        Largest stride [samples] that suffices to compute smooth functions of filtered positions.
 
         The spectrum of positions ends at the cut-off, that of smooth functions slightly above.
         Five samples per period of the cut-off are enough for the pass band of the decimation.
@@ -174,7 +174,7 @@ def conditioning(recordings: Sequence[Recording], settings: SignalSettings) -> C
 
 def velocity_error(recording: Recording, used: Conditioning) -> FloatArray:
     """
-    Return the error of velocities that are computed from filtered positions.
+    Return the standard deviation of velocities from filtered positions, (n,) [rad/s or m/s].
 
     One part is white noise of the positions up to the cut-off, times the square of the frequency.
     The other part is motion above the cut-off, which the filter removes.
@@ -248,7 +248,7 @@ def no_stretch(recording: Recording, used: Conditioning) -> IdentificationError:
             f'without a gap: take more than {_CUTOFF_PERIODS / left:.2g} Hz, or leave it out'
         )
     return IdentificationError(
-        f'{recording.source}: no stretch is long enough to be filtered at {used.cutoff_hz:g} Hz: '
+        f'{recording.source}: no section is long enough to be filtered at {used.cutoff_hz:g} Hz: '
         f'the longest without a gap has {longest:.2f} s, more than {_shortest(used):.2f} s are '
         'needed. Record longer, or without gaps'
         + (', or lower --decimation' if 'decimation' in used.given else '')
@@ -257,7 +257,7 @@ def no_stretch(recording: Recording, used: Conditioning) -> IdentificationError:
 
 def decimate(values: FloatArray, used: Conditioning, stride: int = 1) -> FloatArray:
     """
-    Low-pass and decimate values, such as torques and regressor columns.
+    Low-pass and decimate values along the first axis, such as torques and regressor columns.
 
     Parameters
     ----------
@@ -305,7 +305,7 @@ def decimated_samples(n_samples: int, used: Conditioning) -> range:
 
 
 def _even(t: FloatArray, period: float, *signals: FloatArray) -> tuple[FloatArray, ...]:
-    """Return evenly spaced times and signals; cubic splines interpolate if the stamps jitter."""
+    """Return evenly spaced times and signals; cubic splines interpolate stamps with jitter."""
     grid = np.linspace(t[0], t[-1], round((t[-1] - t[0]) / period) + 1)
     # stamps that differ by less than a twentieth of a period are even
     if len(grid) == len(t) and np.max(np.abs(grid - t)) < 0.05 * period:
@@ -327,7 +327,7 @@ def position_noise(recording: Recording) -> FloatArray:
 def _differentiated(
     recording: Recording, t: FloatArray, q: FloatArray, tau: FloatArray, used: Conditioning
 ) -> Motion:
-    """Return the filtered motion of a section; positions may include another machine's."""
+    """Return the filtered motion of a section; `q` may have more columns, of another machine."""
     sections = signal.butter(4, used.cutoff_hz, fs=used.rate_hz, output='sos')
     smooth = signal.sosfiltfilt(sections, q, axis=0)
     dq = _central_difference(smooth, t[1] - t[0])
@@ -371,7 +371,7 @@ def _central_difference(x: FloatArray, step: float) -> FloatArray:
 
 
 def _motion_band(stretches: Sequence[tuple[FloatArray, npt.ArrayLike]], rate: float) -> float:
-    """Return the frequency below which 99 % of the power of the fastest velocity lies [Hz]."""
+    """Return the frequency [Hz] below which each joint has 99 % of its velocity's power."""
     # Each stretch has positions and the frequency above which they are noise, of all joints or of
     # each. Power above this frequency is ignored, as a joint that hardly moves has only noise
     # there. For the same reason, the power is summed over all stretches.
@@ -437,7 +437,7 @@ def mean_spectrum(
 def _position_spectrum(
     recording: Recording,
 ) -> tuple[list[FloatArray], FloatArray, FloatArray, FloatArray]:
-    """Return gap-free positions with frequencies (K,), power (K, n) and noise (n,) per Hz."""
+    """Return gap-free positions, frequencies (K,) [Hz], power (K, n) and noise (n,) per Hz."""
     rate = 1.0 / recording.period
     parts = [part for part in unbroken(recording, rate) if len(part) >= _MIN_SAMPLES]
     stretches = [recording.q[part] for part in parts] or [recording.q]

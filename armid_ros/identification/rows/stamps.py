@@ -63,7 +63,7 @@ def rounded_stamps(recording: Recording) -> str:
 
 def check_recordings(recordings: Sequence[Recording]) -> None:
     """
-    Raise an error for a recording that has too few samples per second or two senders.
+    Raise an error for a recording that has too few samples per second, or two senders.
 
     Raises
     ------
@@ -93,7 +93,7 @@ def check_recordings(recordings: Sequence[Recording]) -> None:
 
 def two_senders(recording: Recording) -> str:
     """
-    Return a message if positions alternate as if from two senders, else ''.
+    Return a message if positions alternate as if two senders published them, else ''.
 
     A sample has another sender than its neighbours if some joint is far from both neighbours, and
     these are near each other. Such samples form a separate track; values of a faulty encoder are

@@ -28,7 +28,7 @@ import numpy.typing as npt
 
 
 def _cuts(piece: Recording, used: Conditioning) -> tuple[int, int]:
-    """Return when the next piece of a recording begins, and its decimated samples begin [ns]."""
+    """Return the start times of a recording's next piece and of its decimated samples [ns]."""
     # after 16 periods, the start of a filter of order 4 has decayed to exp(-38)
     periods = (EDGE_PERIODS + 16.0) * used.rate_hz / used.cutoff_hz
     margin = int(np.ceil(periods)) + len(used.taps)
@@ -55,7 +55,7 @@ def streamed(
     settings: ReadSettings,
 ) -> Iterator[tuple[Recording, Sequence[Regression]]]:
     """
-    Read a bag in pieces; yield each piece, repaired, with its linear problem.
+    Read a bag in pieces; yield each piece, without damaged samples, with its linear problem.
 
     Parameters
     ----------

@@ -21,7 +21,7 @@ _SIZES = {'viscous_slope': 'viscous_coefficient', 'coulomb_slope': 'coulomb_torq
 
 
 def mean_temperatures(parts: Sequence[Motion | Recording]) -> dict[str, float] | None:
-    """Return each joint's mean temperature [degC]; None if a recording has none."""
+    """Return each joint's mean temperature [degC]; None if a recording has no temperatures."""
     found = [part.temperature.at(part.t) for part in parts if part.temperature is not None]
     if not found or len(found) < len(parts):
         return None
@@ -32,7 +32,7 @@ def mean_temperatures(parts: Sequence[Motion | Recording]) -> dict[str, float] |
 
 def at_mean_temperature(arm: ArmModel, recordings: Sequence[Recording]) -> ArmModel:
     """
-    Return the arm whose friction effects, unless fitted, refer to the mean temperature.
+    Return the arm with the mean temperature as reference of friction effects not fitted yet.
 
     Raises
     ------
