@@ -20,7 +20,7 @@ Moment = tuple[float, FloatArray]
 
 
 @dataclass
-class _Part:
+class _Sender:
     """Sender of joint states: its joints, and its samples (s, k) that are not merged yet."""
 
     joints: tuple[int, ...]
@@ -71,7 +71,7 @@ class JointMerger:
 
     def __init__(self, n_joints: int) -> None:
         self._n_joints = n_joints
-        self._parts: dict[tuple[int, ...], _Part] = {}
+        self._parts: dict[tuple[int, ...], _Sender] = {}
 
     @property
     def missing(self) -> tuple[int, ...]:
@@ -98,11 +98,11 @@ class JointMerger:
             Time stamps and signals of all n joints, oldest first.
 
         """
-        self._parts.setdefault(joints, _Part(joints)).take(t, values)
+        self._parts.setdefault(joints, _Sender(joints)).take(t, values)
         if self.missing:
             return []
         # only senders with a joint that no earlier sender has
-        found: list[_Part] = []
+        found: list[_Sender] = []
         known: set[int] = set()
         for part in self._parts.values():
             if not known.issuperset(part.joints):
@@ -126,7 +126,7 @@ class JointMerger:
 
 def joint_places(joints: Sequence[str], names: Sequence[str]) -> npt.NDArray[np.intp]:
     """
-    Return the index of each given joint among the joint names of a message.
+    Return the index of each of `joints` among the joint names of a message, shape (n,).
 
     Parameters
     ----------

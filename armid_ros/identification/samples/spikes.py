@@ -55,7 +55,7 @@ N_FIRST = 20
 
 class SpikeGate:
     """
-    Filter of a stream of joint states that leaves out damaged ones.
+    Filter that leaves damaged samples out of a stream of joint states.
 
     Parameters
     ----------
@@ -156,7 +156,7 @@ class SpikeGate:
         return good + self._take(StreamSample(t, x))
 
     def _take(self, sample: StreamSample) -> list[StreamSample]:
-        """Process a sample after the next sample has confirmed its time stamp."""
+        """Unwrap and classify a sample with a confirmed time stamp; return undamaged samples."""
         if self._reference:
             self._last = self._reference[1].x
         if self._last is not None:
@@ -170,7 +170,7 @@ class SpikeGate:
         return self._begin() if len(self._first) == N_FIRST else []
 
     def settle(self) -> bool:
-        """Update a nearly full window of typical errors early; return whether it was updated."""
+        """Update typical prediction errors early, from a nearly full window; True if done."""
         return self._level.settle(self._period, WINDOW - 4)
 
     def begin(
@@ -234,7 +234,7 @@ class SpikeGate:
         return latest[-1] if latest else None
 
     def _in_time(self, sample: StreamSample) -> bool:
-        """Return whether a stamp continues the stream, or is the second after a time jump."""
+        """Return whether a sample's stamp follows the stream, or confirms a clock jump."""
         tail, stray, self._jumped = self._tail, self._jumped, None
         dt = 0.0 if tail is None else sample.t - tail.t
         longest = MAX_GAP * self._period
@@ -255,7 +255,7 @@ class SpikeGate:
         return False
 
     def _begin(self) -> list[StreamSample]:
-        """Measure noise and period from the first samples; return the undamaged ones."""
+        """Measure noise and period from the first samples; return the undamaged samples."""
         raw, self._first = self._first or [], None
         first = all_unwrapped(raw, self._turn)
         self._period = float(np.median(np.diff([s.t for s in first])))
@@ -278,7 +278,7 @@ class SpikeGate:
         return good
 
     def _classify(self, sample: StreamSample) -> list[StreamSample]:
-        """Compare a sample with its prediction; return samples now known to be undamaged."""
+        """Compare a sample with its prediction; return the samples now known to be undamaged."""
         if self._first is not None:  # the earlier samples were erratic
             self._first.append(sample)
             return []
@@ -319,7 +319,7 @@ class SpikeGate:
         return []
 
     def _release(self) -> list[StreamSample]:
-        """Check the held-back samples again; return the undamaged ones."""
+        """Check the held-back samples again; return the undamaged samples."""
         held, self._pending = self._pending, []
         innovations = self._lines_through(held)
         steady = ~self._pulsing
@@ -337,7 +337,7 @@ class SpikeGate:
         return good
 
     def _continues(self, sample: StreamSample, ratio: FloatArray) -> bool:
-        """Return whether a sample continues the held-back samples, with old or new slope."""
+        """Return whether a sample is on a line from held-back samples, with old or new slope."""
         last = self._pending[-1]
         before = self._pending[-2] if len(self._pending) > 1 else self._reference[1]
         first, second = self._reference
@@ -368,7 +368,7 @@ class SpikeGate:
         return np.maximum(limits, self._floor)
 
     def _ratio_to_limit(self, innovation: Innovation) -> FloatArray:
-        """Return each signal's prediction error divided by the largest allowed one, (m,)."""
+        """Return each signal's prediction error over its largest allowed error, shape (m,)."""
         limit = np.maximum(self._limits(innovation), 1e-300)
         return np.asarray(np.abs(innovation.error) / limit)
 
@@ -388,12 +388,12 @@ class SpikeGate:
         return samples
 
     def _lines_through(self, samples: Sequence[StreamSample]) -> list[Innovation]:
-        """Return the errors of predicting each sample by the line through the two before."""
+        """Return each sample's prediction error from the line through the two previous samples."""
         pairs = range(len(samples) - 2)
         return [innovation_of(samples[k : k + 2], samples[k + 2], self._period) for k in pairs]
 
     def _leave_out_ahead(self, samples: Sequence[StreamSample], innovation: Innovation) -> None:
-        """Leave out all samples before the first three that lie on a straight line."""
+        """Leave out `samples`, which precede the first three samples on a straight line."""
         if samples:
             ratio, limit = self._ratio_to_limit(innovation), self._limits(innovation)
             self._leave_out(Excursion(tuple(samples), ratio, limit))

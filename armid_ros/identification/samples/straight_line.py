@@ -101,7 +101,7 @@ class ErrorModel:
     quantile: float
 
     def growth(self, noise: Factor, acceleration: Factor) -> FloatArray:
-        """Return the growth of prediction errors by noise and acceleration, (m,) or (N, m)."""
+        """Return growth factors of errors, (m,) or (N, m), by noise and acceleration."""
         squares = acceleration**2
         return np.asarray(np.sqrt(squares + self.white * (noise**2 - squares)))
 
@@ -112,7 +112,7 @@ class ErrorModel:
 
     def limits(self, noise: Factor, acceleration: Factor) -> FloatArray:
         """
-        Return the largest allowed prediction errors, for given growth factors.
+        Return the largest allowed prediction errors for growth factors of noise and acceleration.
 
         The acceleration of an arm is bounded, unlike noise, which has tails. The limit of a smooth
         signal is therefore a small multiple of its typical error, not a quantile of the normal
@@ -149,7 +149,7 @@ class Innovation(NamedTuple):
 
 
 def growth_over(step: Time, ahead: Time, period: float) -> tuple[Time, Time]:
-    """Return how prediction errors grow with time: factors for noise and for acceleration."""
+    """Return growth factors of errors of a prediction `ahead` s: for noise, for acceleration."""
     ratio = ahead / step
     noise: Time = ((1.0 + (1.0 + ratio) ** 2 + ratio**2) / 6.0) ** 0.5
     return noise, 0.5 * ahead * (ahead + step) / period**2
@@ -166,7 +166,7 @@ def innovation_of(
 
 
 def unwrapped(x: FloatArray, last: FloatArray, turn: FloatArray) -> FloatArray:
-    """Remove jumps by full turns from positions of drivers that report angles within +-pi."""
+    """Return signals without jumps by full turns from `last`, as drivers wrap angles to +-pi."""
     if float(np.abs(x - last).max()) <= np.pi:
         return x
     turns = np.rint(np.divide(x - last, turn, where=turn > 0.0, out=np.zeros_like(x)))
@@ -182,13 +182,13 @@ def all_unwrapped(samples: Sequence[StreamSample], turn: FloatArray) -> list[Str
 
 
 def quantile(period: float, count: int) -> float:
-    """Return the limit in standard deviations that noise of `count` signals seldom exceeds."""
+    """Return the error limit [standard deviations] for one false alarm in FALSE_ALARM_TIME."""
     return float(-special.ndtri(min(period / FALSE_ALARM_TIME / count, 0.5) / 2.0))
 
 
 def robust_scale(innovations: FloatArray, share: float = 0.95) -> FloatArray:
     """
-    Return the standard deviation of errors (k, m) from a quantile of their size.
+    Return the standard deviation of errors, (k, m), from a quantile of absolute errors.
 
     Larger errors may be friction steps, or damage.
 
@@ -243,7 +243,7 @@ class NoiseLevel:
         self._window, self._count = np.empty((WINDOW + 2 * MAX_GAP, 2 * count + 2)), 0
 
     def set(self, model: ErrorModel) -> None:
-        """Use the typical prediction errors of a given error model."""
+        """Replace the typical prediction errors by an error model."""
         self.forget()
         self._remember(model.size, model.white)
         self.model = model
@@ -276,7 +276,7 @@ class NoiseLevel:
         self._count += 1
 
     def settle(self, period: float, count: int = WINDOW) -> bool:
-        """Update the typical prediction errors after a full window; return whether updated."""
+        """Update the typical prediction errors if a window is full; return whether updated."""
         if self._count < count:
             return False
         window, self._count = self._window[: self._count], 0
@@ -291,12 +291,12 @@ class NoiseLevel:
         return True
 
     def _use(self, period: float, size: FloatArray, white: FloatArray) -> None:
-        """Set the typical prediction errors from a window, but at least to the resolution."""
+        """Set the typical prediction errors to `size`, or to the resolution if larger."""
         allowed = quantile(period, len(size))
         self.model = ErrorModel(period, np.maximum(size, self._least(period)), white, allowed)
 
     def _remember(self, size: FloatArray, white: FloatArray) -> None:
-        """Store the typical prediction errors of a window; overwrite the oldest window."""
+        """Store the typical prediction errors of a window in place of the oldest window."""
         place = self._seen % len(self._sizes)
         self._sizes[place], self._shares[place] = size, white
         self._seen += 1
@@ -308,7 +308,7 @@ class NoiseLevel:
             self._min_steps = smallest_steps(np.concatenate([self._min_steps, sizes]))
 
     def _least(self, period: float) -> FloatArray:
-        """Return each signal's smallest relevant error: resolution, or change as motion begins."""
+        """Return each signal's smallest relevant error: resolution, or change at motion onset."""
         # A fast signal has no small steps, but its resolution causes prediction errors.
         known = np.isfinite(self._min_steps[-1])
         step = np.where(known, self._min_steps[-1], 0.0)
