@@ -90,7 +90,7 @@ class IdentificationSettings:
     prefers_bodies: bool = False
 
     def __post_init__(self) -> None:
-        """Check that the method exists, and that it allows physical constraints if requested."""
+        """Raise an error for an unknown method, or for physical constraints with method 'iv'."""
         if self.method not in ESTIMATORS:
             raise IdentificationError(
                 f"method '{self.method}' does not exist; use {', '.join(ESTIMATORS)}"
@@ -102,7 +102,7 @@ class IdentificationSettings:
 
     @property
     def least_squares(self) -> Method:
-        """Return the least-squares method; for instrumental variables, that of the first fit."""
+        """Return the least-squares method; 'wls' for the first fit of instrumental variables."""
         return 'wls' if self.method == 'iv' else self.method
 
     @property
@@ -200,7 +200,7 @@ class Identification:
         return tuple(found)
 
     def predict(self, recordings: Sequence[Recording]) -> tuple[Fit, ...]:
-        """Predict the torques of other recordings, filtered like the training data; see `Fit`."""
+        """Predict torques of other recordings, filtered like the data of the fit."""
         check_recordings(recordings)
         recordings, _ = without_damage(recordings, self.used)
         found = predictions(self.arm, recordings, self.used)
@@ -302,7 +302,7 @@ def _fit_consistent_links(
     settings: IdentificationSettings,
     rng: np.random.Generator,
 ) -> tuple[IdentificationSettings, BaseParameters, FittedValues, PhysicalCertificate] | None:
-    """Fit physically consistent links; None if not requested, or optional but infeasible."""
+    """Fit physically consistent links; None if not requested, or if optional and infeasible."""
     if settings.method == 'iv' or not (settings.physical or settings.prefers_bodies):
         return None
     constraints = settings.physical or PhysicalSettings()
@@ -324,7 +324,7 @@ def _fitted(
     settings: IdentificationSettings,
     rng: np.random.Generator,
 ) -> tuple[BaseParameters, FittedValues]:
-    """Return the identifiable base parameters, and a fit of those excited by the data."""
+    """Return the identifiable base parameters, and a fit of the parameters the data excite."""
     base, problem, recordings, used = data
     method, rigid = settings.least_squares, len(arm.robot.rigid_parameters)
     refitted = False
@@ -351,7 +351,7 @@ def _fit_quasi_static(
     method: Method,
     rng: np.random.Generator,
 ) -> tuple[FittedValues, tuple[str, ...]]:
-    """Fit weight and friction to slow motions with described inertias; also return notes."""
+    """Fit weight and friction to slow motions with described inertia; return fit and notes."""
     base, problem, recordings, used = data
     problem = exact_at(problem, torques(arm, recordings, used), base.values(arm.theta))
     free = unidentifiable_directions(arm, arm.base_parameters(rng))
@@ -395,7 +395,7 @@ def _require_samples(
     columns: Sequence[Regression],
     used: Conditioning,
 ) -> None:
-    """Raise an error if a recording is too short, or all have too few torques for the fit."""
+    """Raise an error if a recording is too short, or if there are too few samples to fit."""
     filtered = {part.source for part in columns}
     for recording in recordings:
         if recording.source not in filtered:

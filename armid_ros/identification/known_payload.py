@@ -52,7 +52,7 @@ class DriveGains:
     half_width: FloatArray
 
     def document(self) -> list[dict[str, object]]:
-        """Return the gains as written to identification.json; null if not identified."""
+        """Return the gains for identification.json; null for a gain that is not identified."""
         numbers = zip(
             *(array.tolist() for array in (self.values, self.std, self.half_width)), strict=True
         )
@@ -64,7 +64,7 @@ class DriveGains:
         ]
 
     def sentences(self) -> tuple[str, ...]:
-        """Return sentences on the drive gains, and on the model that is fitted with the gains."""
+        """Return a sentence on each drive's gain, and one on the efforts of the fit."""
         sure = np.isfinite(self.std)
         lines = [
             f'drive gain of {joint}: {gain:.4g} ({gain - width:.4g} to {gain + width:.4g}, 95 %)'
@@ -88,7 +88,7 @@ def payloads_of(
     texts: Sequence[str], recordings: Sequence[Recording], robot: Robot
 ) -> Mapping[str, Robot]:
     """
-    Return for each recording with a payload, by path, the robot model with this payload.
+    Return the robot with its payload for each recording with a payload, by the recording's path.
 
     Raises
     ------
@@ -103,7 +103,7 @@ def payloads_of(
         named = [source for source, bag in bags.items() if name in (str(bag), bag.name, bag.stem)]
         if len(named) != 1:
             raise IdentificationError(
-                f"--payload '{text}' names {len(named)} recordings, but has to name 1 of "
+                f"--payload '{text}': BAG matches {len(named)} recordings; it has to match one of "
                 f'{", ".join(map(str, bags.values()))}'
             )
         found[named[0]] = with_payload(found.get(named[0], robot), link, payload)
@@ -112,7 +112,7 @@ def payloads_of(
 
 def parse_payload(text: str) -> tuple[str, str, pin.Inertia]:
     """
-    Return recording, link and payload of a text 'BAG=KG@LINK' or 'BAG=KG@LINK:X,Y,Z'.
+    Return recording, link and payload from a text 'BAG=KG@LINK' or 'BAG=KG@LINK:X,Y,Z'.
 
     Returns
     -------
@@ -145,13 +145,13 @@ def parse_payload(text: str) -> tuple[str, str, pin.Inertia]:
 
 
 def with_payload(robot: Robot, link: str, payload: pin.Inertia) -> Robot:
-    """Return the robot model whose link carries a payload; raise an error for an unknown link."""
+    """Return the robot with a payload added to a link; raise an error for an unknown link."""
     frames = {f.name: f for f in robot.model.frames if f.type == pin.FrameType.BODY}
     frame = frames.get(link)
     if frame is None or frame.parentJoint == 0:
         links = [name for name, one in frames.items() if one.parentJoint > 0]
         raise IdentificationError(
-            f"--payload: no joint moves a link '{link}'; moving links are {', '.join(links)}"
+            f"--payload: '{link}' is not a moving link; moving links are {', '.join(links)}"
             f'{meant(link, links)}'
         )
     parameters = robot.rigid_parameters.reshape(-1, 10).copy()
@@ -210,8 +210,8 @@ def drive_gains(
     values, std, width = (np.array(one) for one in zip(*gains, strict=True))
     if not np.any(np.isfinite(std)):
         raise IdentificationError(
-            '--payload: no gain of a drive is determined; record one motion with and without the '
-            'payload, or use a heavier payload'
+            '--payload: the recordings do not determine the gain of any drive; record one motion '
+            'with and without the payload, or use a heavier payload'
         )
     return DriveGains(arm.robot.joints, values, std, width)
 
@@ -219,7 +219,7 @@ def drive_gains(
 def _gain(
     columns: FloatArray, known: FloatArray, tau: FloatArray, blocks: FloatArray
 ) -> tuple[float, float, float]:
-    """Return gain of a drive, its standard deviation, and half the width of its 95 % interval."""
+    """Return a drive's gain, with the standard deviation and half-width of its 95 % interval."""
     scale = np.linalg.norm(columns, axis=0)
     columns = columns[:, scale > 0.0] / scale[scale > 0.0]
     # regression of the effort's residual on that of the payload's torque (Frisch and Waugh)

@@ -153,7 +153,7 @@ def with_digests(document: Mapping[str, Any]) -> dict[str, Any]:
 
 def identified_from(path: str | Path) -> tuple[Path, ...]:
     """
-    Return the paths of the recordings that gave a model, if they still exist.
+    Return the existing paths of the recordings from which a model was identified.
 
     Parameters
     ----------
@@ -173,7 +173,7 @@ def identified_from(path: str | Path) -> tuple[Path, ...]:
 
 def require_as_identified(path: str | Path) -> None:
     """
-    Raise an error if a recording has changed since a model was identified from it.
+    Raise an error if a recording has changed since the identification of a model from it.
 
     Parameters
     ----------
@@ -191,13 +191,13 @@ def require_as_identified(path: str | Path) -> None:
         if known is not None and _content(recording) != known:
             raise ModelError(
                 f'{recording}: this recording has changed since {path} was identified from it. '
-                'Give the baseline (--baseline), diagnose without a baseline (--no-baseline), or '
+                'Name a baseline (--baseline), diagnose without a baseline (--no-baseline), or '
                 'identify the arm again'
             )
 
 
 def _content(path: Path) -> dict[str, Any]:
-    """Return size [bytes] and digest of a recording; the digest is of both ends of its files."""
+    """Return a recording's size [bytes] and the digest of the first and last MiB of its files."""
     inside = sorted(path.rglob('*')) if path.is_dir() else [path]
     digest, total = hashlib.sha256(), 0
     end = 1 << 20  # bytes; enough for the time stamps at the beginning and the index at the end
@@ -215,7 +215,7 @@ def _content(path: Path) -> dict[str, Any]:
 
 
 def _found(model: Path) -> dict[Path, dict[str, Any] | None]:
-    """Return the existing recordings that gave a model.yaml, with digests if known."""
+    """Return the existing recordings that identified a model.yaml, with digests if known."""
     file = model.with_name('identification.json')
     if not is_file(file):
         return {}
@@ -241,7 +241,7 @@ def _names(document: Mapping[str, Any]) -> list[str]:
 
 
 def _noise(result: Identification, noise: NoiseCheck) -> dict[str, Any]:
-    """Return the test of encoder noise in the form of identification.json."""
+    """Return the result of the encoder-noise test for identification.json."""
     return {
         'statistic': noise.statistic,
         'degrees_of_freedom': noise.freedom,
@@ -254,7 +254,7 @@ def _noise(result: Identification, noise: NoiseCheck) -> dict[str, Any]:
 
 
 def _score(result: Identification, fits: Sequence[Fit]) -> dict[str, Any]:
-    """Return the torque errors of fits in the form of identification.json."""
+    """Return the torque errors of fits for identification.json."""
     score = Score.of(fits)
     return {
         'relative_error_percent': score.relative_error_percent,
@@ -264,5 +264,5 @@ def _score(result: Identification, fits: Sequence[Fit]) -> dict[str, Any]:
 
 
 def _by_joint(result: Identification, values: FloatArray) -> dict[str, float]:
-    """Return values (n,) as a dictionary by joint name."""
+    """Return values of the joints, shape (n,), as a dictionary by joint name."""
     return dict(zip(result.arm.robot.joints, values.tolist(), strict=True))

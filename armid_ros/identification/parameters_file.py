@@ -56,7 +56,7 @@ class KnownFit:
 
     @property
     def unusable(self) -> bool:
-        """Whether the model is graded unusable, so that it does not describe the arm."""
+        """Whether the grade of the model is unusable: the model does not describe the arm."""
         return self.grade == 'unusable'
 
 
@@ -106,25 +106,25 @@ class ParameterFile:
     fit: KnownFit | None = None
 
     def covariance_of(self, names: Sequence[ParameterName]) -> FloatArray:
-        """Return the covariance matrix (p, p) of given parameters."""
+        """Return the covariance matrix of the named parameters, shape (p, p)."""
         assert self.covariance is not None
         chosen = self._positions(names)
         return np.asarray(self.covariance[np.ix_(chosen, chosen)])
 
     def scatter_of(self, names: Sequence[ParameterName]) -> FloatArray:
-        """Return the jackknife changes (K, p) of given parameters, one row per recording."""
+        """Return the jackknife changes of named parameters, shape (K, p), a row per recording."""
         if not len(self.scatter):
             return np.zeros((0, len(names)))
         return np.asarray(self.scatter[:, self._positions(names)])
 
     def _positions(self, names: Sequence[ParameterName]) -> list[int]:
-        """Return the indices of given parameters in the covariance."""
+        """Return the indices of the named parameters in the covariance matrix."""
         order = {name: position for position, name in enumerate(self.values)}
         return [order[name] for name in names]
 
     def information(self, parameters: Sequence[ParameterName]) -> FloatArray | None:
         """
-        Return the information matrix of P standard parameters of a model, (P, P).
+        Return the information matrix of P standard parameters of a model, shape (P, P).
 
         The matrix is zero in directions that the values do not determine, such as effects that the
         file does not have. None if the file has no covariance.
@@ -138,7 +138,7 @@ class ParameterFile:
 
     def regrouped_as(self, other: ParameterFile) -> ParameterFile:
         """
-        Add the base parameters of another file that the parameters of this file determine.
+        Add base parameters of another file if the parameters of this file determine them.
 
         A motion with less excitation groups more standard parameters. Its base parameters are
         combinations of the base parameters of a motion with more excitation.
@@ -212,7 +212,7 @@ def read_parameters(path: str | Path) -> ParameterFile:
 
 
 def _identification_of(path: Path, model: Mapping[str, Any]) -> ParameterFile | None:
-    """Read the identification.json beside a model.yaml; None for the file of another model."""
+    """Read identification.json in the folder of a model.yaml; None if it has another model."""
     # identification.json has the base parameters of the model and their covariance. It is of this
     # model if the model reproduces the value of every base parameter.
     file = path.with_name('identification.json')
@@ -327,13 +327,13 @@ def parameters_of(source: str, document: dict[str, Any]) -> ParameterFile:
 
 
 def _matrix(rows: Sequence[Mapping[str, float]], keys: Sequence[str]) -> FloatArray:
-    """Return the values of given keys in each mapping, zero where missing, as a matrix."""
+    """Return a matrix with a row per mapping and a column per key; missing values are zero."""
     return np.array([[row.get(key, 0.0) for key in keys] for row in rows])
 
 
 def known_fit(document: Mapping[str, Any]) -> KnownFit | None:
     """
-    Return torque error and grade from the content of identification.json; None if absent.
+    Return torque error and grade from the content of identification.json; None if missing.
 
     Raises
     ------

@@ -79,7 +79,7 @@ def test_intervals_hold_the_truth_as_often_as_they_say(arm, ladder):
 
 
 def test_without_a_difference_of_payload_nothing_is_determined(arm, ladder):
-    with pytest.raises(IdentificationError, match='no gain'):
+    with pytest.raises(IdentificationError, match='gain of any drive'):
         drive_gains(arm, ladder[:1], {}, SIGNALS, np.random.default_rng(0))
     loaded = payloads(arm, ladder)
     with pytest.raises(IdentificationError, match='and without'):
