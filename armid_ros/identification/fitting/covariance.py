@@ -25,7 +25,7 @@ MIN_RESIDUAL_SHARE = 0.1
 
 
 def sandwich(bread: FloatArray, middle: FloatArray) -> FloatArray:
-    """Return the sandwich covariance B M B' of B (bread) and M (middle)."""
+    """Return the sandwich covariance B M B', with B = `bread` and M = `middle`."""
     covariance = bread @ middle @ bread.T
     std = np.sqrt(np.maximum(np.abs(np.diag(covariance)), 1e-300))
     sizes, axes = np.linalg.eigh(covariance / np.outer(std, std))
@@ -36,7 +36,7 @@ def sandwich(bread: FloatArray, middle: FloatArray) -> FloatArray:
 
 def score_products(scores: Sequence[FloatArray], lags: int) -> FloatArray:
     """
-    Return the covariance of a sum of scores in which neighbouring samples are correlated.
+    Return the covariance of a sum of scores, with correlated neighbouring samples, (p, p).
 
     Source: Newey and West 1987.
 
@@ -62,7 +62,7 @@ def score_products(scores: Sequence[FloatArray], lags: int) -> FloatArray:
 
 
 def widened(covariance: FloatArray, bread: FloatArray, middle: FloatArray) -> FloatArray:
-    """Raise each variance of a covariance to at least the variance of a sandwich B M B'."""
+    """Return a covariance, scaled so that each variance is at least its sandwich B M B'."""
     ratio = np.diag(bread @ middle @ bread) / np.diag(covariance)
     factor = np.sqrt(np.maximum(ratio, 1.0))
     return np.asarray(covariance * np.outer(factor, factor))
@@ -76,7 +76,7 @@ def noise_products(
     instruments: Sequence[FloatArray] | None = None,
 ) -> FloatArray:
     """
-    Return the covariance of W' e, for weighted regressor W and torque noise e.
+    Return the covariance of W' e, with weighted regressor W and coloured torque noise e.
 
     The noise of each joint is coloured, with a spectrum Phi that is estimated from its residual.
     Noise is taken as independent between joints and between stretches. A fit removes noise at

@@ -44,7 +44,7 @@ def halves_error(
     spread: FloatArray | None = None,
 ) -> Score:
     """
-    Return the torque error with which fits to each half of the data predict the other half.
+    Return the torque errors of predicting each half of the data by a fit to the other half.
 
     Parameters
     ----------
@@ -88,7 +88,7 @@ def jackknife(
     problem: Sequence[Regression], weights: FloatArray, values: FloatArray
 ) -> FloatArray:
     """
-    Return how fitted values change when each recording in turn is left out (jackknife).
+    Return the changes of fitted values if each recording in turn is left out, shape (K, r).
 
     The squared changes of a value sum to its variance. The weight of a change is the precision
     with which the other recordings determine the value. For white noise, the sum of squares then
@@ -260,7 +260,7 @@ def _fit(
 def _some_rows(
     problem: Sequence[Regression], most: int
 ) -> tuple[int, FloatArray, FloatArray, FloatArray, npt.NDArray[np.bool_]]:
-    """Take about `most` samples; return stride, columns, torque, target and informative mask."""
+    """Return stride, columns, torque, target and informative mask of about `most` samples."""
     step = max(1, sum(len(part.tau) for part in problem) // most)
     columns, tau, target = (
         np.concatenate([getattr(part, name) for part in problem])[::step]

@@ -74,7 +74,7 @@ def excited(
     theory: BaseParameters, problem: Sequence[Regression]
 ) -> tuple[BaseParameters, tuple[Regression, ...]]:
     """
-    Group parameters that a motion does not separate, such as those of a joint at rest.
+    Group parameters that a motion does not separate, such as the parameters of a resting joint.
 
     Parameters
     ----------
@@ -140,7 +140,7 @@ def fit_determined(
     arm: ArmModel, base: BaseParameters, problem: Sequence[Regression], method: Method
 ) -> tuple[BaseParameters, tuple[Regression, ...], Solution]:
     """
-    Fit base parameters; keep described values that are more certain than the data.
+    Fit base parameters; keep described values if they are more certain than the data.
 
     Parameters are fixed one at a time, as each fixed parameter makes the others more certain.
 

@@ -47,7 +47,7 @@ from scipy.stats import chi2
 
 
 class _Instrumented(NamedTuple):
-    """Instrumental-variable estimate of r parameters, and its difference to least squares."""
+    """Instrumental-variable estimate of r parameters, and the difference from least squares."""
 
     values: FloatArray
     covariance: FloatArray  # correlation of the residuals included
@@ -116,8 +116,8 @@ def _by_instruments(
         by_w, by_z = inverse @ inverse.T, scipy.linalg.inv(z.T @ w)
     except scipy.linalg.LinAlgError:
         raise IdentificationError(
-            'the smoothed motion does not correlate with the recorded motion in every parameter: '
-            'use method wls, or record a richer motion'
+            'method iv cannot fit: the smoothed motion does not excite every parameter; use '
+            'method wls, or record a richer motion'
         ) from None
     free = values = by_z @ (z.T @ target)
     if limits is not None:
@@ -156,7 +156,7 @@ def _smoothed(recordings: Sequence[Recording], used: Conditioning) -> list[Recor
 @dataclass(frozen=True)
 class NoiseCheck:
     """
-    Test result whether encoder noise biases an identification, and size of the bias.
+    Result of the test for a bias by encoder noise, and the estimated bias.
 
     Attributes
     ----------
@@ -196,19 +196,19 @@ class NoiseCheck:
 
     @property
     def relative_bias(self) -> FloatArray:
-        """Bias of each parameter by encoder noise, divided by its standard deviation, (r,)."""
+        """Bias of each parameter by encoder noise over the parameter's std, shape (r,)."""
         return np.asarray(self.bias / np.where(self.std > 0.0, self.std, np.inf))
 
     @property
     def harmless(self) -> bool:
-        """Whether no bias is significant, and a large share of its standard deviation."""
+        """Whether no bias significantly exceeds a quarter of a parameter's std."""
         # smallest bias that matters, in standard deviations: it reduces 95 % intervals to 94 %
         significant = np.maximum(np.abs(self.bias) - HALF_WIDTH * self.bias_std, 0.0)
         return bool(np.all(significant <= 0.25 * self.std))
 
     def findings(self) -> tuple[tuple[str, bool], tuple[str, bool]]:
         """
-        Return a sentence on the test and one on the bias, each with whether it is satisfactory.
+        Return a sentence on the test and a sentence on the bias, each with True if satisfactory.
 
         If the test is significant and the bias by noise is negligible, the two fits differ for
         another reason: a missing effect of the model changes the two fits differently.

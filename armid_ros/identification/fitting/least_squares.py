@@ -140,7 +140,7 @@ class NormalEquations:
         return int(self.products.shape[2]) - 1
 
     def summed(self, scale: npt.ArrayLike = 1.0) -> FloatArray:
-        """Sum the products over joints, each divided by its squared scale, (r + 1, r + 1)."""
+        """Return the sum over joints of products divided by squared scales, (r + 1, r + 1)."""
         weight = np.broadcast_to(np.asarray(scale, dtype=float), self.counts.shape) ** -2.0
         return np.asarray(np.tensordot(weight, self.products, axes=1))
 
@@ -172,7 +172,7 @@ class NormalEquations:
 
     @classmethod
     def unpacked(cls, numbers: FloatArray) -> NormalEquations:
-        """Restore normal equations from an array of `packed`."""
+        """Restore normal equations from the array that `packed` returns."""
         joints = int(numbers[0])
         triangles = numbers[1 + joints :].reshape(joints, -1)
         size = int(np.sqrt(2 * triangles.shape[1]))
@@ -272,7 +272,7 @@ class WeightedFit:
 
 def weighted_fit(normal: NormalEquations, *, weighted: bool = True) -> WeightedFit:
     """
-    Solve normal equations, by default with each joint weighted by its own residual.
+    Solve normal equations, by default with each joint divided by its residual's deviation.
 
     Parameters
     ----------
@@ -292,14 +292,14 @@ def weighted_fit(normal: NormalEquations, *, weighted: bool = True) -> WeightedF
 
 
 def scaled_fit(normal: NormalEquations, scale: FloatArray) -> WeightedFit:
-    """Solve normal equations, with columns and torque of each joint divided by a scale (n,)."""
+    """Solve normal equations, with columns and torque of each joint divided by `scale`, (n,)."""
     products = normal.summed(scale)
     factor, inverse = factored(products[:-1, :-1])
     return WeightedFit(inverse @ (inverse.T @ products[:-1, -1]), scale, factor, inverse)
 
 
 def _positive(scale: FloatArray) -> FloatArray:
-    """Return residual scales (n,), kept above zero for joints that are fitted exactly."""
+    """Return residual scales, (n,), limited to values above zero for exactly fitted joints."""
     return np.maximum(scale, max(1e-9 * float(np.max(scale)), 1e-100))
 
 
@@ -322,7 +322,7 @@ def within_bounds(
     values: FloatArray, factor: FloatArray, bounds: tuple[FloatArray, FloatArray]
 ) -> FloatArray:
     """
-    Return the parameters within bounds that give the torques nearest to the unbounded fit's.
+    Return parameters within bounds whose torques are nearest to the torques of `values`.
 
     Parameters
     ----------

@@ -44,7 +44,7 @@ Torques = tuple[FloatArray, ...]
 @dataclass(frozen=True)
 class FittedValues:
     """
-    Fitted base parameters, the arm model with these values, and its torque.
+    Fitted base parameters, the arm model with these values, and the torque of this model.
 
     Attributes
     ----------
@@ -96,7 +96,7 @@ def fit_values(
     solution: Solution | None = None,
 ) -> FittedValues:
     """
-    Fit base parameters: by one linear solution, or by Gauss-Newton if the arm is nonlinear.
+    Fit base parameters by linear least squares, or by Gauss-Newton if the arm is nonlinear.
 
     Parameters
     ----------
@@ -144,7 +144,7 @@ def fit_values(
 
 def is_nonlinear(before: ArmModel, after: ArmModel, motions: Sequence[Motion]) -> bool:
     """
-    Return whether the torque is nonlinear in the parameters, from one model to another.
+    Return whether torques are nonlinear in the parameters between two models of an arm.
 
     Parameters
     ----------
@@ -233,7 +233,7 @@ def torques(arm: ArmModel, recordings: Sequence[Recording], used: Conditioning) 
 def exact_at(
     problem: Sequence[Regression], predicted: Torques, values: FloatArray
 ) -> tuple[Regression, ...]:
-    """Set the constants of linear problems so that given parameters predict given torques."""
+    """Set the constants of linear problems so that `values` predict the torques `predicted`."""
     return tuple(
         replace(part, constant=torque - part.columns @ values)
         for part, torque in zip(problem, predicted, strict=True)
@@ -243,7 +243,7 @@ def exact_at(
 def agree(
     problem: Sequence[Regression], weights: FloatArray, linear: Torques, predicted: Torques
 ) -> bool:
-    """Return whether torques of the linear model agree with those of the nonlinear model."""
+    """Return whether the torques of the linear and the nonlinear model agree in tolerance."""
     measured = [part.tau for part in problem]
     difference, torque, residual = (
         float(np.linalg.norm(weights * np.concatenate(parts)))
@@ -315,7 +315,7 @@ class _State:
         self._weights = self._used / np.maximum(rms, _MIN_TORQUE_SHARE * max(rms.max(), 1e-100))
 
     def gain(self, predicted: Torques) -> float:
-        """Return how much given torques reduce the cost; zero if the fit is already exact."""
+        """Return the decrease of the cost by torques `predicted`; zero if the fit is exact."""
         # a smaller residual torque is a rounding error
         if np.linalg.norm(self._used * self._residual) <= 1e-6 * np.linalg.norm(
             self._used * self._tau

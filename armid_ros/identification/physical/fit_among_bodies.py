@@ -83,7 +83,7 @@ class PhysicalSettings:
 @dataclass(frozen=True)
 class PhysicalCertificate:
     """
-    Proof that fitted links are physically consistent, and its cost in torque error.
+    Proof that fitted links are physically consistent, and the torque error added thereby.
 
     Attributes
     ----------
@@ -172,7 +172,7 @@ class PhysicalCertificate:
         return tuple(notes)
 
     def document(self) -> dict[str, Any]:
-        """Return the certificate in the form of identification.json."""
+        """Return the certificate as written to identification.json."""
         return {
             'consistent': self.consistent,
             'links': [
@@ -408,7 +408,7 @@ def _held_out_errors(
     blocks: FloatArray,
     counts: FloatArray,
 ) -> tuple[tuple[float, float], ...]:
-    """Return held-out torque errors relative to unconstrained fits, for each prior weight."""
+    """Return each prior weight with its held-out error relative to unconstrained fits."""
     # compared weights of the divergence. The term of the torques is a mean square of about one.
     candidates = tuple(float(w) for w in 10.0 ** np.arange(-7.0, 0.5))
     free = 0.0
