@@ -96,7 +96,7 @@ class InteractionProblem:
 
     @property
     def motion_noise(self) -> FloatArray:
-        """Covariance (3 J, 3 J) of a sample's motion that noisy angles cause."""
+        """Covariance of the errors of a sample's motion by noisy angles, shape (3 J, 3 J)."""
         return np.asarray(self.motion_lags[0])
 
     @property
@@ -106,7 +106,7 @@ class InteractionProblem:
         return np.asarray(np.sqrt(variance[: len(variance) // 3]))
 
     def with_springs(self, kept: npt.NDArray[np.intp]) -> InteractionProblem:
-        """Return the regression problem with only some of its springs, chosen by their indices."""
+        """Return the regression problem with only the springs at the indices `kept`."""
         columns = [*kept.tolist(), *range(len(self.segments), self.columns.shape[2])]
         return replace(
             self,
@@ -128,7 +128,7 @@ class InteractionProblem:
         return np.asarray(self.known_by_motion + spring)
 
     def deviation(self, theta: FloatArray) -> FloatArray:
-        """Return each joint's root mean square residual that noise alone causes, (n,) [N m]."""
+        """Return the rms residual of each joint that noise alone causes, shape (n,) [N m]."""
         by_motion = self.sensitivity(theta)
         angles = np.sum(by_motion @ self.motion_noise * by_motion, axis=2)
         return np.asarray(np.sqrt(np.mean(angles, axis=0) + self.torque_noise**2))
@@ -175,10 +175,10 @@ def interaction_problem(
     """
     robot, other, ties = machines.robot, machines.other, machines.ties
     if motion.tau is None:
-        raise IdentificationError(f'{robot.name}: no torques to find stiffness; record the effort')
+        raise IdentificationError(f'{robot.name}: the motion has no torques; record the effort')
     if len(motion) != len(other_motion) or np.max(np.abs(motion.t - other_motion.t)) > 1e-6:
         raise IdentificationError(
-            f'the motions of {robot.name} and {other.name} have to be on one time base'
+            f'the motions of {robot.name} and {other.name} differ in their times; interpolate one'
         )
     kept = np.array(decimated_samples(len(motion), used) if used else range(len(motion)))
     slow, far = motion.select(kept), other_motion.select(kept)
@@ -248,7 +248,7 @@ def _free_inertias(
 
 
 def _filtered_noise(used: Conditioning | None) -> tuple[FloatArray, FloatArray]:
-    """Return covariances between samples of filtered unit noise: of motion and of torques."""
+    """Return the covariances over lags of filtered unit noise: of motion, and of torques."""
     # number of samples over which errors are correlated after filtering
     n_lags = 6
     # Covariances of position, velocity, acceleration of a sample with itself and with later
@@ -284,7 +284,7 @@ def _regressor_by_motion(robot: Robot, motion: Motion, kept: npt.NDArray[np.intp
 
 
 def _placed(by_own: FloatArray, count: int) -> FloatArray:
-    """Append zero derivatives by the motion of the other machine to those by one motion."""
+    """Append zero derivatives by the other machine's motion to derivatives by the own motion."""
     result = np.zeros((*by_own.shape[:-1], count))
     result[..., : by_own.shape[-1]] = by_own
     return result.reshape((*by_own.shape[:-2], 3 * count))

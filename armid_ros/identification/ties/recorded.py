@@ -131,7 +131,7 @@ def together_interaction_problem(
         )
     if not problems:
         raise IdentificationError(
-            f'{recording.source}: no stretch without a gap is long enough for a filter of '
+            f'{recording.source}: no section without a gap is long enough for a filter of '
             f'{used.cutoff_hz:.3g} Hz; record longer'
         )
     return stacked(problems)
@@ -258,5 +258,5 @@ class SensorNoise:
 
     @cached_property
     def _taut(self) -> InteractionProblem:
-        """Regression for springs without slack."""
+        """Linear regression of torques on springs without slack."""
         return together_interaction_problem(self.robot, self.recording, self.used, separate=True)

@@ -75,7 +75,7 @@ class Interaction:
 
     @property
     def bias(self) -> FloatArray:
-        """Bias of least-squares stiffnesses that noisy angles cause, shape (S,) [N/m]."""
+        """Bias of least-squares stiffnesses due to noisy angles, shape (S,) [N/m]."""
         return np.asarray(self.uncorrected[: len(self.segments)] - self.stiffness)
 
     def interval(self, confidence: float = 0.95) -> FloatArray:
@@ -173,7 +173,7 @@ def _least_squares(problem: InteractionProblem, columns: FloatArray) -> FloatArr
     if not np.all(springs > 1e-9 * np.sqrt(len(w))):
         name = problem.segments[int(np.argmin(springs))]
         raise IdentificationError(
-            f'spring {name} never stretches, so its stiffness is not identifiable'
+            f'spring {name} never stretches; record a motion that stretches the spring'
         )
     y = problem.tau - problem.known
     return np.asarray(np.linalg.lstsq(w / scale, y.ravel(), rcond=None)[0] / scale)
