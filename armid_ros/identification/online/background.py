@@ -40,7 +40,7 @@ class Background:
         self._jobs: deque[Job] = deque()
 
     def begin(self, job: Job, *, urgent: bool = False) -> None:
-        """Add a computation at the end of the queue, or at its front if urgent."""
+        """Add a computation at the end of the queue, or at the front of the queue if urgent."""
         if urgent:
             self._jobs.appendleft(job)
         else:
@@ -52,7 +52,7 @@ class Background:
         return bool(self._jobs)
 
     def advance(self, pieces: int = 1) -> None:
-        """Run at most the given number of pieces of the pending computations."""
+        """Run at most `pieces` pieces of the pending computations."""
         for _ in range(pieces):
             if not self._jobs:
                 return

@@ -21,7 +21,7 @@ _MIN_SINGULAR_VALUE = 1e-6
 @dataclass(frozen=True, eq=False)
 class ChangeCandidate:
     """
-    Possible change of an arm, such as a payload: directions in the base parameters' space.
+    Possible change of an arm, such as a payload, as directions of the base parameters.
 
     Attributes
     ----------
@@ -66,7 +66,7 @@ class ChangeCandidate:
 @dataclass(frozen=True, eq=False)
 class Change:
     """
-    Change of the arm that the torques reveal: cause, time and size.
+    Detected change of an arm: cause, time and size.
 
     Attributes
     ----------
@@ -148,7 +148,7 @@ def _candidate(
     added_to: Sequence[int],
     names: Sequence[ParameterName] = (),
 ) -> ChangeCandidate:
-    """Return the possible change of an effect, or of a payload on a link."""
+    """Return a candidate: the change of an effect on a joint, or of a payload on a link."""
     columns = base.grouping[:, added_to]
     # a maximal set of linearly independent columns, in their order
     lengths = np.linalg.norm(columns, axis=0)

@@ -234,7 +234,7 @@ class ChangeSearch:
         self._chance = chance / (len(self._sizes) * len(_WINDOW_LENGTHS))
 
     def interrupt(self) -> None:
-        """Discard the blocks from before an interruption of the stream."""
+        """Discard all blocks at an interruption of the stream."""
         self._blocks: deque[Block] = deque(maxlen=_WINDOW_LENGTHS[-1] + 1)
         self._waiting: deque[dict[int, tuple[FloatArray, FloatArray]]] = deque()
 
@@ -292,7 +292,7 @@ class ChangeSearch:
         return Estimate(candidate.parameters, values, covariance * usual)
 
     def _find_onset(self, residual_scale: float) -> Pieces[FoundChange | None]:
-        """Return the change with start and cause; None while start or cause is ambiguous."""
+        """Return a change with onset and cause; None while onset or cause is ambiguous."""
         # difference of log-likelihoods from which one explanation is clearly better
         clear = 5.0
         rows, blocks = [], list(self._blocks)

@@ -43,7 +43,7 @@ Item = TypeVar('Item')
 
 class Row(NamedTuple):
     """
-    Filtered sample for the estimator, and the motion from which friction columns follow.
+    Filtered sample for the estimator, with the filtered motion for friction columns.
 
     Attributes
     ----------
@@ -110,7 +110,7 @@ class NuisanceRows:
         )
 
     def columns(self, rows: Sequence[Row]) -> Pieces[FloatArray]:
-        """Compute the friction columns of N successive samples, shape (N, n, K n), in pieces."""
+        """Compute friction columns of N samples, (N, n, K n), in short pieces of work."""
         motion = Motion(
             self._arm.robot.joints,
             *(np.array([getattr(row.motion, name) for row in rows]) for name in _OF_MOTION),
@@ -230,7 +230,7 @@ class ChangeWatch:
         return np.vstack([directions, np.zeros((more, directions.shape[1]))])
 
     def _queue(self, end: float | None) -> None:
-        """Queue the present block for the change search; start an idle search."""
+        """Queue the present block for the change search; start the search if it is idle."""
         assert self._open is not None
         self._open.end = end
         self._queued.append(self._open)
@@ -266,7 +266,7 @@ class ChangeWatch:
         return [row for part in stretches for row in part.rows]
 
     def _learn(self, estimator: RecursiveLeastSquares, samples: Sequence[WeightedSample]) -> Job:
-        """Update an estimator with several samples, in pieces."""
+        """Update an estimator with several samples, in short pieces of work."""
         for part in _parts(samples, self._samples_per_update):
             estimator.update_together(part)
             yield
@@ -298,7 +298,7 @@ class ChangeWatch:
         samples: Sequence[WeightedSample],
         before: RecursiveLeastSquares,
     ) -> Pieces[Block]:
-        """Compute the normal equations of a block, and update the residual scale."""
+        """Compute the normal equations of a block of samples; update the residual scale."""
         residual_scale, residuals, squares = self._residual_scale.value, [], 0.0
         size = len(self._wider.parameters)
         information, right = np.zeros((size, size)), np.zeros(size)
@@ -332,7 +332,7 @@ class ChangeWatch:
         )
 
     def _apply(self, found: FoundChange) -> Job:
-        """Return to the estimate before a change, free changed directions, redo later samples."""
+        """Restore the estimate before a change, free its directions, repeat later samples."""
         change, before, after = found
         size, directions = change.size, change.changed_directions
         self._wider.restore(before.before)
@@ -361,7 +361,7 @@ class ChangeWatch:
 
 
 def _chance_of_block(false_alarm_time: float | None) -> float:
-    """Return the probability of a false alarm in a block; 0 without a detection of changes."""
+    """Return the probability of a false alarm in a block; 0 if the detection is off."""
     return 0.0 if false_alarm_time is None else BLOCK_LENGTH / false_alarm_time
 
 

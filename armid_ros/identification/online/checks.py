@@ -31,7 +31,7 @@ class StreamChecks:
         self._judged: tuple[bytes, str] | None = None
 
     def take(self, t: float) -> None:
-        """Add the time stamp of an undamaged sample [s] to the duration of motion."""
+        """Update the duration of motion with the time stamp of an undamaged sample [s]."""
         if self._moved is None:
             lowest, highest = self._positions
             self._moved = t if np.any(highest - lowest > REST_RANGE) else None

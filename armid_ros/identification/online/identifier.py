@@ -108,8 +108,8 @@ class OnlineIdentifier:
         past = [effect.name for effect in arm.effects if not effect.instantaneous]
         if past:
             raise IdentificationError(
-                f'the effect {past[0]} depends on earlier motion, which a single sample does not '
-                'contain; identify it from a recording'
+                f'the effect {past[0]} depends on earlier motion, so it cannot be identified '
+                'online; identify it from a recording'
             )
         self.arm, self.settings = arm, settings
         self.base: BaseParameters = arm.base_parameters(rng)
@@ -168,7 +168,7 @@ class OnlineIdentifier:
         self, t: float, q: npt.ArrayLike, dq: npt.ArrayLike | None, tau: npt.ArrayLike
     ) -> OnlineSample | None:
         """
-        Update the estimate with a joint state; return the predicted torque of a used one.
+        Update the estimate with a joint state; return the torque prediction if the state is used.
 
         Parameters
         ----------
@@ -217,7 +217,7 @@ class OnlineIdentifier:
         return self.__dict__
 
     def _process(self, sample: StreamSample) -> OnlineSample | None:
-        """Filter a valid joint state; return the predicted torque, or None for an unused one."""
+        """Filter a valid joint state; return the torque prediction, or None if not used."""
         if sample.begins:
             self._filter.restart('position_step')
         self._checks.take(sample.t)
@@ -257,7 +257,7 @@ class OnlineIdentifier:
         return self._new_row(motion, step, used & usable, begins)
 
     def estimate(self) -> Estimate:
-        """Estimate of the base parameters; its covariance allows for autocorrelated errors."""
+        """Return the estimate of base parameters; its covariance has autocorrelated errors."""
         self._add_pending_row()
         estimate = self._estimator.estimate
         covariance = self._scores.covariance(self._estimator.root)
@@ -349,7 +349,7 @@ class OnlineIdentifier:
 
     @property
     def spikes(self) -> Mapping[tuple[str, str], int]:
-        """Number of joint states rejected for a spike, by joint and signal."""
+        """Number of joint states rejected because of a spike, by joint and signal."""
         joints = self.arm.robot.joints
         signals = ('position', *(['velocity'] * self.settings.measured_velocity), 'effort')
         names = [(joint, signal) for signal in signals for joint in joints]

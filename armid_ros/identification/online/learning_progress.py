@@ -45,7 +45,7 @@ class LearningProgress:
         self._past: deque[tuple[float, FloatArray]] = deque()
 
     def reset(self) -> None:
-        """Forget all earlier estimates."""
+        """Clear all earlier estimates."""
         self._past.clear()
 
     def unidentified(self, t: float, estimate: Estimate) -> Mapping[str, list[ParameterName]]:

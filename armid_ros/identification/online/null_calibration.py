@@ -105,7 +105,7 @@ class NullCalibration:
         yield from self._fit_factors(np.array(self._ratios)[len(self._ratios) // 4 :])
 
     def _fit_factors(self, later: FloatArray) -> Job:
-        """Compute the factors of the test statistics from earlier windows; 0 if there are none."""
+        """Estimate the factors of test statistics from windows without a change, (K, C)."""
         counts = np.sum(later > 0.0, axis=0)
         independent = counts / self._overlap
         valid = independent >= 12.0  # too few independent windows for a test
@@ -199,7 +199,7 @@ class ResidualScale:
 
     @property
     def value(self) -> FloatArray:
-        """Ratio of residual standard deviation to assumed noise, for m joints; at first 1."""
+        """Ratio of residual standard deviation to assumed noise by joint, (m,); at first 1."""
         return np.ones(1) if self._value is None else self._value
 
     def learn(self, residual: FloatArray, weights: FloatArray) -> None:

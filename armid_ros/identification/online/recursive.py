@@ -111,7 +111,7 @@ class RecursiveLeastSquares:
         self._noise = np.array(noise, dtype=np.float64)
         if self._noise.ndim != 1 or not np.all((self._noise > 0.0) & (self._noise < np.inf)):
             raise IdentificationError(
-                f'noise is {self._noise}, but has to be one finite standard deviation > 0 for '
+                f'noise is {self._noise}, but has to be a finite standard deviation above 0 for '
                 'each joint'
             )
         self.noise_is_relative = scale_covariance
@@ -256,7 +256,7 @@ class RecursiveLeastSquares:
 
     @property
     def root(self) -> FloatArray:
-        """Return the triangular factor R of the information R^T R; later updates change it."""
+        """Return the triangular factor R of the information R^T R, not copied."""
         return self._root
 
     @property
@@ -300,7 +300,7 @@ class RecursiveLeastSquares:
 
 def forget_and_add(root: FloatArray, rows: FloatArray, forgetting: float) -> FloatArray:
     """
-    Add rows to the triangular factor R, and forget old information in their directions.
+    Add rows to the triangular factor R; forget old information in directions of the rows.
 
     In the directions b of U = rows R^-1 = A diag(s) B^T the old information, 1, becomes
     1 - f + s^2 with f = min(s^2, level). It never falls, so the new triangle is the old one

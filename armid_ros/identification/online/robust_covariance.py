@@ -39,7 +39,7 @@ class _Bands:
 
     @property
     def information(self) -> FloatArray:
-        """Return the information M, summed over joints and bands, shape (P, P)."""
+        """Return the information matrix M, summed over joints and bands, shape (P, P)."""
         return np.asarray(self.products.sum(axis=(0, 1))[:-1, :-1])
 
 
@@ -136,11 +136,11 @@ class RobustCovariance:
                 settled.counts[:] *= kept
             self._settled = settled
             every = yield from _sum(settled, window)
-            self._shape = yield from _shape(every, values)
+            self._shape = yield from _score_root(every, values)
         self._latest = window
 
     def _subtract_change(self, directions: FloatArray, values: FloatArray) -> Job:
-        """Fit a parameter change in given directions, and remove it from earlier products."""
+        """Fit a parameter change along `directions`; subtract it from earlier products."""
         self._latest = None
         if self._settled is None:
             return
@@ -157,7 +157,7 @@ class RobustCovariance:
             for of_band in of_joint:
                 of_band[:] = change.T @ of_band @ change
                 yield
-        self._shape = yield from _shape(self._settled, values)
+        self._shape = yield from _score_root(self._settled, values)
 
     def covariance(self, root: FloatArray) -> FloatArray | None:
         """
@@ -191,7 +191,7 @@ def _sum(some: _Bands, more: _Bands) -> Pieces[_Bands]:
 
 
 def _transformed(columns: FloatArray) -> Pieces[_Bands]:
-    """Return the Fourier products by octave of a window of rows and torques, (m, k, P + 1)."""
+    """Return Fourier products by octave from a window of rows and torques, (m, k, P + 1)."""
     # number of columns transformed in one piece of work
     at_once = 24
     joints, count, size = columns.shape
@@ -218,7 +218,7 @@ def _transformed(columns: FloatArray) -> Pieces[_Bands]:
     return _Bands(products, counts)
 
 
-def _shape(bands: _Bands, values: FloatArray) -> Pieces[tuple[FloatArray, FloatArray]]:
+def _score_root(bands: _Bands, values: FloatArray) -> Pieces[tuple[FloatArray, FloatArray]]:
     """Return a root of the covariance of scores, and factors for intervals by Student's t."""
     # level of the upper end of an interval
     level = 0.975
@@ -267,7 +267,7 @@ def _shape(bands: _Bands, values: FloatArray) -> Pieces[tuple[FloatArray, FloatA
 
 
 def _triangle(information: FloatArray) -> FloatArray:
-    """Return triangular R with R^T R = information, whose small eigenvalues are raised."""
+    """Return triangular R with R^T R = `information`, after raising small eigenvalues."""
     try:
         return np.asarray(linalg.cholesky(information))
     except linalg.LinAlgError:
