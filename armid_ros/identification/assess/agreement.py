@@ -64,7 +64,7 @@ class Agreement:
 
     @property
     def expected(self) -> float:
-        """Return how many parameters are expected within two standard deviations of the truth."""
+        """Return the expected number of parameters within two standard deviations of the truth."""
         return float(self.parameters * (2.0 * scipy.stats.norm.cdf(_Z_SCORE) - 1.0))
 
     @property

@@ -74,7 +74,7 @@ def compare(before: ParameterFile, after: ParameterFile) -> Comparison:
     if not shared:
         raise ModelError(
             f'{before.source} and {after.source} have no identified parameter in common; '
-            'are they of one robot, with one gravity?'
+            'name two results of one robot, with one gravity'
         )
     grouped: dict[tuple[bool, str], list[ParameterName]] = {}
     for name in shared:
@@ -136,7 +136,7 @@ def _check_comparable(before: ParameterFile, after: ParameterFile) -> None:
 
 
 def _only_in(one: ParameterFile, other: ParameterFile) -> Iterator[NotCompared]:
-    """Yield the parameters that only one of two results has, with the reasons."""
+    """Yield the parameters of `one` that `other` does not have, with the reasons."""
     for name in one.values:
         if name in other.values:
             continue
@@ -150,7 +150,7 @@ def _single_changes(
     before: ParameterFile, after: ParameterFile, names: Sequence[ParameterName]
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """
-    Return values and standard deviations of parameters in two results, and p-values.
+    Return values and standard deviations of parameters in two results, p-values of no change.
 
     The shapes are (2, p), (2, p) and (p,). Standard deviations are those of noise. If the scatter
     between recordings exceeds the noise of a joint, they are multiplied by the ratio.
@@ -254,7 +254,7 @@ def residual_changes(
     before: KnownFit | None, after: KnownFit | None
 ) -> tuple[ResidualChange, ...]:
     """
-    Return how each joint's root mean square residual differs between two models.
+    Return the change of each joint's root mean square residual between two models.
 
     Empty if a file has no residuals. Model errors vary slowly, so even many samples contain few
     independent values of them.

@@ -40,7 +40,7 @@ class ParameterChange:
 
     @property
     def difference(self) -> float:
-        """Return the parameter of the second identification minus that of the first."""
+        """Return the value in the second identification minus the value in the first."""
         return self.after - self.before
 
     @property
@@ -59,7 +59,7 @@ class ParameterChange:
 @dataclass(frozen=True)
 class GroupChange:
     """
-    Group of parameters of one joint, or of the rigid body, that is tested for a common change.
+    Test for a common change of the parameters of a joint's effects, or of the rigid body.
 
     Attributes
     ----------
@@ -239,7 +239,7 @@ class Comparison:
 
     @property
     def changed_together(self) -> tuple[GroupChange, ...]:
-        """Return groups that changed significantly, although none of their parameters did."""
+        """Return groups that changed significantly, although no single parameter of them did."""
         sure = {change.parameter for change in self.changed}
         return tuple(g for g in self.groups if g.changed and not sure.intersection(g.parameters))
 

@@ -121,7 +121,7 @@ def hypotheses(robot: Robot, motions: Sequence[Motion]) -> Iterator[Hypothesis]:
 
 
 def _gravity_and_scale(robot: Robot, motions: Sequence[Motion]) -> Iterator[Hypothesis]:
-    """Yield the hypotheses that gravity differs, and that all torques have a wrong factor."""
+    """Yield hypotheses: another gravity vector, and a wrong common factor of all torques."""
     motion = thinned(motions, 600)
     if motion is None:
         return
@@ -170,7 +170,7 @@ def in_unit(robot: Robot, joint: int, unit: str) -> Hypothesis:
 
 
 def delayed(seconds: float, half_width: float) -> Hypothesis:
-    """Return the hypothesis that torques lag by a time, with its 95 % half-width [s]."""
+    """Return the hypothesis that torques lag positions by `seconds` ± `half_width` (95 %)."""
     side = 'later' if seconds > 0.0 else 'earlier'
     return Hypothesis(
         'delay',
@@ -282,7 +282,7 @@ def _in_degrees(robot: Robot, joint: int | None = None) -> Hypothesis:
 
 
 def _beyond_masses(factor: float) -> bool:
-    """Return whether a factor on all torques is too large or small for wrong masses."""
+    """Return whether a factor on all torques is too far from 1 to be due to wrong masses."""
     return not 1.0 / LIMITS.torque_factor < factor < LIMITS.torque_factor
 
 

@@ -218,7 +218,7 @@ def _error(
 
 
 def _most_likely(rows: Sequence[_Tested], ratio: str, before: PredictionError) -> Mistake:
-    """Return the most likely mistake, together with other kinds that are about as likely."""
+    """Return the most likely mistake, with mistakes of other kinds that are about as likely."""
     value = attrgetter(ratio)
     first, *others = sorted(rows, key=value, reverse=True)
     likely = {first.hypothesis.kind: first.hypothesis}
@@ -287,7 +287,7 @@ def torque_delay(robot: Robot, recording: Recording, used: Conditioning) -> Dela
 
 
 def _delay_rows(robot: Robot, motion: Motion, used: Conditioning) -> tuple[FloatArray, ...]:
-    """Return regressors of nuisance, link and delay parameters, (n, M, k), and torques."""
+    """Return regressors of nuisance, link and delay parameters, (n, M, k), and torques (n, M)."""
     # presliding lengths of friction [rad or m], as in gears of arms, in steps of three to cover
     # all lengths between. On 63 recordings with lengths of 1 to 3 mrad, the delay errs by -1 to 6
     # ms (5 to 95 %). Lengths of 1 and 3 mrad alone err by 0 to 6 ms, 0.1 to 30 mrad by -3 to 6 ms.

@@ -243,7 +243,7 @@ def _longest_constant(reading: FloatArray, step: float = 0.0) -> tuple[int, int]
 
 def velocity_ratio(recording: Recording) -> tuple[FloatArray, FloatArray]:
     """
-    Return the ratio of recorded velocities to the rates of the positions, and their correlation.
+    Return each joint's ratio of recorded velocity to position rate, and the correlation.
 
     The integral of a velocity is compared with the position, so that noise and steps of positions
     and jitter of time stamps do not matter.
@@ -330,7 +330,7 @@ def held_elsewhere(
     robot: Robot, recordings: Sequence[Recording], motions: Sequence[Motion]
 ) -> Iterator[Fault]:
     """
-    Yield undriven joints away from their modelled position, if that position affects torques.
+    Yield faults of undriven joints away from their modelled position, if this affects torques.
 
     If such a joint moves, or carries driven joints at another position, the arm differs from the
     model. The size of this error is the change of the described torque along the recorded motions

@@ -38,7 +38,7 @@ Progress = Callable[[float, str], None]
 @dataclass(frozen=True)
 class ForwardScore:
     """
-    Position errors in a simulation of the arm that recorded torques drive.
+    Position errors of a simulated arm that is driven by recorded torques.
 
     Attributes
     ----------
@@ -106,10 +106,10 @@ class _RecordedTorque(Controller):
 def _forward_score(
     arm: ArmModel, recording: Recording, used: Conditioning, nominal: ArmModel, duration: float
 ) -> ForwardScore:
-    """Simulate an arm driven by recorded torques, with feedback from a nominal model."""
+    """Return errors of an arm, simulated with recorded torques and feedback of `nominal`."""
     motion = next(iter(segments(recording, used)), None)
     if motion is None:
-        raise IdentificationError(f'{recording.source}: no stretch is long enough; record longer')
+        raise IdentificationError(f'{recording.source}: no section is long enough; record longer')
     motion = motion.select(motion.t <= motion.t[0] + duration)
     reference = replace(motion, t=motion.t - motion.t[0])
     # With slower feedback, the friction of a light joint dominates. No model predicts to the
@@ -189,7 +189,7 @@ class ForwardValidation:
         return tuple(name for name, more in zip(self.after.joints, grown, strict=True) if more)
 
     def comment(self) -> str:
-        """Return a sentence on joints whose position error increased; empty if there are none."""
+        """Return a sentence on joints whose position error increased; empty if none did."""
         return f'the error increased in {", ".join(self.worse)}' if self.worse else ''
 
     def document(self) -> dict[str, Any]:
