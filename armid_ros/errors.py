@@ -64,7 +64,7 @@ class TrajectoryError(ArmidError):
 
 
 class IdentificationError(ArmidError):
-    """Error of an identification whose data do not determine the parameters."""
+    """Error for data or settings from which no model can be identified."""
 
 
 class RecordingEnded(RecordingError):

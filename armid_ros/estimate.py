@@ -107,7 +107,7 @@ class Estimate:
     covariance: FloatArray
 
     def __post_init__(self) -> None:
-        """Make the arrays read-only; raise ModelError unless each parameter has a value."""
+        """Make the arrays read-only; raise ModelError unless of shapes (P,) and (P, P)."""
         count = len(self.parameters)
         object.__setattr__(self, 'values', read_only(self.values))
         object.__setattr__(self, 'covariance', read_only(self.covariance))

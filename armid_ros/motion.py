@@ -110,7 +110,7 @@ class Temperatures:
         freeze(self, 't', 'values')
 
     def at(self, t: npt.ArrayLike) -> FloatArray:
-        """Return the temperatures at times `t`, linearly interpolated, shape (N, n) [degC]."""
+        """Return temperatures at times `t`, (N, n) [degC]; constant outside the readings."""
         return np.column_stack([np.interp(np.ravel(t), self.t, one) for one in self.values.T])
 
 

@@ -49,7 +49,7 @@ def plug_ins(kind: str) -> dict[str, EntryPoint]:
 
 def load_plug_in(entry: EntryPoint) -> Any:
     """
-    Import and return the command or module of a plug-in, which its entry point names.
+    Import and return the command or module that the entry point of a plug-in names.
 
     Raises
     ------

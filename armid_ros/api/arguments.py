@@ -63,7 +63,7 @@ def source_of(robot: Robot) -> str:
 
 
 def arm_of(arm: RobotLike, effects: str = USUAL) -> ArmModel:
-    """Return an arm model; a robot without a model gets `effects`, names with commas."""
+    """Return an arm model; a robot without a model gets `effects`, a comma-separated list."""
     if isinstance(arm, ArmModel):
         return arm
     if not isinstance(arm, Robot) and is_model(arm):
@@ -72,7 +72,7 @@ def arm_of(arm: RobotLike, effects: str = USUAL) -> ArmModel:
 
 
 def with_effects(arm: ArmModel, names: str) -> ArmModel:
-    """Add the named effects (separated by commas) to an arm, unless the arm has them already."""
+    """Add effects from a comma-separated list to an arm, unless the arm has them already."""
     for name in filter(None, parted(names)):
         effect = make_effect(name, arm.robot)
         if (effect.name, effect.joints) not in [(own.name, own.joints) for own in arm.effects]:
@@ -81,7 +81,7 @@ def with_effects(arm: ArmModel, names: str) -> ArmModel:
 
 
 def drivable(arm: RobotLike) -> ArmModel:
-    """Return an arm model; TrajectoryError if the robot drives joints that belong to no arm."""
+    """Return an arm model; TrajectoryError if the robot has driven joints outside of its arms."""
     model = arm_of(arm)
     others = joints_beside_arms(model.robot) if isinstance(arm, str | Path) else ()
     if others:
@@ -134,7 +134,7 @@ def with_unique_sources(*groups: list[Recording]) -> tuple[list[Recording], ...]
 
 
 def motion_of(recording: Recording, cutoff: float | None = None) -> Motion:
-    """Return the filtered motion of the longest section of a recording without lost samples."""
+    """Return the filtered motion of the longest gap-free section of a recording."""
     measured = recording.tau is not None
     taken = recording if measured else replace(recording, tau=np.zeros_like(recording.q))
     used = conditioning([taken], SignalSettings(cutoff))

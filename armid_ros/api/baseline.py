@@ -27,7 +27,7 @@ def baseline_recordings(
     diagnosed: Sequence[Recording],
 ) -> list[Recording]:
     """
-    Return the baseline recordings; by default the recordings that identified the model.
+    Return the baseline recordings; by default, the recordings used to identify the model.
 
     The default baseline is empty if one of its recordings is diagnosed.
 
@@ -56,7 +56,7 @@ def diagnosed_model(
     rng: Rng,
 ) -> tuple[RobotLike | IdentificationResult, ArmModel, Misfit | None, IdentificationResult | None]:
     """
-    Return the arm to diagnose, its model and misfit, and the identification of any simulator.
+    Return the arm to diagnose, its model and misfit, and a simulator's identification or None.
 
     Without recordings of a simulator (`against`), the last result is None.
 

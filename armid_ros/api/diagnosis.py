@@ -231,7 +231,7 @@ class DiagnosisResult(ShownModel):
         return replace(self, residual=found, notes=(*self.notes, *why))
 
     def with_extras(self, residual: bool, seed: int, progress: Progress) -> DiagnosisResult:
-        """Add simulations of held-out recordings, the next motion, and a map if `residual`."""
+        """Add simulations of held-out data, a planned motion and, if `residual`, a torque map."""
         result = self
         if residual:
             progress(1.0, 'learning the residual')

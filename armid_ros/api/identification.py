@@ -154,12 +154,12 @@ class IdentificationResult(ShownModel):
         return grade(self.core, self.description, self.recordings, self.validation, self.held_out)
 
     def predict(self, recordings: RecordingLike | Sequence[RecordingLike]) -> tuple[Fit, ...]:
-        """Predict the torques of other recordings; return a `Fit` per section of valid samples."""
+        """Predict the torques of other recordings; return a `Fit` per gap-free section."""
         return self.core.predict(recordings_of(recordings, self.arm.robot, required=True))
 
     def plot(self) -> npt.NDArray[np.object_]:
         """
-        Plot measured and predicted torques of held-out data, or else of training data.
+        Plot measured and predicted torques of held-out data if available, else of training data.
 
         Returns
         -------
@@ -175,7 +175,7 @@ class IdentificationResult(ShownModel):
         return draw_joints(self.arm.robot.joints, curves, 'torque [N m or N]')
 
     def __getitem__(self, key: tuple[str, str]) -> float:
-        """Return an effect or parameter by name and joint, as `['viscous_friction', 'elbow']`."""
+        """Return the value of an effect or parameter on a joint: ['viscous_friction', 'elbow']."""
         return self.estimate[key]
 
     def to_dataframe(self) -> pandas.DataFrame:
@@ -190,7 +190,7 @@ class IdentificationResult(ShownModel):
 
     @cached_property
     def exports(self) -> dict[str, Exported]:
-        """Return URDF and MJCF by file name; empty if a link is physically inconsistent."""
+        """Return URDF and MJCF by file name; empty without a physically consistent fit."""
         if self.core.physical is None:
             return {}
         return {'identified.urdf': arm_urdf(self.arm), 'identified.mjcf.xml': arm_mjcf(self.arm)}

@@ -190,7 +190,7 @@ def inspect(
 
 
 def _trial_fit(robot: Robot, recording: Recording, rng: Rng) -> TrialFit:
-    """Identify a robot from one recording; return the fit's quality, or the reason for none."""
+    """Return the quality of an identification from one recording, or the reason for none."""
     try:
         found = identify(robot, recording, physical=False, rng=rng)
         motions = [fit.motion for fit in found.core.training]

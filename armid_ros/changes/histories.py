@@ -230,7 +230,7 @@ def spreads(series: Sequence[ParameterHistory]) -> dict[tuple[str, str], Spread]
 
 def without_days(series: Sequence[ParameterHistory]) -> list[ParameterHistory]:
     """
-    Return the series without the deviation of each day that all arms share.
+    Return the series minus the daily deviation that all arms have in common.
 
     The shared deviation is proportional to the size of the parameter, as for friction that falls
     with temperature. A median polish estimates it. Days on which few arms have bags are
@@ -262,7 +262,7 @@ def without_days(series: Sequence[ParameterHistory]) -> list[ParameterHistory]:
 
 
 def _largest_change(series: ParameterHistory, spread: Spread) -> HistoryChange:
-    """Return the most significant step of a parameter, or its trend if that fits as well."""
+    """Return the most significant step of a parameter, or an equally likely linear trend."""
     split, count = _splits(series, spread), len(series.values)
     scores, trend = split.scores / spread.steps, split.trend / spread.trends
     best = int(np.argmax(scores))
@@ -418,7 +418,7 @@ def _inflation(
 
 
 def _line(days: FloatArray, x: FloatArray, weights: FloatArray) -> tuple[float, float, float]:
-    """Fit a weighted line; return the slope, its standard deviation, and the first day's value."""
+    """Return slope, standard deviation of the slope, and first value of a weighted line."""
     total = weights.sum()
     middle, mean = weights @ days / total, weights @ x / total
     deviation = days - middle

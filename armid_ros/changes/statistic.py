@@ -39,7 +39,7 @@ def tail(
 
 def limits(chance: float, rank: FloatArray, freedom: FloatArray) -> FloatArray:
     """
-    Return the thresholds of quadratic forms for a false alarm probability, shape (k,).
+    Return the thresholds that quadratic forms exceed with probability `chance`, shape (k,).
 
     Parameters
     ----------

@@ -107,7 +107,7 @@ class IdentificationSettings:
 
     @property
     def holds_description(self) -> bool:
-        """Whether the fit keeps described values that are more certain than the data."""
+        """Whether the fit keeps a described value that is more certain than its estimate."""
         return self.physical is None and self.method != 'iv'
 
 
@@ -200,7 +200,7 @@ class Identification:
         return tuple(found)
 
     def predict(self, recordings: Sequence[Recording]) -> tuple[Fit, ...]:
-        """Predict torques of other recordings, filtered like the data of the fit."""
+        """Predict torques of other recordings, with the filters of the training data."""
         check_recordings(recordings)
         recordings, _ = without_damage(recordings, self.used)
         found = predictions(self.arm, recordings, self.used)

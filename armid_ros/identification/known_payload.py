@@ -64,7 +64,7 @@ class DriveGains:
         ]
 
     def sentences(self) -> tuple[str, ...]:
-        """Return a sentence on each drive's gain, and one on the efforts of the fit."""
+        """Return sentences on the drive gains, and on the scaling of efforts by these gains."""
         sure = np.isfinite(self.std)
         lines = [
             f'drive gain of {joint}: {gain:.4g} ({gain - width:.4g} to {gain + width:.4g}, 95 %)'
@@ -88,7 +88,7 @@ def payloads_of(
     texts: Sequence[str], recordings: Sequence[Recording], robot: Robot
 ) -> Mapping[str, Robot]:
     """
-    Return the robot with its payload for each recording with a payload, by the recording's path.
+    Return a robot with payload for each loaded recording, by the path of the recording.
 
     Raises
     ------

@@ -173,7 +173,7 @@ def identified_from(path: str | Path) -> tuple[Path, ...]:
 
 def require_as_identified(path: str | Path) -> None:
     """
-    Raise an error if a recording has changed since the identification of a model from it.
+    Raise an error if a recording from which a model was identified has changed since.
 
     Parameters
     ----------
@@ -215,7 +215,7 @@ def _content(path: Path) -> dict[str, Any]:
 
 
 def _found(model: Path) -> dict[Path, dict[str, Any] | None]:
-    """Return the existing recordings that identified a model.yaml, with digests if known."""
+    """Return existing recordings from which a model.yaml was identified, and their digests."""
     file = model.with_name('identification.json')
     if not is_file(file):
         return {}

@@ -212,7 +212,7 @@ def read_parameters(path: str | Path) -> ParameterFile:
 
 
 def _identification_of(path: Path, model: Mapping[str, Any]) -> ParameterFile | None:
-    """Read identification.json in the folder of a model.yaml; None if it has another model."""
+    """Read identification.json in the folder of a model.yaml; None unless of this model."""
     # identification.json has the base parameters of the model and their covariance. It is of this
     # model if the model reproduces the value of every base parameter.
     file = path.with_name('identification.json')

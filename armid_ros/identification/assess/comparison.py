@@ -239,7 +239,7 @@ class Comparison:
 
     @property
     def changed_together(self) -> tuple[GroupChange, ...]:
-        """Return groups that changed significantly, although no single parameter of them did."""
+        """Return significantly changed groups without a significantly changed parameter."""
         sure = {change.parameter for change in self.changed}
         return tuple(g for g in self.groups if g.changed and not sure.intersection(g.parameters))
 

@@ -142,7 +142,7 @@ def grade(
 def _torque_errors(
     result: Identification, worst: Mapping[str | None, _WorstJoint], held_out: Sequence[Fit]
 ) -> Iterator[Fault]:
-    """Yield reasons of a grade: the largest torque error, and hardly predicted torques."""
+    """Yield reasons of a grade: the largest torque error, and torques that are not predicted."""
     use = {
         'good': '',
         'poor': ', too large to compute torques',

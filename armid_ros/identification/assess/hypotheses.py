@@ -63,7 +63,7 @@ class Hypothesis:
 
     @property
     def of_masses(self) -> bool:
-        """Whether one common factor on all described masses would explain the data as well."""
+        """Whether a common factor on all described masses would explain the data equally well."""
         return self.kind in ('gravity', 'scale', 'units')
 
     @property

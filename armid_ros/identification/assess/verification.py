@@ -106,7 +106,7 @@ class _RecordedTorque(Controller):
 def _forward_score(
     arm: ArmModel, recording: Recording, used: Conditioning, nominal: ArmModel, duration: float
 ) -> ForwardScore:
-    """Return errors of an arm, simulated with recorded torques and feedback of `nominal`."""
+    """Return errors of an arm simulated with recorded torques and feedback of `nominal`."""
     motion = next(iter(segments(recording, used)), None)
     if motion is None:
         raise IdentificationError(f'{recording.source}: no section is long enough; record longer')

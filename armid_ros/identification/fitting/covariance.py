@@ -62,7 +62,7 @@ def score_products(scores: Sequence[FloatArray], lags: int) -> FloatArray:
 
 
 def widened(covariance: FloatArray, bread: FloatArray, middle: FloatArray) -> FloatArray:
-    """Return a covariance, scaled so that each variance is at least its sandwich B M B'."""
+    """Raise each variance of a covariance to at least the variance of a sandwich B M B'."""
     ratio = np.diag(bread @ middle @ bread) / np.diag(covariance)
     factor = np.sqrt(np.maximum(ratio, 1.0))
     return np.asarray(covariance * np.outer(factor, factor))

@@ -272,7 +272,7 @@ class WeightedFit:
 
 def weighted_fit(normal: NormalEquations, *, weighted: bool = True) -> WeightedFit:
     """
-    Solve normal equations, by default with each joint divided by its residual's deviation.
+    Solve normal equations, by default with joints weighted by inverse residual variances.
 
     Parameters
     ----------

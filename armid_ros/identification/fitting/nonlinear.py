@@ -243,7 +243,7 @@ def exact_at(
 def agree(
     problem: Sequence[Regression], weights: FloatArray, linear: Torques, predicted: Torques
 ) -> bool:
-    """Return whether the torques of the linear and the nonlinear model agree in tolerance."""
+    """Return whether torques of the linear and the nonlinear model agree within tolerance."""
     measured = [part.tau for part in problem]
     difference, torque, residual = (
         float(np.linalg.norm(weights * np.concatenate(parts)))

@@ -48,7 +48,7 @@ _MIN_EIGENVALUE = 1e-9
 @dataclass(frozen=True, eq=False)
 class Block:
     """
-    Normal equations of a block of samples, a quarter of a second, scaled to unit noise.
+    Normal equations of the samples of a quarter of a second, scaled to unit noise.
 
     Attributes
     ----------
@@ -144,7 +144,7 @@ def score_statistics(
     residual_scale: float = 1.0,
 ) -> Pieces[ScoreStatistics]:
     """
-    Compute information and scores of possible changes in a window, in short pieces.
+    Compute information and scores of possible changes in a window, in short pieces of work.
 
     Parameters
     ----------

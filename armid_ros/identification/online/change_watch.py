@@ -332,7 +332,7 @@ class ChangeWatch:
         )
 
     def _apply(self, found: FoundChange) -> Job:
-        """Restore the estimate before a change, free its directions, repeat later samples."""
+        """Restore the estimate before a change, forget changed directions, redo later samples."""
         change, before, after = found
         size, directions = change.size, change.changed_directions
         self._wider.restore(before.before)

@@ -31,7 +31,7 @@ class StreamChecks:
         self._judged: tuple[bytes, str] | None = None
 
     def take(self, t: float) -> None:
-        """Update the duration of motion with the time stamp of an undamaged sample [s]."""
+        """Update the duration of motion with the time stamp [s] of an undamaged sample."""
         if self._moved is None:
             lowest, highest = self._positions
             self._moved = t if np.any(highest - lowest > REST_RANGE) else None

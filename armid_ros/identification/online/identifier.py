@@ -257,7 +257,7 @@ class OnlineIdentifier:
         return self._new_row(motion, step, used & usable, begins)
 
     def estimate(self) -> Estimate:
-        """Return the estimate of base parameters; its covariance has autocorrelated errors."""
+        """Return the estimate of base parameters, with a covariance for autocorrelated errors."""
         self._add_pending_row()
         estimate = self._estimator.estimate
         covariance = self._scores.covariance(self._estimator.root)

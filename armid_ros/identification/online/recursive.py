@@ -256,7 +256,7 @@ class RecursiveLeastSquares:
 
     @property
     def root(self) -> FloatArray:
-        """Return the triangular factor R of the information R^T R, not copied."""
+        """Return the triangular factor R of the information matrix R^T R, without a copy."""
         return self._root
 
     @property

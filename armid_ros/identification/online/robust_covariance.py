@@ -182,7 +182,7 @@ class RobustCovariance:
 
 
 def _sum(some: _Bands, more: _Bands) -> Pieces[_Bands]:
-    """Return the sum of two sets of Fourier products, computed in pieces."""
+    """Return the sum of two sets of Fourier products, computed in short pieces of work."""
     products = np.empty_like(some.products)
     for place, first, second in zip(products, some.products, more.products, strict=True):
         np.add(first, second, out=place)

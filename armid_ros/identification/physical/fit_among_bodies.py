@@ -83,7 +83,7 @@ class PhysicalSettings:
 @dataclass(frozen=True)
 class PhysicalCertificate:
     """
-    Proof that fitted links are physically consistent, and the torque error added thereby.
+    Proof of physically consistent links, and the torque error that the constraints add.
 
     Attributes
     ----------

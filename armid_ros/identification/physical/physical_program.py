@@ -147,7 +147,7 @@ class PhysicalProgram:
 
     @cached_property
     def _whitened_links(self) -> FloatArray:
-        """Map to inertial parameters from coordinates whose prior pseudo-inertia is identity."""
+        """Linear map to inertial parameters from coordinates in which priors are identity."""
         blocks = []
         for link in range(self.n_links):
             values = self.prior[PER_LINK * link : PER_LINK * (link + 1)]

@@ -39,7 +39,7 @@ def check_gap(samples: int) -> None:
     """Raise an error if the longest gap to interpolate, in samples, is below 1."""
     if samples < 1:
         raise IdentificationError(
-            f'the longest gap to interpolate across, {samples} samples, has to be 1 or more'
+            f'max_gap, the longest interpolated gap, is {samples} samples; it has to be 1 or more'
         )
 
 
@@ -222,7 +222,7 @@ class CausalFilter:
         self, t: float, q: npt.ArrayLike, dq: npt.ArrayLike | None, tau: npt.ArrayLike
     ) -> FloatArray | None:
         """
-        Return a joint state as an array of positions, velocities if used, and torques, or None.
+        Return positions, velocities if used, and torques as one array; None if not valid.
 
         Parameters
         ----------
@@ -360,7 +360,7 @@ class RowNoise:
         return cls(bandwidth, gain, gain / (period * row_pole * float(np.max(response))))
 
     def independent(self, step: float) -> float:
-        """Return the number of independent observations, at most 1, in a row per `step` s."""
+        """Return the effective number (at most 1) of observations per row, `step` s apart."""
         return min(1.0, self.bandwidth * step)
 
 

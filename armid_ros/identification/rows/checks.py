@@ -300,7 +300,7 @@ def beyond_limits(robot: Robot, recordings: Sequence[Recording]) -> tuple[str, .
 
 def torque_factors(arm: ArmModel, motions: Sequence[Motion]) -> tuple[FloatArray, FloatArray]:
     """
-    Return the ratio and the correlation of measured to modelled torque for each joint.
+    Return the ratio and the correlation of measured and modelled torque for each joint.
 
     An offset is fitted too, and friction if the model has no effects. With effects, only samples
     in motion are used, as friction holds a joint at rest with any torque.

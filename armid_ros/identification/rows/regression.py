@@ -86,7 +86,7 @@ class Regression(Stretch):
 
     @property
     def target(self) -> FloatArray:
-        """Return the measured torque minus the constant, shape (M, n), which the columns fit."""
+        """Return the measured torque minus the constant, shape (M, n): the target of a fit."""
         return np.asarray(self.tau - self.constant)
 
     def torque(self, values: FloatArray) -> FloatArray:

@@ -305,7 +305,7 @@ def decimated_samples(n_samples: int, used: Conditioning) -> range:
 
 
 def _even(t: FloatArray, period: float, *signals: FloatArray) -> tuple[FloatArray, ...]:
-    """Return evenly spaced times and signals; cubic splines interpolate stamps with jitter."""
+    """Return evenly spaced times and signals; cubic splines interpolate if the stamps jitter."""
     grid = np.linspace(t[0], t[-1], round((t[-1] - t[0]) / period) + 1)
     # stamps that differ by less than a twentieth of a period are even
     if len(grid) == len(t) and np.max(np.abs(grid - t)) < 0.05 * period:

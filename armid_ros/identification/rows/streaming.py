@@ -55,7 +55,7 @@ def streamed(
     settings: ReadSettings,
 ) -> Iterator[tuple[Recording, Sequence[Regression]]]:
     """
-    Read a bag in pieces; yield each piece, without damaged samples, with its linear problem.
+    Read a bag in pieces; yield the repaired recording and the linear problem of each piece.
 
     Parameters
     ----------

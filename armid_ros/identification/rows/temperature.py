@@ -32,7 +32,7 @@ def mean_temperatures(parts: Sequence[Motion | Recording]) -> dict[str, float] |
 
 def at_mean_temperature(arm: ArmModel, recordings: Sequence[Recording]) -> ArmModel:
     """
-    Return the arm with the mean temperature as reference of friction effects not fitted yet.
+    Return the arm whose unfitted friction effects have the mean temperature as reference.
 
     Raises
     ------

@@ -170,7 +170,7 @@ class SpikeGate:
         return self._begin() if len(self._first) == N_FIRST else []
 
     def settle(self) -> bool:
-        """Update typical prediction errors early, from a nearly full window; True if done."""
+        """Update prediction errors early, from a nearly full window; return whether updated."""
         return self._level.settle(self._period, WINDOW - 4)
 
     def begin(

@@ -101,7 +101,7 @@ class ErrorModel:
     quantile: float
 
     def growth(self, noise: Factor, acceleration: Factor) -> FloatArray:
-        """Return growth factors of errors, (m,) or (N, m), by noise and acceleration."""
+        """Combine growth factors of noise and acceleration by signal, (m,) or (N, m)."""
         squares = acceleration**2
         return np.asarray(np.sqrt(squares + self.white * (noise**2 - squares)))
 
@@ -149,7 +149,7 @@ class Innovation(NamedTuple):
 
 
 def growth_over(step: Time, ahead: Time, period: float) -> tuple[Time, Time]:
-    """Return growth factors of errors of a prediction `ahead` s: for noise, for acceleration."""
+    """Return growth factors of prediction errors after `ahead` s: by noise, by acceleration."""
     ratio = ahead / step
     noise: Time = ((1.0 + (1.0 + ratio) ** 2 + ratio**2) / 6.0) ** 0.5
     return noise, 0.5 * ahead * (ahead + step) / period**2
@@ -166,7 +166,7 @@ def innovation_of(
 
 
 def unwrapped(x: FloatArray, last: FloatArray, turn: FloatArray) -> FloatArray:
-    """Return signals without jumps by full turns from `last`, as drivers wrap angles to +-pi."""
+    """Return `x` without jumps by full turns from `last`, as drivers may wrap angles."""
     if float(np.abs(x - last).max()) <= np.pi:
         return x
     turns = np.rint(np.divide(x - last, turn, where=turn > 0.0, out=np.zeros_like(x)))
@@ -182,7 +182,7 @@ def all_unwrapped(samples: Sequence[StreamSample], turn: FloatArray) -> list[Str
 
 
 def quantile(period: float, count: int) -> float:
-    """Return the error limit [standard deviations] for one false alarm in FALSE_ALARM_TIME."""
+    """Return the error limit [standard deviations] for a rare false alarm of `count` signals."""
     return float(-special.ndtri(min(period / FALSE_ALARM_TIME / count, 0.5) / 2.0))
 
 

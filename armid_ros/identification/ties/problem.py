@@ -96,7 +96,7 @@ class InteractionProblem:
 
     @property
     def motion_noise(self) -> FloatArray:
-        """Covariance of the errors of a sample's motion by noisy angles, shape (3 J, 3 J)."""
+        """Covariance of errors of a sample's motion due to noisy angles, shape (3 J, 3 J)."""
         return np.asarray(self.motion_lags[0])
 
     @property
