@@ -63,7 +63,7 @@ def test_a_factor_since_the_baseline_is_a_unit(bench, factor, unit):
         arm = weighing(bench.arm, weight)
         (said,) = faults_since(arm, now, before)
         assert unit in said
-        assert 'convert them' in said
+        assert 'convert the torques' in said
 
 
 @pytest.mark.parametrize('factor', [1.0, 1.1, 1.5])

@@ -142,12 +142,12 @@ def unit_faults(
     named = ', '.join(f'{factors[k]:.3g} in {robot.joints[k]}' for k in clear)
     gains = ','.join(f'{1.0 / factor:.3g}' if factor > 0.0 else '?' for factor in factors)
     remedy = (
-        f'{unit} if those of the baseline are in N m: convert them'
+        f'the recording is in {unit}, if the baseline is in N m: convert the torques'
         if unit
-        else 'other units than N m (currents? drivers change from one to the other with their '
+        else 'one of the two is not in N m (currents? drivers change their unit with their '
         f'version): convert each joint by its own gain, as with --current-gain {gains}'
     )
-    return [f'torques are those of the baseline times {named}: one of the two is in {remedy}']
+    return [f'torques over those of the baseline: {named}; {remedy}']
 
 
 def _torque_ratios(

@@ -228,7 +228,7 @@ def _constant_channel(
     when = 'throughout'
     if run != (0, len(recording)):
         first, last = recording.t[run[0]], recording.t[run[1] - 1]
-        when, remedy = f'from {first:.3f} s to {last:.3f} s', 'leave out that time'
+        when, remedy = f'from {first:.3f} s to {last:.3f} s', 'leave out these seconds'
     text = f'the {quantity} of {recording.joints[joint]} stays at {value} {when}{why}; {remedy}'
     return Fault(text, 'unusable', recording.source)
 

@@ -131,7 +131,7 @@ def check_torque(
             raise IdentificationError(
                 f'{source}: torques of {joints} have the opposite sign of what the description '
                 'predicts; positive is along the URDF joint axis. Negate them with --effort-scale '
-                '-1, or leave that option out if it is given'
+                '-1, or leave this option out if it is given'
             )
         for unit, factor in TORQUE_UNITS.items():
             if np.all((factors > 0.5 * factor) & (factors < 2.0 * factor)):
@@ -175,8 +175,8 @@ def driven_by_friction(robot: Robot, motions: Sequence[Motion]) -> str:
     if not found:
         return ''
     return (
-        f'the torque of {", ".join(found)} has the opposite sign of friction. Negate it '
-        '(positive is along the URDF joint axis), or somebody moved the arm'
+        f'the torque of {", ".join(found)} has the opposite sign of friction. Negate the '
+        'torque (positive is along the URDF joint axis), unless somebody moved the arm'
     )
 
 
@@ -234,8 +234,8 @@ def laws_of_controllers(
             return ()
         found.append(
             f'the torque of {name} depends only on position and direction of motion, to '
-            f'{100 * residual / size:.1f} %. A controller that holds the weight or pushes along '
-            f'makes such a torque, which lacks the {lacking:.2g} {unit} of the inertia. '
+            f'{100 * residual / size:.1f} %. A controller that carries the weight or assists the '
+            f'motion causes such a torque; the {lacking:.2g} {unit} of the inertia are missing. '
             'Something else moves the arm, or body and friction cannot be distinguished: record '
             'the arm while it follows a trajectory'
         )

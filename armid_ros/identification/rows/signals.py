@@ -245,7 +245,7 @@ def no_stretch(recording: Recording, used: Conditioning) -> IdentificationError:
     if 'cutoff' in used.given and left > 0.0:
         return IdentificationError(
             f'{recording.source}: --cutoff {used.cutoff_hz:g} Hz is too low for {longest:.2f} s '
-            f'without a gap: take more than {_CUTOFF_PERIODS / left:.2g} Hz, or leave it out'
+            f'without a gap: give more than {_CUTOFF_PERIODS / left:.2g} Hz, or no --cutoff'
         )
     return IdentificationError(
         f'{recording.source}: no section is long enough to be filtered at {used.cutoff_hz:g} Hz: '

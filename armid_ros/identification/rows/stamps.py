@@ -55,9 +55,9 @@ def rounded_stamps(recording: Recording) -> str:
     if np.any(np.abs(steps / step - np.round(steps / step)) > 0.01):
         return ''
     return (
-        f'time stamps seem to be rounded to {1e3 * step:.4g} ms: all are multiples of that. '
-        f'{report.duplicates} of {report.messages} samples had the stamp of another and are left '
-        'out. Write stamps with more digits, or record with those of the driver'
+        f'time stamps seem to be rounded to multiples of {1e3 * step:.4g} ms. '
+        f'{report.duplicates} of {report.messages} samples had the stamp of another sample and '
+        'are left out. Write stamps with more digits, or record with the stamps of the driver'
     )
 
 
@@ -124,7 +124,7 @@ def two_senders(recording: Recording) -> str:
     if len(rows) < 0.2 * len(t) and np.median(t[rows + 2] - t[rows]) > 1.5 * recording.period:
         return ''
     return (
-        f'{len(rows)} of {len(t)} messages contradict those around them, as of two senders of '
+        f'{len(rows)} of {len(t)} messages contradict their neighbours, as if two senders used '
         f'one topic. The position of {recording.joints[joint]} jumps by {jump:.3g} and back, '
         f'first at {t[rows[0] + 1] - t[0]:.3f} s. Record each sender on a topic of its own'
     )
