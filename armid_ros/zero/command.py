@@ -21,7 +21,7 @@ _SCENE_OPTIONS = ('joint_limits', 'velocity', 'clearance', 'floor', 'environment
 @click.group(epilog='Example: armid zero plan --robot ur5.urdf --out plan')
 def zero() -> None:
     """
-    Find torque sensor zeros and gains, base tilt and tool from an arm at rest.
+    Identify torque sensor zeros and gains, base tilt and tool from recordings of an arm at rest.
 
     plan writes a trajectory of static poses, each reached from both sides, for
     excitation_publisher. fit estimates the quantities from the rests of a recording. It takes the
@@ -50,7 +50,7 @@ def zero() -> None:
 def plan(
     robot_source: str, gravity: str, joints: str | None, out: Path, as_json: bool, **given: Any
 ) -> None:
-    """Plan a trajectory that rests in static poses, for excitation_publisher."""
+    """Plan a trajectory with rests in several poses, to be played by excitation_publisher."""
     from armid_ros.api.excitation import ExcitationResult
     from armid_ros.cli import options
     from armid_ros.excitation import CollisionScene, with_joint_limits
@@ -117,7 +117,7 @@ def fit(
     seed: int,
     as_json: bool,
 ) -> None:
-    """Find zeros, gains, gravity, tool and friction from recordings of an arm at rest."""
+    """Estimate torque sensor zeros and gains, gravity, tool and friction from recorded rests."""
     from armid_ros import ArmModel, save_model
     from armid_ros.cli import options
     from armid_ros.identification.known_payload import payloads_of

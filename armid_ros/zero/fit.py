@@ -49,7 +49,7 @@ _REMEDY = 'record a run of armid zero plan'
 @dataclass(frozen=True)
 class FittedQuantity:
     """
-    Fitted quantity with half the width of its 95 % interval (0 if its value is given).
+    Fitted quantity with the half-width of its 95 % confidence interval (0 for a known quantity).
 
     The joint is empty for a quantity of the whole arm. The reason why the quantity is not
     determined ends with a remedy; it is empty for a determined one.
@@ -67,7 +67,7 @@ class FittedQuantity:
 @dataclass(frozen=True)
 class ZeroFit:
     """
-    Torque sensor zeros and gains, gravity and tool, fitted to K rests of an arm.
+    Result of a fit of torque sensor zeros and gains, gravity and tool to K rests of an arm.
 
     Attributes
     ----------
@@ -94,11 +94,11 @@ class ZeroFit:
     outliers: int
 
     def of(self, name: str, joint: str = '') -> FittedQuantity:
-        """Return the fitted quantity with a name and a joint; '' as joint means the whole arm."""
+        """Return the fitted quantity with a name and a joint; joint '' means the whole arm."""
         return next(one for one in self.quantities if (one.name, one.joint) == (name, joint))
 
     def model(self) -> ArmModel:
-        """Return the arm with all determined quantities but friction; the tool is a point mass."""
+        """Return an arm model with all determined zeros, gains and tilt, and a point-mass tool."""
         arm = ArmModel(self.arm.robot)
         for effect, values in zip(self.arm.effects, self.arm.values, strict=True):
             if effect.name == 'payload' and values[0] > 0.0:
@@ -112,7 +112,7 @@ class ZeroFit:
 
 
 def arm_at_rest(robot: Robot, known: Collection[str] = ()) -> ArmModel:
-    """Return a static arm model with the effects that a fit to rests determines."""
+    """Return a static arm model with the effects that `fit_rests` fits, excluding `known`."""
     names = ['payload', 'base_tilt', 'coulomb_friction', 'torque_offset', 'torque_gain']
     if 'gain' in known and 'tilt' not in known:
         names.append('gravity_magnitude')
@@ -125,7 +125,7 @@ def arm_at_rest(robot: Robot, known: Collection[str] = ()) -> ArmModel:
 
 def quantities_of(arm: ArmModel) -> dict[tuple[str, str, str], float]:
     """
-    Return zeros, gains, friction, gravity and tool of an arm, by name, joint and unit.
+    Return zeros, gains, friction, gravity and tool of an arm; keys are (name, joint, unit).
 
     A zero is the reading without any torque. The centre of the tool is in the frame of the last
     joint.
@@ -156,7 +156,7 @@ def fit_rests(
     link_error: float = 0.0,
 ) -> ZeroFit:
     """
-    Fit torque sensor zeros and gains, gravity, tool and friction to an arm's rests.
+    Fit torque sensor zeros and gains, gravity, tool and friction to the rests of an arm.
 
     Parameters
     ----------
@@ -205,7 +205,7 @@ def fit_rests(
 def _predicted(
     arms: Sequence[ArmModel], rests: Sequence[Motion], x: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Return torques (K, n) predicted after a parameter change x, and derivatives (K, n, P)."""
+    """Return torques (K, n) predicted for parameter changes x (P,), and derivatives (K, n, P)."""
     pairs = [(a.with_theta(a.theta + x), motion) for a, motion in zip(arms, rests, strict=True)]
     torque = np.concatenate([arm.torque(motion) for arm, motion in pairs])
     return torque, np.concatenate([arm.columns(motion) for arm, motion in pairs])
@@ -213,7 +213,7 @@ def _predicted(
 
 class _Solution(NamedTuple):
     """
-    Solution of the fit: changes of P parameters, and the covariance of F free ones.
+    Solution of the fit: changes of P parameters, and covariance of the F free parameters.
 
     Covariances (F, F) are from the variances of joints and from the scatter of the rests;
     information (F, F) is without the prior; freedom is the fewest redundant readings of a joint.
@@ -233,7 +233,7 @@ class _Solution(NamedTuple):
 def _solved(
     arms: Sequence[ArmModel], rests: Sequence[Motion], prior: FloatArray, scales: FloatArray
 ) -> _Solution:
-    """Fit the free parameters by Gauss-Newton; noise is estimated and outliers are left out."""
+    """Fit parameters with prior standard deviations > 0 by Gauss-Newton, without outliers."""
     y = np.concatenate([np.asarray(one.tau) for one in rests])
     # readings without a motion of the joint before only bound its dry friction
     approached = np.concatenate([one.dq for one in rests]).astype(bool)
@@ -267,7 +267,7 @@ def _solved(
 def _quantities(
     arm: ArmModel, solved: _Solution, units: Mapping[str, float], few: str
 ) -> tuple[FittedQuantity, ...]:
-    """Return all quantities with intervals; `few` is the message if poses are too few."""
+    """Return all fitted quantities; a nonempty `few` is the reason why none is determined."""
     factor = float(student.ppf(0.975, max(solved.freedom, 1.0)))
     middle, std = quantities_of(arm), np.sqrt(np.diag(solved.covariance))
     found, tool = [], True
@@ -294,7 +294,7 @@ def _quantities(
 
 
 def _reason(arm: ArmModel, solved: _Solution, slope: FloatArray, limit: float) -> str:
-    """Return the reason why the data do not determine a quantity, with a remedy."""
+    """Return why a quantity with derivatives `slope` (F,) is not determined, and a remedy."""
     std = np.sqrt(np.diag(solved.covariance))
     most = int(np.argmax(np.abs(slope) * std))
     correlation = np.abs(solved.covariance[most]) / std
@@ -316,7 +316,7 @@ def _reason(arm: ArmModel, solved: _Solution, slope: FloatArray, limit: float) -
 def fit_document(
     found: ZeroFit, known: Collection[str], link_error: float, external: bool
 ) -> dict[str, Any]:
-    """Return the content of the file zero.json."""
+    """Return the JSON document of a fit, the content of zero.json."""
     gains = [one.value for one in found.quantities if one.name == 'gain' and not one.reason]
     links = f'links within {100.0 * link_error:g} %' if link_error else 'links as described'
     held = [links, *known]

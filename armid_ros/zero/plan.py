@@ -44,7 +44,7 @@ def plan_zero(
     seed: int = 0,
 ) -> ExcitationResult:
     """
-    Plan a motion through static poses, at each of which the arm rests for `hold` seconds.
+    Plan a motion through several static poses, with rests of `hold` [s] in each pose.
 
     The tour approaches each pose from each free side. `seed` is the seed of the random poses.
     TrajectoryError: too few poses are free, or no tour is found.
@@ -78,7 +78,7 @@ def _poses(
     rng: np.random.Generator,
 ) -> FloatArray:
     """
-    Return the most informative collision-free poses, (count, n), ordered for a short path.
+    Return the most informative collision-free poses in the order of a short path, (count, n).
 
     The determinant of the information on all effects is maximised, pose by pose and then by
     exchange. Source: Fedorov 1972.
@@ -94,8 +94,8 @@ def _poses(
     if len(free) < count:
         reason = next(filter(None, map(planner.fault, drawn)))
         raise TrajectoryError(
-            f'only {len(free)} of {len(drawn)} random poses are allowed, and {count} are needed: '
-            f'{reason}; ask for fewer --poses, or enlarge the free space'
+            f'only {len(free)} of {len(drawn)} random poses are valid, and {count} are needed: '
+            f'{reason}; reduce --poses, or give the arm more free space'
         )
     sides = [Motion.of_states(robot.joints, free, side, 0.0) for side in (-1.0, 1.0)]
     columns = np.concatenate([model.effect_columns(side) for side in sides], axis=1)
@@ -120,7 +120,7 @@ def _poses(
 def _tour(
     planner: TransferPlanner, limits: Limits, poses: FloatArray, hold: float
 ) -> FourierTrajectory:
-    """Return a closed trajectory that rests at each reachable pose."""
+    """Return a closed trajectory with rests of `hold` [s] in each reachable pose."""
     rate, smoothing = 20.0, 0.5  # [Hz], and standard deviation of the filter [s]
     # the filter moves the arm for three standard deviations at either end of a rest
     count = round((hold + 6.0 * smoothing) * rate)
@@ -141,7 +141,7 @@ def _tour(
         if not planner.fault(over):
             parts += [pose + bump * (over - pose), rest]
     if not np.array_equal(now, poses[0]):
-        raise TrajectoryError(f'no return path was found: {reason}; try another --seed')
+        raise TrajectoryError(f'no path back to the first pose: {reason}; try another --seed')
     q = np.roll(np.concatenate(parts), count // 2, axis=0)  # begins and ends in a rest
     q = np.concatenate([q, np.tile(q[-1], (-len(q) % int(rate), 1))])  # whole seconds
     period = len(q) / rate

@@ -17,7 +17,7 @@ _WINDOW, _SETTLING_TIME, _MIN_REST = 1.0, 0.5, 0.5
 
 
 def reading_noise(recording: Recording) -> FloatArray:
-    """Return the standard deviation of the mean torque of a shortest rest, (n,) [N m or N]."""
+    """Return the noise (standard deviation) of the mean torque over 0.5 s, (n,) [N m or N]."""
     assert recording.tau is not None
     count = max(_MIN_REST / max(recording.period, 1e-6), 1.0)
     # the median leaves out steps of friction; for white noise it is 0.954 standard deviations
@@ -27,7 +27,7 @@ def reading_noise(recording: Recording) -> FloatArray:
 
 def find_rests(recording: Recording) -> Motion:
     """
-    Find the K rests of a recording; return their positions and torques as K samples.
+    Find the K rests of a recording; return a motion of K samples, the means over each rest.
 
     Position and torque are means over a rest. The velocity is the direction of the approach of a
     joint, 1 or -1, or 0 if the joint hardly moved since the previous rest.
@@ -37,8 +37,8 @@ def find_rests(recording: Recording) -> Motion:
     tau, t = recording.tau, recording.t
     if tau is None or not np.ptp(tau, axis=0).any():
         raise IdentificationError(
-            f'{recording.source}: no effort was recorded; name the topic or the columns of the '
-            'torque with --topic or --effort'
+            f'{recording.source}: efforts are missing or constant; name the topic of the torques '
+            'with --topic, or the columns with --effort'
         )
     size = max(round(_WINDOW / max(recording.period, 1e-6)), 3)
     # outliers and encoder noise do not end a rest
@@ -54,8 +54,8 @@ def find_rests(recording: Recording) -> Motion:
         longest = float((t[ends] - t[begins]).max(initial=-_WINDOW)) + _WINDOW
         needed = _SETTLING_TIME + _MIN_REST + _WINDOW
         raise IdentificationError(
-            f'{recording.source}: the arm is at rest for {longest:.2g} s at most, and '
-            f'{needed:g} s are needed; record a run of armid zero plan'
+            f'{recording.source}: the longest rest of the arm lasts {longest:.2g} s, and '
+            f'{needed:g} s are needed; record a trajectory of armid zero plan'
         )
     rests, before = [], 0
     for begin, end in zip(begins[lasting], ends[lasting] + 1, strict=True):
