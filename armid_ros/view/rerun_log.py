@@ -160,7 +160,7 @@ def log_recording(
 
 
 def _log_bodies(stream: Any, robot: Robot, marked: Sequence[str]) -> list[str]:
-    """Send the shapes of links to rerun, or bars if there are none; return notes on the rest."""
+    """Send link shapes to rerun, or bars if there are none; return notes on links not drawn."""
     rr, drawn = rerun(), 0
     notes: list[str] = []
     absent: list[str] = []

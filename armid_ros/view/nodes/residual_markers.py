@@ -83,7 +83,7 @@ class ResidualMarkersNode(ListeningNode):
         return '', {f'residual share {joint}': float(share) for joint, share in shares}
 
     def draw(self) -> None:
-        """Publish the markers of all joints at the present position of the arm."""
+        """Publish the markers of all joints at the present pose of the arm."""
         if self.robot is None or not np.isfinite(self._q).all():
             return
         stamp = self.get_clock().now().to_msg()
@@ -136,7 +136,7 @@ class ResidualMarkersNode(ListeningNode):
         return np.asarray(np.sqrt(self._residual / np.maximum(self._torque, 1e-12)))
 
     def take_description(self, urdf: str) -> None:
-        """Set up the markers for the robot that the topic robot_description describes."""
+        """Set up the markers for the robot of a URDF text from the topic robot_description."""
         self._draw_on(robot_from_urdf(urdf, joints=self.value('joints') or None))
 
     def _draw_on(self, robot: Robot) -> None:
@@ -153,7 +153,7 @@ class ResidualMarkersNode(ListeningNode):
         self._reach = max(float(np.linalg.norm(steps, axis=1).sum()), 0.1)
 
     def take_sample(self, sample: JointSample) -> None:
-        """Store the positions of a joint state, and update the mean squares of its torques."""
+        """Store the positions of a joint state, and update the mean squares of the torques."""
         self._q = sample.q
         self._torque = self._mean_square('torque', sample.t, self._torque, sample.tau)
 
@@ -171,7 +171,7 @@ class ResidualMarkersNode(ListeningNode):
     def _mean_square(
         self, signal: str, t: float, before: FloatArray, values: FloatArray
     ) -> FloatArray:
-        """Return the mean square of a signal over about 2 s, after new values at time t [s]."""
+        """Return the running mean square (over 2 s) of a signal, with new values at t [s]."""
         step, self._seen[signal] = t - self._seen[signal], t
         share = 1.0 if not before.any() else float(np.clip(step / 2.0, 0.0, 1.0))
         return np.asarray(before + share * (values**2 - before))
