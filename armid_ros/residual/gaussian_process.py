@@ -26,7 +26,7 @@ _LENGTHS = (0.02, 10.0)
 
 
 class _Cells(NamedTuple):
-    """Clusters of N samples: cluster of each sample (N,), mean state (M, 3) and torque (M,)."""
+    """M clusters of N samples: labels of the samples (N,), mean states (M, 3), torques (M,)."""
 
     labels: npt.NDArray[np.intp]
     points: FloatArray
@@ -35,7 +35,7 @@ class _Cells(NamedTuple):
 
 def learn_map(rows: JointRows, rng: np.random.Generator) -> tuple[TorqueMap, FloatArray]:
     """
-    Learn the residual torque of a joint as a map of position, velocity and load.
+    Learn a map of a joint's residual torque; return the map and its cross-validated torques.
 
     Parameters
     ----------
@@ -80,7 +80,7 @@ def learn_map(rows: JointRows, rng: np.random.Generator) -> tuple[TorqueMap, Flo
 
 
 class _Scales(NamedTuple):
-    """Hyperparameters of the Gaussian process: noise, length scales, amplitude, knee velocity."""
+    """Hyperparameters of the Gaussian process, and the velocity `knee` that scales its inputs."""
 
     noise: float
     lengths: FloatArray
@@ -93,7 +93,7 @@ def _span(inputs: FloatArray) -> FloatArray:
 
 
 def _cells(rows: JointRows, labels: npt.NDArray[np.intp], used: npt.NDArray[np.bool_]) -> _Cells:
-    """Return mean state and mean residual of each cluster; only rows marked as used count."""
+    """Return mean state and mean residual of each cluster, over the samples in the mask `used`."""
     own, n = labels[used], int(labels.max()) + 1
     count = np.bincount(own, minlength=n)
     there = count > 0
@@ -104,7 +104,7 @@ def _cells(rows: JointRows, labels: npt.NDArray[np.intp], used: npt.NDArray[np.b
 
 
 def _fitted(cells: _Cells, knee: float) -> tuple[float, _Scales]:
-    """Return the largest log likelihood per cluster, and the hyperparameters that give it."""
+    """Maximise the log likelihood; return its value per cluster, and the hyperparameters."""
     from sklearn.gaussian_process import GaussianProcessRegressor, kernels
 
     size = max(float(np.sqrt(np.mean(cells.torque**2))), 1e-12)

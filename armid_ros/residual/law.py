@@ -106,7 +106,7 @@ def _library(
 
 def suggest_law(rows: JointRows, prismatic: bool) -> Law | None:
     """
-    Fit a formula of up to three terms to a joint's residual torque; None if it fits badly.
+    Fit a formula of up to three terms to a joint's residual torque; None if the fit is poor.
 
     Parameters
     ----------
@@ -143,12 +143,12 @@ def suggest_law(rows: JointRows, prismatic: bool) -> Law | None:
 
 
 def share_of(residual: FloatArray, torque: FloatArray) -> float:
-    """Return the share of the squared residual that a predicted torque explains, at most 1."""
+    """Return the share of the squared residual that the predicted `torque` explains, at most 1."""
     return 1.0 - float(np.sum((residual - torque) ** 2)) / max(float(np.sum(residual**2)), 1e-300)
 
 
 def _fit(x: FloatArray, residual: FloatArray, count: int) -> FloatArray:
-    """Fit a residual by at most `count` of L terms; return L factors, 0 for unused terms."""
+    """Fit a residual by at most `count` of the L columns of x; return L factors, 0 if unused."""
     from sklearn.linear_model import orthogonal_mp
 
     size = np.sqrt(np.mean(x**2, axis=0))

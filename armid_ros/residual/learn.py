@@ -68,7 +68,7 @@ class JointResidual:
     law: Law | None
 
     def axis(self, number: int, count: int) -> FloatArray:
-        """Return evenly spaced values over the recorded range of position, velocity or load."""
+        """Return `count` evenly spaced values of input 0 (position), 1 (velocity) or 2 (load)."""
         return np.linspace(float(self.ranges[number, 0]), float(self.ranges[number, 1]), count)
 
 
@@ -97,7 +97,7 @@ class Residual:
     joints: tuple[JointResidual, ...]
 
     def sentences(self) -> tuple[str, ...]:
-        """Return for each joint a sentence on its learned map and formula."""
+        """Return a sentence for each joint on its learned map and formula."""
         lines = []
         for one in self.joints:
             alone = ''
@@ -115,7 +115,7 @@ class Residual:
         return tuple(lines)
 
     def steps(self) -> list[str]:
-        """Return for each joint with a learned map what the user can do next."""
+        """Return the next step of the user, as a sentence for each joint with a learned map."""
         return [
             f'Inspect gear, cables and stops of {one.joint} where its map is strong.'
             if one.law is None
@@ -307,7 +307,7 @@ def _learned(
     rng: np.random.Generator,
 ) -> JointResidual | None:
     """
-    Learn the residual torque of a joint as a map; None if it predicts held-out data badly.
+    Learn a map of a joint's residual torque; None if the map predicts held-out data poorly.
 
     The map is None if it does not predict held-out blocks beyond chance. It is also None if its
     torque is below a material torque [N m] and it predicts no held-out recording.
@@ -345,13 +345,13 @@ def _learned(
 
 
 def near_data(learned: TorqueMap, rows: JointRows) -> npt.NDArray[np.bool_]:
-    """Return a mask (N,) of the rows near the data from which a map was learned."""
+    """Return a mask (N,) of the samples that are near the training data of a map."""
     # a map is informative where its standard deviation is less than half of that of the prior
     return np.asarray(learned.std(rows.inputs) < 0.5 * learned.amplitude)
 
 
 def _pictures(one: JointResidual, unit: str, length: str) -> list[tuple[str, str, Markup, str]]:
-    """Return images of the torque and standard deviation of a map, at the mid-range load."""
+    """Return two images of a map at the mid-range load: torque, and standard deviation."""
     # cells along position and velocity
     q, dq = (one.axis(number, count) for number, count in enumerate((80, 60)))
     load = np.full((len(dq), len(q)), one.ranges[2].mean())

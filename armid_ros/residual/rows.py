@@ -56,7 +56,7 @@ class JointRows:
 
 def joint_rows(arm: ArmModel, data: Sequence[Trajectory]) -> list[JointRows]:
     """
-    Return samples of each joint: residual torque of a model, position, velocity and load.
+    Return the informative samples of each joint, with the residual torque of a model.
 
     Parameters
     ----------
