@@ -89,7 +89,7 @@ class LinkCheck:
 
     @property
     def agrees(self) -> bool:
-        """Whether fitting the links reduces the torque error by less than 1 % of the torque."""
+        """Whether fitted links lower the torque error by less than 1 % of the measured torque."""
         return self.error_percent - self.fitted_error_percent < _MIN_IMPROVEMENT
 
 
@@ -330,7 +330,7 @@ def check_links(found: Identification, robot: Robot, grade: str, fault: str) -> 
 
 
 def _errors(found: Identification, theta: FloatArray) -> tuple[float, float]:
-    """Return relative torque errors [%] for parameters theta, and for the fitted parameters."""
+    """Return the relative torque errors [%] of parameters theta and of the fitted parameters."""
     before = found.arm.with_theta(theta)
     fits = [
         replace(
@@ -344,7 +344,7 @@ def _errors(found: Identification, theta: FloatArray) -> tuple[float, float]:
 
 
 def _selected(rows: FloatArray, spread: FloatArray, total: float) -> list[int]:
-    """Select the links with wrong inertial parameters by forward selection; return indices."""
+    """Return the indices of links with wrong inertial parameters, found by forward selection."""
     every = range(len(spread) // PER_LINK)
     wrong: list[int] = []
     rest = total
@@ -365,7 +365,7 @@ def _selected(rows: FloatArray, spread: FloatArray, total: float) -> list[int]:
 def _fit(
     rows: FloatArray, spread: FloatArray, links: Sequence[int]
 ) -> tuple[FloatArray, FloatArray, float]:
-    """Fit inertial parameters of links; return changes, covariance and remaining chi-squared."""
+    """Fit inertial parameters of links; return changes, their covariance and chi-squared."""
     size = PER_LINK
     own = [size * k + i for k in links for i in range(size)]
     columns, target = rows[:, own] * spread[own], rows[:, -1]

@@ -72,7 +72,7 @@ class Sampling:
 
 
 def repetition_period(recording: Recording) -> float | None:
-    """Return the period with which a recorded motion repeats [s]; None if it does not repeat."""
+    """Return the period of a repeated motion in a recording [s]; None without repetition."""
     # at most 20 Hz and 3000 samples
     rate = min(20.0, 1.0 / recording.period, 3000 / max(recording.duration, 1e-9))
     t = np.arange(recording.t[0], recording.t[-1], 1.0 / rate)
@@ -183,7 +183,7 @@ def _derivative(recording: Recording) -> FloatArray:
 @dataclass(frozen=True)
 class TrialFit:
     """
-    Quality of a quick identification from one recording.
+    Quality of a trial identification from one recording.
 
     Attributes
     ----------
@@ -234,7 +234,7 @@ class TrialFit:
     def of(
         cls, found: Identification, graded: Grade, recording: Recording, scale: FloatArray
     ) -> TrialFit:
-        """Assess a trial fit; `scale` is the ratio of recorded effort to described torque."""
+        """Assess a trial identification; `scale` is effort divided by described torque, (n,)."""
         robot, motions = found.arm.robot, [fit.motion for fit in found.training]
         score = Score.of(found.training)
         errors = score.joint_relative_error_percent

@@ -178,7 +178,7 @@ def inspection_document(found: Inspection) -> dict[str, Any]:
 
 
 def notes_on(robot: Robot) -> list[str]:
-    """Return warnings and notes on a robot description; one note covers all undriven joints."""
+    """Return the texts of notes on a robot description; undriven joints share one note."""
     held = {f"joint '{joint.name}'" for joint in held_joints(robot)}
     others = [note for note in robot.notes if note.partition(': not')[0] not in held]
     return list(
@@ -196,7 +196,7 @@ def _contains_any(text: str, others: Iterable[str]) -> bool:
 
 
 def _fit_remarks(trial: TrialFit, known: Sequence[str]) -> Iterator[Remark]:
-    """Yield remarks on faults that only the quick identification has found."""
+    """Yield remarks on faults that only the trial identification has found."""
     weight: Weight = 'bad' if trial.grade == 'unusable' else 'doubt'
     others = [*known, *trial.elsewhere]
     yield from (
@@ -211,7 +211,7 @@ def _fit_remarks(trial: TrialFit, known: Sequence[str]) -> Iterator[Remark]:
 
 
 def _time_remarks(recording: Recording, sampling: Sampling) -> Iterator[Remark]:
-    """Yield remarks on damaged data, time stamps, gaps, jitter and repeated periods."""
+    """Yield remarks on damaged data, time stamps, gaps, jitter and a motion without repetition."""
     report = recording.report
     if report.damage:
         yield Remark('doubt', report.damage)
