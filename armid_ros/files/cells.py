@@ -13,7 +13,7 @@ _GUARDED = ('=', '+', '-', '@', '#', '\t', '\r', "'")
 
 def csv_text(rows: Iterable[Sequence[str]]) -> str:
     """
-    Format table rows as CSV text; the first cell of each row has to be a name.
+    Format table rows as CSV text; the first cell of each row is a name, which is escaped.
 
     A name that begins like a formula of a spreadsheet gets an apostrophe as prefix. Quotes are
     added if needed.

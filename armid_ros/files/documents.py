@@ -77,7 +77,7 @@ def reading(path: str | Path, error: type[ArmidError]) -> Iterator[None]:
 
 
 def finite(value: Any, quantity: str) -> float:
-    """Convert a value of a document to a float; ValueError unless finite and at most LARGEST."""
+    """Convert a value to a float; ValueError if it is not finite, or is larger than LARGEST."""
     try:
         number = float(value)
     except (TypeError, ValueError, OverflowError):
@@ -133,7 +133,7 @@ def load_yaml(text: str) -> Any:
 
 def yaml_line(text: str, place: Sequence[str | int]) -> int:
     """
-    Return the line number, from 1, of an entry of a YAML text.
+    Return the line number (from 1) of an entry in a YAML text.
 
     Parameters
     ----------
@@ -161,12 +161,12 @@ def yaml_line(text: str, place: Sequence[str | int]) -> int:
 
 
 def _line(event: yaml.Event) -> int:
-    """Return the line number, from 1, of a parser event; 0 if unknown."""
+    """Return the line number (from 1) of a parser event; 0 if unknown."""
     return 0 if event.start_mark is None else int(event.start_mark.line) + 1
 
 
 def _error_message(problem: BaseException) -> str:
-    """Return the message of a parser's error as one line."""
+    """Return the message of a parser error as one line."""
     if isinstance(problem, RecursionError):
         return 'the document is nested too deep'
     if isinstance(problem, MemoryError):

@@ -97,7 +97,7 @@ _MARKED_SUFFIXES = ('.html', '.json', '.yaml', '.rviz', 'plotjuggler.xml')
 
 def write_file(path: str | Path, content: str | bytes) -> None:
     """
-    Write a file atomically: under a temporary name, which is then renamed.
+    Write a file atomically: write a temporary file, then rename the temporary file.
 
     Parameters
     ----------
@@ -142,7 +142,7 @@ def result_folder(
     force: bool = False,
 ) -> Iterator[Path]:
     """
-    Create a folder for a command's results; it is locked during the `with` block.
+    Create a folder for the results of a command, and lock the folder during the `with` block.
 
     Parameters
     ----------
@@ -184,7 +184,7 @@ def result_folder(
 @contextmanager
 def locked(path: Path) -> Iterator[None]:
     """
-    Create a folder if necessary; it is locked for other runs during the `with` block.
+    Lock a folder against other runs during the `with` block; create the folder if necessary.
 
     Raises
     ------
@@ -239,7 +239,7 @@ def _refuse_other_results(path: Path, schema: str, robot: str) -> None:
         same = '-' in (robot, other) or Path(robot).absolute() == Path(other).absolute()
         if robot and other and not same:
             raise OutputError(
-                f'{path}: has {_in_words(kind)} of robot {other}, not of {robot}; {hint}'
+                f'{path} contains {_in_words(kind)} for robot {other}, not for {robot}; {hint}'
             )
 
 
@@ -250,7 +250,7 @@ def _in_words(schema: str) -> str:
 
 
 def _representable(value: Any) -> Any:
-    """Replace numbers that are not finite by None in a nested document."""
+    """Return a copy of a nested document with None in place of NaN and infinite numbers."""
     if isinstance(value, float):
         return value if math.isfinite(value) else None
     if isinstance(value, dict):
@@ -261,12 +261,12 @@ def _representable(value: Any) -> Any:
 
 
 def final_path(path: Path) -> Path:
-    """Return where a file in a staging folder will be finally; other paths are unchanged."""
+    """Return the final path of a file in a staging folder; return other paths unchanged."""
     return Path(*(part for part in path.parts if part != STAGING))
 
 
 def hash_files(paths: Iterable[str | Path]) -> tuple[tuple[str, int, str], ...]:
-    """Return path, size and SHA-256 of files, and of all files in folders such as bags."""
+    """Return path, size [bytes] and SHA-256 of each file, including the files inside folders."""
     found = []
     for path in map(Path, paths):
         inside = sorted(path.rglob('*')) if path.is_dir() else [path]
@@ -311,7 +311,7 @@ def refuse_foreign(folder: Path, schema: str, also: Collection[str] = ()) -> Non
 
 def refuse_replacing(folder: Path, names: Collection[str], remedy: str = '') -> None:
     """
-    Raise OutputError if a file to be replaced was not written by this package.
+    Raise OutputError if the files to be replaced include a file of another program.
 
     Parameters
     ----------
@@ -339,7 +339,7 @@ def refuse_replacing(folder: Path, names: Collection[str], remedy: str = '') -> 
 
 
 def is_plan(path: Path) -> bool:
-    """Return whether a folder is a bag of a planned trajectory, without measurements."""
+    """Return whether a folder is a bag with a planned trajectory and without measurements."""
     try:
         text = read_text(path / 'metadata.yaml', OutputError)
     except OutputError:

@@ -28,7 +28,7 @@ from armid_ros.files.output import DOCUMENTS, locked, STAGING
 @dataclass(frozen=True)
 class Staged:
     """
-    New result in a staging folder, which replaces the earlier result once complete.
+    New result in a staging folder; the earlier result is replaced once all files are complete.
 
     Attributes
     ----------
@@ -90,10 +90,10 @@ class Staged:
                 else:
                     source.replace(target)
         except OSError as error:
-            raise OutputError(f'{self.out}: cannot be written to: {error.strerror}') from error
+            raise OutputError(f'{self.out}: result cannot be written: {error.strerror}') from error
 
     def _exchanged(self, names: Collection[str]) -> bool:
-        """Replace the folder by one with the new result and other files; False if impossible."""
+        """Replace the results folder by a new folder atomically; return False if impossible."""
         out = self.out.resolve()
         old, own = out.stat(), self.folder.stat()
         if Path.cwd().is_relative_to(out) or (old.st_uid, old.st_gid) != (own.st_uid, own.st_gid):
@@ -122,7 +122,7 @@ class Staged:
         return True
 
     def _earlier_files(self) -> list[Path]:
-        """Return the files of the earlier result that the new result does not replace."""
+        """Return the files of the earlier result that are absent from the new result."""
         spared = {path.resolve() for path in self.spared}
         return [
             path
@@ -168,7 +168,7 @@ def staged(
 
 
 def _exchange(first: Path, second: Path) -> None:
-    """Exchange the names of two folders in one step; OSError if the system cannot do so."""
+    """Exchange the names of two folders atomically; OSError if the system does not support it."""
     at_fdcwd, rename_exchange = -100, 2  # constants of the system call renameat2(2)
     rename = getattr(ctypes.CDLL(None, use_errno=True), 'renameat2', None)
     if rename is None:
