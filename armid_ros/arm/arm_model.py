@@ -44,7 +44,7 @@ import numpy.typing as npt
 @dataclass(frozen=True, repr=False)
 class ArmModel:
     """
-    Rigid body with effects: tau = Y pi + sum over effects of tau_e(motion; theta_e).
+    Rigid body with effects: tau = Y pi + sum of tau_e(motion; theta_e) over all effects e.
 
     Motions are sensor readings, and the model includes the errors of these sensors.
 
@@ -156,7 +156,7 @@ class ArmModel:
 
     @property
     def parameters(self) -> tuple[ParameterName, ...]:
-        """Names of the P standard parameters: of the rigid body, then of the effects."""
+        """Names of the P standard parameters: rigid-body parameters, then effect parameters."""
         names = list(rigid_parameter_names(self.robot))
         for effect in self.effects:
             names.extend(effect.parameters(self.robot))
@@ -183,7 +183,7 @@ class ArmModel:
         return np.zeros(len(effect.parameters(self.robot)))
 
     def action(self) -> Action:
-        """Return the terms that all effects together add to robot, torques and sensors."""
+        """Return the combined action of all effects on rigid body, joint torques and sensors."""
         return self._acting
 
     def __getstate__(self) -> dict[str, Any]:
@@ -192,7 +192,7 @@ class ArmModel:
 
     @cached_property
     def _acting(self) -> Action:
-        """Return the combined action of all effects, computed once."""
+        """Combined action of all effects, which is computed once."""
         robot = self.robot
         pairs = list(zip(self.effects, self.values, strict=True))
         for effect, values in pairs:
@@ -204,18 +204,18 @@ class ArmModel:
 
     @property
     def body(self) -> Robot:
-        """Return the rigid body with all effects that change its inertia, such as a payload."""
+        """Rigid body, including all effects that change its inertia, such as a payload."""
         assert self._acting.robot is not None
         return self._acting.robot
 
     def along(self, motion: Motion) -> ArmModel:
-        """Return the arm with recorded signals that its effects need, such as temperatures."""
+        """Return the arm with its effects set to the signals of a motion, such as temperatures."""
         effects = tuple(effect.along(motion) for effect in self.effects)
         known = all(new is old for new, old in zip(effects, self.effects, strict=True))
         return self if known else replace(self, effects=effects)
 
     def link_motion(self, motion: Motion) -> Motion:
-        """Return the true motion of the links for a motion that sensors recorded."""
+        """Return the true motion of the links: recorded motion plus displacements by effects."""
         displacement = self._acting.displacement
         if displacement is None:
             return motion
@@ -350,7 +350,7 @@ class ArmModel:
 
     def torque_change(self, motion: Motion, change: Displacement) -> FloatArray:
         """
-        Return how the true joint torque changes with a small change of the links' motion.
+        Return changes of the true joint torque due to small changes of the motion of links.
 
         Parameters
         ----------
@@ -377,7 +377,7 @@ class ArmModel:
         return tau
 
     def neighbours(self, period: float) -> int:
-        """Return how many samples on each side of a sample influence its torque reading."""
+        """Return the number of samples on each side of a sample that influence its reading."""
         action = self._acting
         if action.displacement is None and action.reading_memory == 0.0:  # noqa: RUF069 - of laws, never computed
             return 0
@@ -386,7 +386,7 @@ class ArmModel:
 
     @cached_property
     def _readings(self) -> list[tuple[TorqueReading, FloatArray]]:
-        """Return the sensor effects on torque, with their parameter values."""
+        """Effects of torque sensors, with their parameter values."""
         pairs = zip(self.effects, self.values, strict=True)
         return [(e, values) for e, values in pairs if isinstance(e, TorqueReading)]
 
@@ -410,7 +410,7 @@ class ArmModel:
         return columns
 
     def with_load_friction(self, motion: Motion, columns: FloatArray) -> FloatArray:
-        """Add derivatives of load-dependent friction to derivatives of the load, (N, n, P)."""
+        """Add the derivatives of load-dependent friction to derivatives of the load (N, n, P)."""
         friction = self._acting.dry_friction
         if friction is None or friction.load_share is None:
             return columns
@@ -420,14 +420,14 @@ class ArmModel:
         return np.asarray(columns + along @ (gain[:, :, np.newaxis] * (along.T @ columns)))
 
     def rigid_body_motion(self, motion: Motion) -> Motion:
-        """Return the motion; if the arm is quasi-static, with zero velocity and acceleration."""
+        """Return a motion, with zero velocity and acceleration if the arm is ``quasi_static``."""
         return motion.at_rest() if self.quasi_static else motion
 
     def base_parameters(
         self, rng: np.random.Generator, free: npt.NDArray[np.intp] | None = None
     ) -> BaseParameters:
         """
-        Return the combinations of parameters that a suitable motion can identify.
+        Return the base parameters of rigid body and effects, for sufficiently rich motions.
 
         Parameters
         ----------

@@ -22,7 +22,7 @@ import numpy as np
 @dataclass(frozen=True)
 class Exported:
     """
-    Exported URDF or MJCF text, and what the arm has that the format cannot contain.
+    Exported URDF or MJCF text, and the parameters of the arm that the format cannot contain.
 
     Attributes
     ----------
@@ -90,7 +90,7 @@ def place_values(
     arm: ArmModel, attribute: Callable[[Effect], str]
 ) -> tuple[dict[str, dict[str, float]], tuple[str, ...]]:
     """
-    Return effect values by attribute of a file format, and values without attribute as text.
+    Return effect values for the attributes of a file format, and texts on all other values.
 
     The function ``attribute`` returns the attribute of the format for an effect, or an empty text.
     Effects that change the rigid body are part of its inertial parameters, and appear in neither

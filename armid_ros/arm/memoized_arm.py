@@ -19,7 +19,7 @@ _Method = TypeVar('_Method', bound=Callable[..., Any])
 
 @dataclass
 class _Regressor:
-    """Cache entry: a motion, its rigid-body regressor, and that regressor filtered."""
+    """Cache entry: a motion, its rigid-body regressor, and the filtered regressor."""
 
     motion: Motion
     columns: FloatArray
@@ -27,7 +27,7 @@ class _Regressor:
 
 
 def _once(compute: _Method) -> _Method:
-    """Return a method of `ArmModel` that computes its result only once for each motion."""
+    """Add a cache to a method of `ArmModel`, with one result for each motion."""
 
     @wraps(compute)
     def cached(arm: _Memoized, motion: Motion) -> Any:
@@ -66,11 +66,11 @@ class _Memoized(ArmModel):
     _joint_torque = _once(ArmModel.joint_torque)
 
     def link_motion(self, motion: Motion) -> Motion:
-        """Return the true motion of the links for a motion that sensors recorded."""
+        """Return the true motion of the links: recorded motion plus displacements by effects."""
         return motion if self.action().displacement is None else self._moved(motion)
 
     def regressor(self, motion: Motion) -> _Regressor | None:
-        """Return the rigid-body regressor of a motion from the cache; None if not cacheable."""
+        """Return the cached rigid-body regressor of a motion; None if it cannot be cached."""
         if self.action().displacement is not None:
             return None
         key = self._key(motion)
@@ -121,7 +121,7 @@ def plain_arm(arm: ArmModel) -> ArmModel:
 def rigid_rows(
     arm: ArmModel, motion: Motion, reduce: Callable[[FloatArray], FloatArray]
 ) -> FloatArray:
-    """Return filtered derivatives of torque readings by inertial parameters, (M, n, 10 n)."""
+    """Return derivatives of torque readings by inertial parameters, filtered by `reduce`."""
     columns = arm.rigid_columns(motion)
     known = arm.regressor(motion) if isinstance(arm, _Memoized) else None
     if known is None or known.columns is not columns:

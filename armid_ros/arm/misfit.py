@@ -28,7 +28,7 @@ _DATA = ('held-out', 'training')
 
 class RowFilters(NamedTuple):
     """
-    Filters that an identification used: sampling rate and cut-off [Hz], and decimation.
+    Filter settings of an identification: sampling rate [Hz], cut-off [Hz] and decimation.
 
     The fields are those of `armid_ros.identification.rows.signals.Conditioning`.
 
@@ -107,7 +107,7 @@ class Misfit:
         missing = [joint for joint in robot.joints if joint not in self.rms]
         if missing:
             raise ModelError(
-                f"the model has no misfit of joint '{missing[0]}'; identify the arm again. "
+                f"the model has no misfit for joint '{missing[0]}'; identify the arm again. "
                 f'Joints with a misfit: {", ".join(self.rms)}'
             )
         residual = np.array([self.rms[joint] for joint in robot.joints])
@@ -117,7 +117,7 @@ class Misfit:
 
 
 def growth(now: FloatArray, before: FloatArray) -> FloatArray:
-    """Return the ratio (at least 1) of present to earlier rms torque of each joint."""
+    """Return the ratio now / before of the rms torques of each joint, at least 1, shape (n,)."""
     return np.asarray(np.maximum(now / np.maximum(before, 1e-12), 1.0))
 
 
@@ -138,17 +138,17 @@ def misfit_of_block(block: Any) -> Misfit:
     if data not in _DATA:
         raise ModelError(f"misfit: 'data' is '{data}', but has to be {' or '.join(_DATA)}")
     if loud is not None and not loud.keys() >= rms.keys():
-        raise ModelError(f"misfit: 'torque_rms' lacks joint '{min(rms.keys() - loud.keys())}'")
+        raise ModelError(f"misfit: 'torque_rms' has no joint '{min(rms.keys() - loud.keys())}'")
     relative = finite(error, 'relative_error_percent of the misfit')
     return Misfit(data, rms, relative, loud, filters=filters)
 
 
 def _torques(block: Any) -> dict[str, float]:
-    """Read rms torques by joint from a block of model.yaml; ModelError if one is negative."""
+    """Read the rms torque of each joint from a block of model.yaml; ModelError if negative."""
     torques = {
         str(joint): finite(value, f"misfit of joint '{joint}'") for joint, value in block.items()
     }
     negative = [joint for joint, value in torques.items() if value < 0.0]
     if negative:
-        raise ModelError(f"misfit: the value of joint '{negative[0]}' is negative")
+        raise ModelError(f"misfit: the rms of joint '{negative[0]}' is negative")
     return torques

@@ -184,7 +184,7 @@ def load_model(path: str | Path, robot: Robot | ArmModel | str | Path | None = N
 
 def load_misfit(path: str | Path) -> Misfit | None:
     """
-    Read the misfit in a model.yaml; None if the file has none.
+    Read the misfit from a model.yaml; return None if the file has no misfit.
 
     Parameters
     ----------
@@ -206,7 +206,7 @@ def load_misfit(path: str | Path) -> Misfit | None:
 
 def read_model(text: str, robot: Robot, source: str) -> ArmModel:
     """
-    Return the arm model in the text of a model.yaml.
+    Parse the text of a model.yaml, and return the arm model.
 
     Parameters
     ----------
@@ -244,7 +244,7 @@ def add_effect(arm: ArmModel, effect: Effect, values: FloatArray) -> ArmModel:
 
 
 def _find_effect(arm: ArmModel, effect: Effect) -> tuple[int, list[int]] | None:
-    """Return the indices of an effect of an arm and of its parameters; None if missing."""
+    """Return the index of an effect in an arm and the indices of its parameters, or None."""
     wanted = [(p.name, p.joint) for p in effect.parameters(arm.robot)]
     for position, own in enumerate(arm.effects):
         if isinstance(effect, type(own)) and not own.shapes and not own.points:
@@ -255,7 +255,7 @@ def _find_effect(arm: ArmModel, effect: Effect) -> tuple[int, list[int]] | None:
 
 
 def _with_catalogue_effects(arm: ArmModel) -> ArmModel:
-    """Replace effects that only searches use by equivalent effects of the catalogue."""
+    """Replace internal effects of a search by equivalent effects of the catalogue."""
     # a gravity vector, for example, becomes a tilt of the base and a magnitude of gravity
     converted = replace(arm, effects=(), values=())
     for effect, values in zip(arm.effects, arm.values, strict=True):
@@ -293,7 +293,7 @@ def checked_model(text: str) -> dict[str, Any]:
             f"line {line}: the key '{str(strange[0])[:40]}' is not known; the keys of a model are "
             f'{", ".join(_KEYS)}'
         )
-    _require(document, _NEEDED, 'a model')
+    _require(document, _NEEDED, 'the model')
     for place, row, units in _rows(document, text):
         key, problem = _problem(row, units)
         if problem:
@@ -302,7 +302,7 @@ def checked_model(text: str) -> dict[str, Any]:
 
 
 def _wrong_unit(row: Mapping[str, Any], units: Collection[str]) -> str:
-    """Return a message if the unit of a parameter is wrong; empty if right or not given."""
+    """Return an error message if the unit of a parameter is wrong; '' if right or absent."""
     if not units or row.get('unit', next(iter(units))) in units:
         return ''
     expected = ' or '.join(f"'{unit}'" for unit in units)
@@ -312,14 +312,14 @@ def _wrong_unit(row: Mapping[str, Any], units: Collection[str]) -> str:
 def _rows(
     document: Mapping[str, Any], text: str
 ) -> Iterator[tuple[tuple[str | int, ...], Any, tuple[str, ...]]]:
-    """Yield the keys, the content and the permitted units of each parameter of model.yaml."""
+    """Yield keys, content and permitted units of each parameter in the content of model.yaml."""
     for k, row in enumerate(document['rigid_parameters']):
         unit = link_unit(_name(row))
         yield ('rigid_parameters', k), row, (unit,) if unit else ()
     for k, entry in enumerate(document['effects']):
         if not isinstance(entry, dict):
             line = yaml_line(text, ('effects', k))
-            raise ModelError(f'line {line}: an effect needs {", ".join(_NEEDED_OF_EFFECT)}')
+            raise ModelError(f'line {line}: an effect needs keys {", ".join(_NEEDED_OF_EFFECT)}')
         _require(entry, _NEEDED_OF_EFFECT, f"effect '{str(entry.get('name'))[:40]}'")
         kind = CATALOGUE.find(str(entry['name']))
         known: tuple[Quantity | Shape, ...] = (*kind.quantities, *kind.shapes)
@@ -330,7 +330,7 @@ def _rows(
 
 
 def _problem(row: Any, units: tuple[str, ...]) -> tuple[str, str]:
-    """Return key and message of a fault in a parameter's entry; empty texts if no fault."""
+    """Return key and message of a fault in the entry of a parameter; ('', '') if no fault."""
     keys = ', '.join(_KEYS_OF_PARAMETER)
     if not isinstance(row, dict):
         return '', f'a parameter has {keys}, but this entry is {str(row)[:40]!r}'
@@ -352,7 +352,7 @@ def _require(content: Mapping[str, Any], keys: Collection[str], part: str) -> No
     """Raise ModelError if a part of model.yaml lacks a required key."""
     missing = [key for key in keys if key not in content]
     if missing:
-        raise ModelError(f"{part}: '{missing[0]}' is missing; needed are {', '.join(keys)}")
+        raise ModelError(f"{part}: key '{missing[0]}' is missing; required: {', '.join(keys)}")
 
 
 def _name(row: Any) -> str:
@@ -361,7 +361,7 @@ def _name(row: Any) -> str:
 
 
 def _called(row: Mapping[str, Any]) -> str:
-    """Return an entry's parameter name and joint as text for error messages."""
+    """Return the parameter name and joint of an entry as text for error messages."""
     return f"parameter '{row.get('name')}' of joint '{row.get('joint')}'"
 
 
@@ -391,7 +391,7 @@ def _arm(document: dict[str, Any], robot: Robot) -> ArmModel:
 
 
 def _values(rows: Sequence[dict[str, Any]], names: Sequence[ParameterName]) -> FloatArray:
-    """Return parameter values from entries of model.yaml; each name must occur exactly once."""
+    """Return the values of parameters `names` from entries; each must have exactly one entry."""
     table: dict[tuple[str, str], dict[str, Any]] = {}
     units = {(name.name, name.joint): [name.unit] for name in names}
     for row in rows:

@@ -96,16 +96,16 @@ class EffectCase:
         return cls(effect, robot, motion, np.clip(values, *effect.bounds()))
 
     def arm(self, values: npt.ArrayLike) -> ArmModel:
-        """Return the arm model that has the effect with given parameter values."""
+        """Return the arm model with the effect, at given parameter values."""
         return ArmModel(self.robot).with_effect(self.effect, values)
 
     def torque(self, values: FloatArray) -> FloatArray:
-        """Return the arm's torque with the effect along the motion, shape (N, n)."""
+        """Return the torque of the arm with the effect, along the motion, shape (N, n)."""
         return np.asarray(self.arm(values).torque(self.motion))
 
 
 def sines(robot: Robot, duration: float = 0.5, rate: float = 200.0) -> Motion:
-    """Return a motion in which each joint follows a sine of its own within its limits."""
+    """Return a motion in which joints follow sines of different frequency, inside limits."""
     t = np.arange(0.0, duration, 1.0 / rate)
     frequency = 2.0 * np.pi * np.linspace(0.4, 2.1, robot.n_joints)
     phase = frequency * t[:, np.newaxis] + np.arange(robot.n_joints)
@@ -176,7 +176,7 @@ def docstring_bounds_and_names_are_valid(trial: EffectCase) -> None:
 
 
 def columns_are_finite_and_one_per_parameter(trial: EffectCase) -> None:
-    """Fail if the effect's columns are not finite, or their array shape is not (N, n, P)."""
+    """Fail if the columns of the effect are not finite, or are not of shape (N, n, P)."""
     columns = ArmModel(trial.robot).columns_of(trial.effect, trial.motion)
     assert np.all(np.isfinite(columns)), 'columns are not finite'
 
@@ -220,7 +220,7 @@ def instantaneous_means_sample_by_sample(trial: EffectCase) -> None:
 
 
 def shapes_stay_possible(trial: EffectCase) -> None:
-    """Fail if shape parameters exceed their bounds, by default or at the start of a search."""
+    """Fail if default or start values of shape parameters are outside their bounds."""
     effect, motion = trial.effect, trial.motion
     assert motion.tau is not None
     nothing = np.zeros((*motion.q.shape, 0))
@@ -240,7 +240,7 @@ def effect_can_be_pickled(trial: EffectCase) -> None:
 
 
 def _compare(trial: EffectCase, values: FloatArray, columns: FloatArray) -> None:
-    """Fail if an effect's columns differ from finite differences of the torque."""
+    """Fail if the columns of an effect differ from finite differences of the torque."""
     lower, _ = trial.effect.bounds()
     for parameter, step in enumerate(_STEP * np.eye(len(values))):
         if values[parameter] - _STEP > lower[parameter]:
