@@ -33,7 +33,7 @@ _KEEP_ORDER = ('Ixx', 'Ixy', 'Ixz', 'Iyy', 'Iyz', 'Izz', 'mx', 'my', 'mz', 'm')
 @dataclass(frozen=True)
 class BaseParameters:
     """
-    Identifiable combinations of standard parameters, named by expressions.
+    Identifiable linear combinations of the standard parameters, with expressions as names.
 
     Attributes
     ----------
@@ -60,7 +60,7 @@ class BaseParameters:
 
     @property
     def terms(self) -> tuple[dict[str, float], ...]:
-        """Factors of the standard parameters in each base parameter, by name."""
+        """Factors of the standard parameters in each base parameter, as a mapping from names."""
         symbols = [symbol(parameter) for parameter in self.standard]
         return tuple(
             {symbols[column]: float(row[column]) for column in np.flatnonzero(row)}
@@ -71,7 +71,7 @@ class BaseParameters:
         self, standard: tuple[ParameterName, ...], columns: npt.NDArray[np.intp]
     ) -> BaseParameters:
         """
-        Express the base parameters by a longer list of standard parameters.
+        Express the base parameters in terms of a longer list of standard parameters.
 
         Parameters
         ----------
@@ -92,7 +92,7 @@ class BaseParameters:
 
     def lift(self, beta: npt.ArrayLike, prior: npt.ArrayLike) -> FloatArray:
         """
-        Return standard parameters that have given base parameters, nearest to a prior.
+        Return the standard parameters with base parameters beta that are nearest to a prior.
 
         Parameters
         ----------
@@ -175,7 +175,7 @@ def group_columns(
 
 def regroup(theory: BaseParameters, data: BaseParameters) -> BaseParameters:
     """
-    Combine two groupings of parameters: for any motion, and for the given data.
+    Return the base parameters of a data set, as combinations of all standard parameters.
 
     Parameters
     ----------
@@ -193,7 +193,7 @@ def regroup(theory: BaseParameters, data: BaseParameters) -> BaseParameters:
 def _named(
     standard: tuple[ParameterName, ...], independent: npt.NDArray[np.intp], grouping: FloatArray
 ) -> BaseParameters:
-    """Return base parameters with names, from their grouping matrix without rounding errors."""
+    """Name the base parameters of a grouping matrix (r, P), and remove rounding errors."""
     grouping = np.where(np.abs(grouping) < RANK_TOLERANCE, 0.0, grouping)
     parameters = tuple(
         replace(standard[leader], name=_expression(row, leader, standard))
@@ -204,7 +204,7 @@ def _named(
 
 def levelled(robot: Robot) -> Robot:
     """
-    Return the robot with gravity components that are only rounding errors set to zero.
+    Return the robot with gravity components below 0.2 % of gravity set to zero.
 
     Components of gravity below 0.2 %, across the axes of the first joint, become zero. A hanging
     base with a rounded angle of 3.1416 excites first moments by 7e-6 of their weight, far below
@@ -218,7 +218,7 @@ def levelled(robot: Robot) -> Robot:
 
 
 def symbol(parameter: ParameterName) -> str:
-    """Return a parameter's name, followed by its joint unless the name has a link number."""
+    """Return a parameter's name with link number or joint: 'm2', or 'torque_offset[elbow]'."""
     numbered = parameter.name[-1:].isdigit() or not parameter.joint
     return parameter.name if numbered else f'{parameter.name}[{parameter.joint}]'
 

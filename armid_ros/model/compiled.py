@@ -89,7 +89,7 @@ class BodyOfKernel(Structure):
 
 @cache
 def kernel() -> ctypes.CDLL | None:
-    """Load the compiled kernel; return None without a compiled kernel."""
+    """Load and return the compiled kernel; return None if it is not installed."""
     found = find_spec('armid_ros.model._kernel')
     if found is None or found.origin is None:
         return None
@@ -106,7 +106,7 @@ def kernel_body(
     robot: Robot, added_inertia: FloatArray | None = None, weighs: bool = True
 ) -> BodyOfKernel | None:
     """
-    Convert the rigid body of a robot to the kernel's format; None without kernel.
+    Convert the rigid body of a robot to the format of the compiled kernel, or return None.
 
     Parameters
     ----------

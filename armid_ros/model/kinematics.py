@@ -16,7 +16,7 @@ def points_motion(
     robot: Robot, joints: Sequence[str], offsets: FloatArray, q: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """
-    Return positions and Jacobians of points on links for given joint positions.
+    Return positions and Jacobians of points on links at joint positions q.
 
     Parameters
     ----------
@@ -42,7 +42,7 @@ def points_motion(
 
 @dataclass(frozen=True)
 class _Frame:
-    """Link frame in N samples: rotation (3, 3, N), origin (3, N), and joints that move it."""
+    """Frame of a link in N samples: rotation, origin [m], and the joints that move the link."""
 
     rotation: FloatArray
     origin: FloatArray
@@ -86,7 +86,7 @@ class LinkFrames:
     @classmethod
     def of(cls, robot: Robot, q: FloatArray, joints: Sequence[str] | None = None) -> LinkFrames:
         """
-        Compute the frames of the links that the given joints move.
+        Compute the frames of the links that `joints` move, at joint positions q.
 
         Parameters
         ----------
@@ -151,7 +151,7 @@ class LinkFrames:
 
 
 def _cross(a: FloatArray, b: FloatArray) -> FloatArray:
-    """Return the cross products of the columns of two arrays (3, N)."""
+    """Return the cross products of the columns of two arrays (3, N), shape (3, N)."""
     result = np.empty(b.shape)
     for x, y, z in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
         result[x] = a[y] * b[z] - a[z] * b[y]

@@ -111,7 +111,7 @@ def export_mjcf(
 
 
 def _couplings(root: ElementTree.Element, robot: Robot) -> list[str]:
-    """Add joint couplings and closed loops as constraints; return those MuJoCo cannot model."""
+    """Add joint couplings and loops as constraints; return texts on unsupported couplings."""
     if robot.mechanism is None:
         return []
     tendons = ElementTree.SubElement(root, 'tendon')
@@ -145,7 +145,7 @@ def _couplings(root: ElementTree.Element, robot: Robot) -> list[str]:
 def _shapes(
     robot: Robot, bodies: Mapping[int, ElementTree.Element], assets: ElementTree.Element
 ) -> list[str]:
-    """Add the shapes of links to MJCF bodies; return the meshes that MuJoCo cannot read."""
+    """Add the shapes of links to MJCF bodies; return the names of meshes MuJoCo cannot read."""
     left_out: dict[str, None] = {}
     files: dict[tuple[Path, tuple[float, ...]], str] = {}
     for of in _CLASSES:

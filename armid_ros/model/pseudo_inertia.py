@@ -73,7 +73,7 @@ def link_parameters(matrix: npt.ArrayLike) -> FloatArray:
 @dataclass(frozen=True)
 class Consistency:
     """
-    Quantities of a link that decide whether its inertial parameters are possible.
+    Mass properties of a link that show whether its parameters are physically consistent.
 
     Attributes
     ----------
@@ -99,7 +99,7 @@ class Consistency:
 
     @staticmethod
     def of(link: str, parameters: npt.ArrayLike) -> Consistency:
-        """Compute the quantities from the ten inertial parameters of a link."""
+        """Compute the mass properties from the ten inertial parameters of a link."""
         matrix = pseudo_inertia(parameters)
         mass = float(matrix[3, 3])
         center = moments = np.full(3, np.nan)
@@ -119,7 +119,7 @@ class Consistency:
 
 def require_consistent(links: tuple[str, ...], parameters: npt.ArrayLike) -> None:
     """
-    Raise ModelError if no body can have a link's inertial parameters.
+    Raise ModelError if the inertial parameters of a link are not physically consistent.
 
     Parameters
     ----------

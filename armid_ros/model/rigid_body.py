@@ -30,7 +30,7 @@ LINK_UNITS = ('kg', 'kg m', 'kg m', 'kg m') + ('kg m^2',) * 6
 
 def rigid_parameter_names(robot: Robot) -> tuple[ParameterName, ...]:
     """
-    Return names and units of the ten inertial parameters of each moving joint's body.
+    Return names and units of the ten inertial parameters of each of the m moving bodies.
 
     Returns
     -------
@@ -51,19 +51,19 @@ def link_unit(name: str) -> str:
 
 
 class _Prepared(threading.local):
-    """Cache of each thread, by robot: Pinocchio's work space and the kernel's body."""
+    """Cache per thread and robot: the data object of Pinocchio and the body of the kernel."""
 
     def __init__(self) -> None:
         self.data: WeakKeyDictionary[Robot, pin.Data] = WeakKeyDictionary()
         self.bodies: WeakKeyDictionary[Robot, BodyOfKernel | None] = WeakKeyDictionary()
 
     def data_of(self, robot: Robot) -> pin.Data:
-        """Return Pinocchio's work space for a robot."""
+        """Return the cached data object of Pinocchio for a robot."""
         data = self.data.get(robot)
         return self.data.setdefault(robot, robot.model.createData()) if data is None else data
 
     def body_of(self, robot: Robot) -> BodyOfKernel | None:
-        """Return a robot in the compiled kernel's format; None if there is no kernel."""
+        """Return a robot in the format of the compiled kernel; None if there is no kernel."""
         if robot not in self.bodies:
             self.bodies[robot] = kernel_body(robot)
         return self.bodies[robot]
@@ -105,7 +105,7 @@ def inverse_dynamics_derivatives(
     Returns
     -------
     by_q, by_dq, by_ddq : ndarray, shape (N, n, n)
-        dtau/dq [N m/rad], dtau/ddq, and the inertia matrix [kg m^2].
+        dtau/dq [N m/rad], dtau/d(dq) [N m s/rad], and the inertia matrix [kg m^2].
 
     Notes
     -----
@@ -151,7 +151,7 @@ def _projected(jacobian: FloatArray, torques: FloatArray) -> FloatArray:
 
 
 def _difference(robot: Robot, motion: Motion, name: str) -> FloatArray:
-    """Differentiate joint torques by q or dq with central differences, (N, n, n)."""
+    """Differentiate joint torques by `name`, 'q' or 'dq', with central differences, (N, n, n)."""
     step = 1e-5
     slopes = []
     for shift in step * np.eye(robot.n_joints):
@@ -242,7 +242,7 @@ def gravity_sensitivity(robot: Robot, q: FloatArray) -> FloatArray:
 
 def random_motion(robot: Robot, rng: np.random.Generator, n_samples: int | None = None) -> Motion:
     """
-    Draw random joint states that make every identifiable parameter visible.
+    Draw random joint states in which all base parameters of the robot are identifiable.
 
     Positions are uniform within the limits (one turn without limits), velocities and accelerations
     are normal with a standard deviation of 1 rad/s and 1 rad/s^2 (or m). Temperatures rise from

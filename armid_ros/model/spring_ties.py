@@ -71,7 +71,7 @@ class TieGeometry(NamedTuple):
 
     def pulled(self, slack: float | FloatArray) -> FloatArray:
         """
-        Return the first machine's torques per unit stiffness of each spring, (N, n, S) [m^2].
+        Return torques of the first machine per unit stiffness of each spring, (N, n, S) [m^2].
 
         A spring pulls only if it is longer than its slack [m].
 
@@ -81,7 +81,7 @@ class TieGeometry(NamedTuple):
 
 
 def extension(way: FloatArray, slack: float | FloatArray) -> FloatArray:
-    """Shorten spring vectors (..., 3) by a slack [m]; vectors below the slack become 0."""
+    """Shorten spring vectors (..., 3) by a slack [m]; vectors shorter than the slack become 0."""
     # the direction of a vector shorter than this [m] is undefined
     length = np.maximum(np.linalg.norm(way, axis=-1), 1e-12)
     return np.asarray(np.maximum(1.0 - slack / length, 0.0)[..., np.newaxis] * way)

@@ -33,7 +33,7 @@ def export_urdf(
     robot: Robot, values: Mapping[str, Mapping[str, float]], remarks: Sequence[str] = ()
 ) -> str:
     """
-    Return the URDF of a robot, with its present inertial parameters and given friction.
+    Return the URDF of a robot with its inertial parameters and with joint friction `values`.
 
     Parameters
     ----------
@@ -83,12 +83,12 @@ def export_urdf(
 
 
 def _frame(robot: Robot, link: str) -> pin.Frame:
-    """Return the frame of a link in the model."""
+    """Return the frame of a link in the Pinocchio model of a robot."""
     return robot.model.frames[robot.model.getFrameId(link, pin.FrameType.BODY)]
 
 
 def _attached(robot: Robot) -> FloatArray:
-    """Return the described parameters of the links attached to each child link, (m, 10)."""
+    """Return described inertial parameters of all links fixed to each moving link, (m, 10)."""
     parameters = np.zeros((len(robot.links), PER_LINK))
     for name, inertial in robot.description.links.items():
         frame = _frame(robot, name)
@@ -109,7 +109,7 @@ def _children(parent: minidom.Element, name: str) -> Iterator[minidom.Element]:
 
 
 def _child(parent: minidom.Element, name: str) -> minidom.Element:
-    """Return the first child element with a tag; add an empty one if there is none."""
+    """Return the first child element with tag `name`; add an empty element if there is none."""
     found = next(_children(parent, name), None)
     if found is None:
         document = minidom.Document()
@@ -144,7 +144,7 @@ def _set_inertials(root: minidom.Element, robot: Robot) -> None:
 
 
 def _share(body: FloatArray, attached: FloatArray) -> float:
-    """Return a factor on the inertias of attached links that keeps the child link consistent."""
+    """Return a factor (0 to 1) on inertias of attached links; the child link stays consistent."""
     if not np.any(attached):
         return 1.0
     if not Consistency.of('', attached).eigenvalues[0] > -1e-12:
@@ -168,7 +168,7 @@ def _set_inertial(link: minidom.Element, parameters: FloatArray) -> None:
 
 
 def _check(robot: Robot, urdf: str) -> None:
-    """Raise ModelError if a written URDF has other inertial parameters than the robot."""
+    """Raise ModelError if the inertial parameters of a written URDF differ from the robot's."""
     read = robot_from_urdf(urdf, joints=robot.joints, source=robot.name)
     wanted = robot.rigid_parameters
     worst = np.max(np.abs(read.rigid_parameters - wanted).reshape(-1, PER_LINK), axis=1)
