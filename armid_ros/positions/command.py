@@ -106,7 +106,7 @@ def positions(
 
 
 def gains_of(text: str, robot: Robot) -> FloatArray:
-    """Parse the option --gains; return kp and kd of the n joints, shape (2, n)."""
+    """Parse the option --gains; return kp [N m/rad] and kd [N m s/rad] of n joints, (2, n)."""
     from armid_ros.errors import RobotError
     from armid_ros.files import reading
     from armid_ros.files.regular import read_text
@@ -122,7 +122,7 @@ def gains_of(text: str, robot: Robot) -> FloatArray:
             values = np.array(numbers(text))
     if len(values) not in (2, 2 * robot.n_joints) or np.any(values < 0.0) or not values[0]:
         raise RobotError(
-            f"--gains '{text}' has to be KP,KD, or {robot.n_joints} values of KP and then as many "
-            'of KD; none may be negative'
+            f"--gains '{text}' is not valid; give KP,KD, or {robot.n_joints} values of KP and "
+            f'then {robot.n_joints} of KD, without negative values and with a positive first KP'
         )
     return np.asarray(np.broadcast_to(values.reshape(2, -1), (2, robot.n_joints)))

@@ -60,7 +60,7 @@ def read_commands(
     columns = columns or ColumnSettings()
     if is_table(path):
         if name is None:
-            raise RecordingError(f'{path}: name the commanded positions with --commands')
+            raise RecordingError(f'{path}: name the columns of the commands with --commands')
         columns = replace(columns, position=name, velocity='none', effort='none')
         topic = None
     else:
@@ -80,7 +80,7 @@ def read_commands(
 
 
 def _topic(path: Path, recording: Recording, name: str | None, settings: ReadSettings) -> Topic:
-    """Return the topic of commanded positions in a bag: the named one, or the only candidate."""
+    """Find the topic of commanded positions in a bag: topic `name`, or else the only candidate."""
     with Bag(path, settings) as bag:
         topics = bag.topics()
     if name is None:
@@ -97,13 +97,13 @@ def _topic(path: Path, recording: Recording, name: str | None, settings: ReadSet
     if len(found) != 1:
         raise RecordingError(
             f'{path}: {"several topics" if found else "no topic"} of commanded positions; name a '
-            f'topic of {JOINT_STATE} or {_STATE} with --commands: {listed(topics)}'
+            f'topic of type {JOINT_STATE} or {_STATE} with --commands: {listed(topics)}'
         )
     return found[0]
 
 
 def _controller_state(path: Path, robot: Robot, topic: Topic, settings: ReadSettings) -> Recording:
-    """Read the reference positions in the state messages of a joint_trajectory_controller."""
+    """Read the reference positions from the state messages of a joint_trajectory_controller."""
     source, rows = f'{path}: {topic.name}', []
     with Bag(path, settings) as bag:
         for block in bag.blocks(topic.name):
@@ -113,14 +113,14 @@ def _controller_state(path: Path, robot: Robot, topic: Topic, settings: ReadSett
                 stamp, names = state.header.stamp, list(state.joint_names)
                 missing = sorted(set(robot.joints) - set(names))
                 if missing:
-                    raise RecordingError(f'{source}: messages lack joints {", ".join(missing)}')
+                    raise RecordingError(f'{source}: a message lacks joints {", ".join(missing)}')
                 order = [names.index(joint) for joint in robot.joints]
                 q, dq = (np.array(x) for x in (point.positions, point.velocities))
                 if len(q) == len(names):
                     speed = dq[order] if len(dq) == len(q) else np.zeros(len(order))
                     rows.append((stamp.sec * 10**9 + stamp.nanosec, q[order], speed))
     if not rows:
-        raise RecordingError(f'{source} has no positions; name another topic in --commands')
+        raise RecordingError(f'{source}: no positions; name another topic with --commands')
     stamps, *both = (np.array(column) for column in zip(*rows, strict=True))
     stamps, index = np.unique(stamps, return_index=True)
     sampled = 1e-9 * (stamps - stamps[0])

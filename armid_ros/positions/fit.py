@@ -76,7 +76,7 @@ class PositionFit:
     duration: float
 
     def of(self, name: str, joint: str = '') -> tuple[float, float]:
-        """Return value and standard error of a fitted parameter, by its name and joint."""
+        """Return value and standard error of the fitted parameter with a name and a joint."""
         place = [(one.name, one.joint) for one in self.parameters].index((name, joint))
         return float(self.values[place]), float(self.std[place])
 
@@ -85,7 +85,7 @@ def fit_positions(
     model: LoopModel, runs: Sequence[Run], gains: FloatArray | None = None
 ) -> PositionFit:
     """
-    Fit a simulated position-control loop to recordings.
+    Fit the parameters of a simulated position-control loop to recorded positions.
 
     Parameters
     ----------
@@ -105,7 +105,7 @@ def fit_positions(
     windows = [window for run in runs for window in windows_of(*run)]
     if not windows:
         raise IdentificationError(
-            f'{runs[0][0].source}: no stretch of 4 s has positions and commands without a gap; '
+            f'{runs[0][0].source}: positions and commands overlap by less than 2 s without gaps; '
             'check that both were recorded together, and record longer'
         )
     start, size = start_values(model, runs, gains)
@@ -119,7 +119,7 @@ def start_values(
     model: LoopModel, runs: Sequence[Run], gains: FloatArray | None
 ) -> tuple[FloatArray, FloatArray]:
     """
-    Return start values for the fit of the control loop, and a typical size of each parameter.
+    Return start values and typical sizes of the P parameters for the fit, each of shape (P,).
 
     The torque balance of each joint is linear in gains, rotor inertia and friction. It is solved
     for nonnegative values and several delays. The result has the delay with the smallest
@@ -193,14 +193,14 @@ class _Problem:
         return np.concatenate(simulated) - np.concatenate(measured)
 
     def slopes(self, x: FloatArray, places: npt.NDArray[np.intp]) -> FloatArray:
-        """Return derivatives of simulated positions by k chosen parameters, shape (M, n, k)."""
+        """Return derivatives of simulated positions by the k parameters at `places`, (M, n, k)."""
         share = 1e-3  # step of a parameter, as a share of its size
         now, steps = self.residual(x), share * np.diag(self.size)[places]
         columns = [(self.residual(x + step) - now) / share for step in steps]
         return np.stack(columns, axis=-1)
 
     def solved(self, free: npt.NDArray[np.bool_]) -> FloatArray:
-        """Return the least-squares parameters; each joint is weighted by its inverse residual."""
+        """Fit the `free` parameters, with joints weighted by 1 / rms residual; return all P."""
         x, places = self.start.copy(), np.flatnonzero(free)
         lower, upper = np.zeros(len(x)), np.full(len(x), np.inf)
         lower[0], upper[0] = -0.05, 0.3  # delay [s]; it is negative if the clocks differ
@@ -240,20 +240,20 @@ class _Problem:
 
 
 def _errors(
-    information: FloatArray, scores: FloatArray, some: npt.NDArray[np.intp]
+    information: FloatArray, scores: FloatArray, chosen: npt.NDArray[np.intp]
 ) -> tuple[FloatArray, FloatArray]:
-    """Return covariance and standard errors of chosen parameters, both in scaled units."""
-    inside = information[np.ix_(some, some)] + np.eye(len(some)) / _PRIOR_STD**2
+    """Return covariance and standard errors of the `chosen` parameters, over their sizes."""
+    inside = information[np.ix_(chosen, chosen)] + np.eye(len(chosen)) / _PRIOR_STD**2
     covariance = np.linalg.inv(inside)
     blocks = len(scores)
-    correction = blocks / max(blocks - len(some), 0.2 * blocks)  # degrees of freedom
-    middle = correction * scores[:, some].T @ scores[:, some]
+    correction = blocks / max(blocks - len(chosen), 0.2 * blocks)  # degrees of freedom
+    middle = correction * scores[:, chosen].T @ scores[:, chosen]
     robust = np.diag(covariance @ middle @ covariance)
     return np.asarray(covariance), np.sqrt(np.maximum(np.diag(covariance), robust))
 
 
 def _fit_at(problem: _Problem, x: FloatArray, free: npt.NDArray[np.bool_]) -> PositionFit:
-    """Return the fit with parameters x, their standard errors, and why errors are missing."""
+    """Return the result for fitted parameters x: standard errors, residuals, gain ratios."""
     model, n, count = problem.model, problem.model.robot.n_joints, len(x)
     residuals = problem.residual(x)
     sigma = np.sqrt(np.mean(residuals**2, axis=0)) + 1e-9

@@ -37,7 +37,7 @@ _COMMAND_HOLD = 0.5
 @dataclass(frozen=True, eq=False)
 class CommandedMotion:
     """
-    Commanded motion of a recording; the drive holds each command until the next one.
+    Commanded positions and velocities; the drive applies each command until the next command.
 
     Attributes
     ----------
@@ -54,13 +54,13 @@ class CommandedMotion:
 
     @classmethod
     def of(cls, commanded: Recording, recording: Recording) -> CommandedMotion:
-        """Return the commanded motion on the time base of a recording of measured positions."""
+        """Convert recorded commands to a commanded motion in the time base of `recording`."""
         t = commanded.t + 1e-9 * (commanded.start_ns - recording.start_ns)
         dq = np.zeros_like(commanded.q) if commanded.dq is None else commanded.dq
         return cls(t, commanded.q, dq)
 
     def mean(self, edges: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return mean commanded position and velocity in each time interval, shape (K - 1, n)."""
+        """Return mean commanded position and velocity between K times `edges`, each (K - 1, n)."""
         ends = min(self.t[0], edges[0]) - 1.0, max(self.t[-1], edges[-1]) + 1.0
         t = np.concatenate([ends[:1], self.t, ends[1:]])
         values = np.hstack([self.q, self.dq])
@@ -74,7 +74,7 @@ class CommandedMotion:
 @dataclass(frozen=True, eq=False)
 class Window:
     """
-    Section of a recording that is simulated, starting from a measured state.
+    Time window of a recording, with the measured state in which the simulation starts.
 
     Attributes
     ----------
@@ -99,7 +99,7 @@ class Window:
 
 
 def windows_of(recording: Recording, commands: CommandedMotion) -> Iterator[Window]:
-    """Yield sections of about 5 s in which positions and commands are recorded without gaps."""
+    """Yield windows of about 5 s in which positions and commands are recorded without gaps."""
     t = recording.t
     length, lead = 5.0, 0.5  # of a window, and of the time before it to forget the start state [s]
     around = 0.03  # half of the time over which a parabola gives the start state [s]
@@ -126,7 +126,7 @@ def windows_of(recording: Recording, commands: CommandedMotion) -> Iterator[Wind
 @dataclass(frozen=True, eq=False)
 class LoopModel:
     """
-    Model of a position-controlled robot: its drives and its tool depend on P parameters.
+    Model of a position-controlled robot with P parameters of its controller, drives and tool.
 
     Attributes
     ----------
@@ -142,13 +142,13 @@ class LoopModel:
 
     @cached_property
     def bare(self) -> ArmModel:
-        """Return the arm of the robot description, with the effects to fit at zero."""
+        """Return the arm model of the robot description, with the fitted effects at zero."""
         names = 'rotor_inertia', 'viscous_friction', 'coulomb_friction', 'payload'
         return ArmModel.of(self.robot, effects=names)
 
     @cached_property
     def parameters(self) -> tuple[ParameterName, ...]:
-        """Return names and units of the P parameters: delay, gains, effects, payload centre."""
+        """Return names and units of the P parameters: delay, gains, effects, payload."""
         robot = self.robot
         units = list(zip(robot.torque_units, robot.position_units, strict=True))
         gains = [
@@ -176,7 +176,7 @@ class LoopModel:
         self, x: FloatArray, recording: Recording, commands: CommandedMotion
     ) -> Recording:
         """
-        Return a recording with the torques that the position controller computes from commands.
+        Return a recording with the torques that the position controller computes.
 
         Parameters
         ----------
@@ -202,7 +202,7 @@ class LoopModel:
 
     def simulated(self, x: FloatArray, windows: Sequence[Window]) -> list[FloatArray]:
         """
-        Simulate each window with parameters x, shape (P,); return its positions.
+        Simulate each window with parameters x, shape (P,); return the simulated positions.
 
         Returns
         -------

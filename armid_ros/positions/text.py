@@ -26,7 +26,7 @@ _COLUMNS = {
 
 
 def limit_hints(runs: Sequence[Run], torques: Sequence[Recording], robot: Robot) -> list[str]:
-    """Return hints on joints with commands beyond position limits, or with torques at limits."""
+    """Return a hint for each joint with commands beyond position limits or torques at limits."""
     commands = np.concatenate([commands.q for _, commands in runs])
     torque = np.concatenate([one.tau for one in torques if one.tau is not None])
     beyond = np.mean((commands < robot.lower) | (commands > robot.upper), axis=0)
@@ -43,7 +43,7 @@ def limit_hints(runs: Sequence[Run], torques: Sequence[Recording], robot: Robot)
 
 
 def fit_document(found: PositionFit, hints: Sequence[str] = ()) -> dict[str, Any]:
-    """Return the content of the file positions.json: a fit and the hints of `limit_hints`."""
+    """Return the JSON document of a fit, the content of positions.json."""
     poor = bool(np.any(found.residual > 0.3 * found.tracking))
     std = [float(one) if np.isfinite(one) else None for one in found.std]
     values = zip(found.parameters, found.values.tolist(), std, found.reasons, strict=True)
@@ -83,7 +83,7 @@ def fit_document(found: PositionFit, hints: Sequence[str] = ()) -> dict[str, Any
 
 
 def _reasons(found: PositionFit) -> dict[str, list[str]]:
-    """Return reasons why values are not determined, with their names."""
+    """Return undetermined parameters as a mapping from reasons to parameter names."""
     mass, std = found.of('payload_m', found.arm.robot.joints[-1])
     absent, reasons = mass < 1.96 * std, dict[str, list[str]]()
     for one, reason in zip(found.parameters, found.reasons, strict=True):
