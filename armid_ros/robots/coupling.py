@@ -20,7 +20,7 @@ import pinocchio as pin
 
 def moving_joints(description: Description, driven: Sequence[str]) -> tuple[str, ...]:
     """
-    Return the joints that move a body when the given joints are driven, in file order.
+    Return the joints that move a link if the joints `driven` are driven, in file order.
 
     A driven joint that others follow is a motor without a body if neither its link nor the links
     that it carries have inertia.
@@ -46,7 +46,7 @@ def moving_joints(description: Description, driven: Sequence[str]) -> tuple[str,
 
 def couple(tree: Robot, driven: Sequence[Joint], known: Mapping[str, float]) -> Robot:
     """
-    Return the robot with only the given joints driven; its other moving joints follow them.
+    Return the robot with only the joints `driven` driven; other moving joints follow them.
 
     Parameters
     ----------
@@ -201,7 +201,7 @@ def _closing_range(
     else:
         raise RobotError(
             'a closed loop of the description does not close with its driven joints near zero, or '
-            'only with passive joints beyond their limits; correct its points or these limits'
+            'only with passive joints beyond their limits; correct the points or these limits'
         )
     ends[:, own] = (start + share / 1.1 * (ends - start))[:, own]
     within = [np.maximum(lower, ends[0]), np.minimum(upper, ends[1])]

@@ -28,7 +28,7 @@ INERTIA = ('ixx', 'ixy', 'ixz', 'iyy', 'iyz', 'izz')
 
 
 def text_of(numbers: npt.ArrayLike) -> str:
-    """Return one or several numbers as the value of an XML attribute, with all digits."""
+    """Format one or several numbers as the value of an XML attribute, with all digits."""
     return ' '.join(repr(float(number)) for number in np.ravel(numbers))
 
 
@@ -54,7 +54,7 @@ class Inertial:
         return np.array([[ixx, ixy, ixz], [ixy, iyy, iyz], [ixz, iyz, izz]])
 
     def doubt(self) -> str | None:
-        """Return the reason why no body can have this inertia; None if the inertia is possible."""
+        """Return why this inertia is physically impossible; None if the inertia is possible."""
         moments = np.linalg.eigvalsh(self.tensor)
         # descriptions have six digits; moments below 1e-12 kg m^2 are negligible
         tolerance = max(1e-6 * float(np.abs(moments).max()), 1e-12)
@@ -79,13 +79,13 @@ class Mimic:
 
     @property
     def joint(self) -> str:
-        """Name of the leader; of several leaders, the first."""
+        """Name of the leader, or of the first of several leaders."""
         return next(iter(self.multipliers))
 
 
 @dataclass(frozen=True)
 class Loop:
-    """Closed kinematic loop: points of two links [m] that coincide, and its passive joints."""
+    """Closed kinematic loop: coincident points of two links [m], and the passive joints."""
 
     links: tuple[str, str]
     points: tuple[Vector, Vector]
@@ -138,13 +138,13 @@ class Description:
         return tuple(joint for joint in self.joints if joint.kind in MOVABLE)
 
     def inertia_doubts(self) -> tuple[str, ...]:
-        """Return a line of text for each link whose inertia no body can have."""
+        """Return a line of text for each link with a physically impossible inertia."""
         doubts = {link: inertial.doubt() for link, inertial in self.links.items() if inertial}
         return tuple(f"link '{link}': {doubt}" for link, doubt in doubts.items() if doubt)
 
     @cached_property
     def by_name(self) -> Mapping[str, Joint]:
-        """Mapping from names to joints."""
+        """Joints of the URDF, by name."""
         return {joint.name: joint for joint in self.joints}
 
 
@@ -156,7 +156,7 @@ def parse_xml(text: str) -> ElementTree.Element:
 
     """
     if len(text) > TEXT_LIMIT:
-        raise RobotError(f'the URDF has {len(text)} characters; at most {TEXT_LIMIT} are read')
+        raise RobotError(f'the URDF has {len(text)} characters; the maximum is {TEXT_LIMIT}')
     builder, parser = ElementTree.TreeBuilder(), expat.ParserCreate()
     parser.StartElementHandler, parser.EndElementHandler = builder.start, builder.end
     parser.CharacterDataHandler = builder.data
@@ -238,7 +238,7 @@ def _loop(element: ElementTree.Element, links: Iterable[str], joints: Mapping[st
 
 
 def _mimic(element: ElementTree.Element, where: str, known: Mimic | None) -> Mimic:
-    """Return a joint's mimic relation after the leader in a <mimic> element is added."""
+    """Add the leader in a <mimic> element to the mimic relation `known` of a joint."""
     joint = element.get('joint', '')
     before = {} if known is None else dict(known.multipliers)
     before[joint] = before.get(joint, 0.0) + _number(element, 'multiplier', where, 1.0)
@@ -247,7 +247,7 @@ def _mimic(element: ElementTree.Element, where: str, known: Mimic | None) -> Mim
 
 
 def _check_tree(links: Iterable[str], joints: Iterable[Joint]) -> None:
-    """Raise a RobotError unless the joints connect all links to a single base link."""
+    """Raise RobotError if links and joints do not form a tree with a single base link."""
     carriers: dict[str, Joint] = {}  # joint above each link
     for joint in joints:
         for role, link in (('parent', joint.parent), ('child', joint.child)):
@@ -288,7 +288,7 @@ def _name(element: ElementTree.Element, taken: Iterable[str]) -> str:
     if not name:
         raise RobotError(f'a <{element.tag}> of the URDF has no name; add name="..."')
     if name in taken:
-        raise RobotError(f"two {element.tag}s are named '{name}'")
+        raise RobotError(f"two {element.tag}s are named '{name}'; rename one")
     return name
 
 
@@ -322,7 +322,7 @@ def _joint(element: ElementTree.Element, name: str, notes: list[str]) -> Joint:
     joint = f"joint '{name}'"
     kind = element.get('type', '')
     if kind not in JOINT_TYPES:
-        raise RobotError(f"{joint} has the type '{kind}'; types are {', '.join(JOINT_TYPES)}")
+        raise RobotError(f"{joint} has the type '{kind}', not {', '.join(JOINT_TYPES)}")
     if kind in ('floating', 'planar'):
         raise RobotError(
             f"{joint} is {kind}, but an arm needs a fixed base: set type='fixed' in this joint, "
@@ -334,7 +334,7 @@ def _joint(element: ElementTree.Element, name: str, notes: list[str]) -> Joint:
     length = math.hypot(x, y, z)
     if length < 1e-100:  # a zero vector cannot be normalised
         if kind in MOVABLE:
-            raise RobotError(f'{joint}: its <axis> is a zero vector; give it a direction')
+            raise RobotError(f'{joint}: its <axis> is a zero vector; correct the axis')
         x, y, z, length = 1.0, 0.0, 0.0, 1.0
     lower, upper, velocity, effort = _limits(element, kind, joint, notes)
     mimic, followed = None, element.find('mimic')
@@ -407,7 +407,7 @@ def _origin(element: ElementTree.Element, where: str) -> tuple[Vector, Vector]:
 
 
 def _vector(element: ElementTree.Element, name: str, where: str) -> Vector:
-    """Read three numbers from an XML attribute; zeros if it is missing."""
+    """Read three numbers from an XML attribute; zeros if the attribute is missing."""
     text = element.get(name, '0 0 0')
     attribute = f"{where}: {name}='{text}' of <{element.tag}>"
     try:
@@ -429,7 +429,7 @@ def _number(
     *,
     endless: bool = False,
 ) -> float:
-    """Read a number from an XML attribute; it may be infinite only if `endless` is True."""
+    """Read a number from an XML attribute; infinite numbers need `endless`."""
     text = element.get(name, '' if default is None else repr(default))
     attribute = f"{where}: {name}='{text}' of <{element.tag}>"
     try:

@@ -168,7 +168,7 @@ def collision_geometry(
 
 def sticks(model: pin.Model) -> list[tuple[int, FloatArray]]:
     """
-    Return a stick figure of a robot: lines with joint index and end in the joint's frame [m].
+    Return the lines of a stick figure: joint index, and end point in the joint frame [m].
 
     A line ends at the next joint; the line of the last body ends beyond its centre of mass.
     Index 0 is the base.
@@ -186,14 +186,14 @@ def sticks(model: pin.Model) -> list[tuple[int, FloatArray]]:
 
 
 def combined_mesh_note(notes: Sequence[str]) -> tuple[str, ...]:
-    """Replace several notes on missing meshes by one note with their number."""
+    """Replace several notes on missing meshes by one note with the number of meshes."""
     if len(notes) < 2:
         return tuple(notes)
     return (f'{len(notes)} meshes not found, such as that of {notes[0]}',)
 
 
 def _bodies(shape: LinkShape, meshes: _Meshes) -> tuple[coal.CollisionGeometry, ...]:
-    """Return the coal bodies that form a shape."""
+    """Return the collision bodies of a shape; bodies of meshes are cached in `meshes`."""
     if shape.kind != 'mesh':
         return (_BODIES[shape.kind](*shape.size),)
     if shape.path is None:
@@ -312,7 +312,7 @@ def collision_model(
 
 
 def _leave_out_touching(robot: Robot, geometry: pin.GeometryModel) -> tuple[tuple[str, str], ...]:
-    """Remove pairs of links that touch in the zero pose; return these pairs sorted."""
+    """Remove collision pairs of links that touch in the zero pose; return these links sorted."""
     data, placed = robot.model.createData(), geometry.createData()
     pin.computeDistances(robot.model, data, geometry, placed, robot.positions(robot.zero_pose))
     touching = {
@@ -327,7 +327,7 @@ def _leave_out_touching(robot: Robot, geometry: pin.GeometryModel) -> tuple[tupl
 
 
 def _leave_out_separate(robot: Robot, geometry: pin.GeometryModel) -> None:
-    """Remove pairs of bodies on both sides of one joint that cannot touch in its range."""
+    """Remove pairs of bodies next to a joint that cannot touch in the range of this joint."""
     robot = robot.tree
     data, placed = robot.model.createData(), geometry.createData()
     by_joint: dict[int, list[int]] = {}

@@ -141,15 +141,13 @@ def load_robot(
         guess = '; write arguments as NAME:=VALUE' if '.xacro ' in str(source) else ''
         guess = guess or meant(str(source), shipped_robots())
         raise RobotError(
-            f'{source}: neither a file nor a shipped robot{guess}; shipped are '
+            f'{source}: neither a file nor a shipped robot{guess}; shipped robots: '
             f'{", ".join(shipped_robots())}'
         )
     if path.is_dir():
         inside = path / 'model.yaml'
         file = inside if inside.is_file() else 'the URDF, xacro or MJCF file of the robot'
-        raise RobotError(
-            f'{source} is a folder; name {file} as the robot, which comes before the recordings'
-        )
+        raise RobotError(f'{source} is a folder, not a robot; give {file}, before the recordings')
     text = read_text(path, RobotError)
     notes: tuple[str, ...] = ()
     if is_mjcf(text) and not arguments:
@@ -174,7 +172,7 @@ def robot_from_urdf(
     path: Path | None = None,
 ) -> Robot:
     """
-    Return the robot that the text of a URDF describes; see `load_robot`.
+    Create a robot from the text of a URDF; see `load_robot`.
 
     Parameters
     ----------
@@ -258,7 +256,7 @@ def _split_arguments(source: str | Path) -> tuple[str | Path, dict[str, str], di
 
 def described_at(robot: Robot, positions: Mapping[str, float]) -> Robot:
     """
-    Return the robot of the same description, with given positions of its undriven joints.
+    Return the described robot with its undriven joints locked at given positions.
 
     Parameters
     ----------
@@ -334,7 +332,7 @@ def _kinematic_urdf(description: Description, positions: Mapping[str, float]) ->
 
 def read_mounting(robot: Robot) -> tuple[float | None, Path] | None:
     """
-    Read the floor height from NAME.mounting.yaml beside a description; None if there is none.
+    Read the floor height from NAME.mounting.yaml next to a description; None without file.
 
     Returns
     -------
@@ -360,7 +358,7 @@ def read_mounting(robot: Robot) -> tuple[float | None, Path] | None:
     if floor == 'none':
         return None, path
     if isinstance(floor, bool) or not isinstance(floor, int | float) or not math.isfinite(floor):
-        raise RobotError(f'{path}: it has to contain floor: HEIGHT [m], or floor: none')
+        raise RobotError(f'{path}: no valid floor; write floor: HEIGHT [m], or floor: none')
     return float(floor), path
 
 
@@ -373,7 +371,7 @@ def _with_mechanism(text: str, path: Path) -> str:
     with reading(path, RobotError):
         document = load_yaml(read_text(path, RobotError))
         if not isinstance(document, dict) or document.keys() - {'mimic', 'motors', 'loops'}:
-            raise RobotError('the content has to be a mapping with the keys mimic, motors, loops')
+            raise RobotError('the content has to be a mapping with keys mimic, motors or loops')
         try:
             lines = _elements(document, text)
         except (AttributeError, KeyError, TypeError) as error:

@@ -92,7 +92,7 @@ class Mechanism:
 
     def at(self, u: FloatArray, du: FloatArray | None = None) -> Configuration:
         """
-        Return positions and Jacobian of the moving joints, given the driven joints in one state.
+        Return positions and Jacobian of the moving joints for one state of the driven joints.
 
         Parameters
         ----------
@@ -188,7 +188,7 @@ class Mechanism:
         return np.asarray(-closing @ np.concatenate(apart))
 
     def _gap(self, data: pin.Data, q: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return vectors between both points of each loop, (3 L,) [m], and their Jacobian."""
+        """Return vectors between the two points of each loop, (3 L,) [m], and their Jacobian."""
         pin.computeJointJacobians(self.model, data, q)
         pin.updateFramePlacements(self.model, data)
         world, gaps, slopes = pin.LOCAL_WORLD_ALIGNED, [], []
@@ -200,7 +200,7 @@ class Mechanism:
 
 
 class _Scratch(threading.local):
-    """Work space of each thread: Pinocchio data, last solution, solved motions, by mechanism."""
+    """Cache per thread and mechanism: Pinocchio data, last solution and solved motions."""
 
     def __init__(self) -> None:
         self._of: WeakKeyDictionary[Mechanism, list[Any]] = WeakKeyDictionary()

@@ -50,7 +50,7 @@ def find_mesh(name: str, urdf: Path | None) -> Path | None:
 
 
 def load_mesh(path: Path, scale: FloatArray) -> Any:
-    """Load a mesh file as a scaled coal object; RobotError if it is not a mesh."""
+    """Load a mesh file as a scaled mesh of coal; RobotError if the file is not a mesh."""
     try:
         return coal.MeshLoader().load(str(path), scale)
     except (RuntimeError, ValueError) as error:

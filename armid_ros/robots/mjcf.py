@@ -37,7 +37,7 @@ def is_mjcf(text: str) -> bool:
 
 def urdf_of_mjcf(path: Path) -> tuple[str, tuple[str, ...]]:
     """
-    Convert the arm in an MJCF file to URDF; return the URDF, and notes.
+    Convert the arm in an MJCF file to URDF; return the URDF, and notes on omitted parts.
 
     Parameters
     ----------
@@ -110,7 +110,7 @@ class _Writer:
         self.joints = _names('joint', [model.joint(k).name for k in range(model.njnt)])
 
     def urdf(self) -> ElementTree.Element:
-        """Return the root element of a URDF with all bodies but floating ones."""
+        """Return the root element of a URDF with all bodies that do not float."""
         model, afloat, anchors = self.model, set[int](), {0: np.zeros(3)}
         ElementTree.SubElement(self.root, 'link', name=self.bodies[0])
         self._shapes(self.root[-1], 0, anchors[0])
@@ -154,7 +154,7 @@ class _Writer:
     def _link(
         self, body: int, parent: int, joints: list[int], parent_anchor: FloatArray
     ) -> FloatArray:
-        """Write a MuJoCo body and its joints; return the link's origin in the body frame [m]."""
+        """Write a MuJoCo body and its joints; return the link origin in the body frame [m]."""
         model, name = self.model, self.bodies[body]
         placement = pin.SE3(_rotation(model.body_quat[body]), np.array(model.body_pos[body]))
         placement.translation = placement.translation - parent_anchor
@@ -334,7 +334,7 @@ class _Writer:
 
 
 def _names(kind: str, given: list[str]) -> list[str]:
-    """Return the names of bodies or joints; one without a name is given its kind and number."""
+    """Return the names of bodies or joints; an empty name becomes kind and number, 'body_3'."""
     return [one or _unused(f'{kind}_{number}', given) for number, one in enumerate(given)]
 
 

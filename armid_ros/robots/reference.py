@@ -60,7 +60,7 @@ class Reference:
         ]
         freeze(self, *names)
         if self.t.ndim != 1 or not len(self.t):
-            raise TrajectoryError('trajectory: it has no waypoints')
+            raise TrajectoryError('trajectory: there are no waypoints')
         if len(set(self.joints)) != len(self.joints):
             raise TrajectoryError(f'trajectory: a joint is named twice: {", ".join(self.joints)}')
         expected = (len(self.t), len(self.joints))
@@ -80,17 +80,17 @@ class Reference:
                 )
         if not self.t[0] >= 0.0:
             raise TrajectoryError(
-                f'trajectory: its first waypoint is at {self.t[0]} s, but time begins at 0'
+                f'trajectory: the first waypoint is at {self.t[0]} s; times have to be >= 0'
             )
         late = np.flatnonzero(~((np.diff(self.t) > 0.0) & np.isfinite(self.t[1:])))
         if len(late):
             point = int(late[0]) + 1
             raise TrajectoryError(
                 f'trajectory: time_from_start has to increase, but point {point} is at '
-                f'{self.t[point]} s and the one before it at {self.t[point - 1]} s'
+                f'{self.t[point]} s and the previous point at {self.t[point - 1]} s'
             )
         if self.ddq is not None and self.dq is None:
-            raise TrajectoryError('trajectory: it has accelerations but no velocities')
+            raise TrajectoryError('trajectory: accelerations need velocities, which are missing')
         if len(self.t) > 1:
             position = _curve(self.t, self.q, self.dq, self.ddq)
             curves = (position, position.derivative(), position.derivative(2))
@@ -108,7 +108,7 @@ class Reference:
 
     def sample(self, t: FloatArray) -> Motion:
         """
-        Return the motion on the smooth curve through the waypoints at given times.
+        Return the motion at times t on the smooth curve through the waypoints.
 
         Parameters
         ----------
@@ -161,13 +161,13 @@ class Reference:
         return self if self.joints == robot.joints else self.of_joints(robot.joints)
 
     def of_joints(self, joints: tuple[str, ...]) -> Reference:
-        """Return the reference of only the named joints, in the given order."""
+        """Return the reference of only the joints `joints`, in this order."""
         order = [self.joints.index(joint) for joint in joints]
         return self._waypoints(joints, self.t, (slice(None), order))
 
     def remaining(self, late: float) -> Reference:
         """
-        Return the part of the reference that remains if its start was `late` seconds ago.
+        Return the remaining part of a reference that was started `late` seconds ago.
 
         Waypoints of the first 2 * late seconds are left out, so the arm has time to reach the
         reference. If no waypoint remains, the whole reference is returned.
@@ -191,7 +191,7 @@ class Reference:
 
     def after(self, q: FloatArray, dq: FloatArray, ddq: FloatArray) -> Reference:
         """
-        Return the reference with the arm's present state inserted as waypoint at time zero.
+        Return the reference with the present state of the arm as first waypoint, at time zero.
 
         The time of the first point has to be later than zero.
 
@@ -207,7 +207,7 @@ class Reference:
 
     def require_limits(self, robot: Robot, dt: float) -> None:
         """
-        Raise an error if the interpolated motion exceeds position or velocity limits.
+        Raise TrajectoryError if the interpolated motion exceeds position or velocity limits.
 
         Parameters
         ----------

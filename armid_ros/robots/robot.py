@@ -133,17 +133,17 @@ class Robot:
 
     @property
     def moving(self) -> tuple[str, ...]:
-        """Joints that move a body: the driven joints and those coupled to them."""
+        """Joints that move a body: driven joints, and joints coupled to driven joints."""
         return self.joints if self.mechanism is None else self.mechanism.joints
 
     @property
     def all_joints(self) -> tuple[str, ...]:
-        """Moving joints, and motors that move no body of their own."""
+        """Moving joints, and driven joints (motors) without a body of their own."""
         return tuple(dict.fromkeys([*self.moving, *self.joints]))
 
     @property
     def tip(self) -> str:
-        """Last moving joint of the arm; with coupled joints, the one farthest from the base."""
+        """Last moving joint of the arm; with coupled joints, the joint farthest from the base."""
         if self.mechanism is None:
             return self.joints[-1]
         lengths = [np.linalg.norm(place.translation) for place in self.model.jointPlacements]
@@ -159,7 +159,7 @@ class Robot:
         return bool(own.prismatic[own.index(joint)])
 
     def body_of(self, joint: str) -> int:
-        """Return the index of the body that a joint moves; for a motor, of its last body."""
+        """Return the index of the body that a joint moves; for a motor, of the last moved body."""
         if self.mechanism is None or joint in self.moving:
             return self.moving.index(joint)
         return int(np.flatnonzero(self.mechanism.driven[:, self.index(joint)])[-1])
@@ -173,7 +173,7 @@ class Robot:
         return replace(self, **joint_fields(own), mechanism=None)
 
     def positions(self, q: FloatArray) -> FloatArray:
-        """Convert positions of driven joints (..., n) to those of all moving joints (..., m)."""
+        """Convert positions of driven joints (..., n) to positions of moving joints (..., m)."""
         if self.mechanism is None:
             return q
         rows = self.mechanism.states(q.reshape(-1, self.n_joints)).q
@@ -367,7 +367,7 @@ class JointGeometry:
 
     @classmethod
     def of(cls, model: pin.Model, number: int) -> JointGeometry:
-        """Return the geometry of a joint of a Pinocchio model, by its number from 0."""
+        """Return the geometry of joint `number` (from 0) of a Pinocchio model."""
         joint, placement = model.joints[number + 1], model.jointPlacements[number + 1]
         data = joint.createData()
         joint.calc(data, np.zeros(joint.nq))

@@ -41,7 +41,7 @@ class HeldJoint:
 
 def driven_joints(description: Description, names: Sequence[str] | None) -> tuple[Joint, ...]:
     """
-    Return the joints to drive: the named ones, or all but those of a gripper.
+    Return the driven joints: the joints `names`, or by default all but gripper joints.
 
     A joint that mimics others, or that a loop moves, is never driven. By default, a joint of a
     gripper is not driven either: this is a joint with a single mimic joint, or with finger,
@@ -71,19 +71,19 @@ def driven_joints(description: Description, names: Sequence[str] | None) -> tupl
     else:
         chosen = _by_name(description, names)
     if not chosen:
-        raise RobotError('no joint can be driven; a robot needs at least one')
+        raise RobotError('no joint of the robot can be driven; at least one is needed')
     # Pinocchio keeps tensors of the joints cubed, 1 GB for 250; a humanoid with both hands has 70
     most = 150
     if len(chosen) > most:
         raise RobotError(
             f'{len(chosen)} joints are driven; at most {most} can be '
-            'identified together: name those of one arm with --joints'
+            'identified together; name the joints of one arm with --joints'
         )
     return chosen
 
 
 def several_arms(description: Description, driven: Sequence[str]) -> tuple[str, ...]:
-    """Return a note that lists the arms if the driven joints belong to more than one."""
+    """Return a note that lists the arms if the driven joints belong to several arms."""
     arms = _arms(description, driven)
     if len(arms) < 2:
         return ()
@@ -92,7 +92,7 @@ def several_arms(description: Description, driven: Sequence[str]) -> tuple[str, 
 
 
 def _arms(description: Description, joints: Sequence[str]) -> list[list[str]]:
-    """Return the arms of a robot: chains of at least three joints from the last fork to a tip."""
+    """Return the joint names of each arm: a chain of >= 3 joints from the last fork to a tip."""
     carriers = {name: _carriers(description, [name]) for name in joints}
     kept = list(joints)
     while kept:
@@ -137,7 +137,7 @@ def joints_beside_arms(robot: Robot) -> tuple[str, ...]:
 def load_arms(
     load: Callable[[Sequence[str] | None], Robot], joints: Sequence[str] | None
 ) -> tuple[Robot, tuple[str, ...]]:
-    """Load a robot with only the joints of its arms driven; also return the other joints."""
+    """Load a robot with only the joints of its arms driven; also return the omitted joints."""
     robot = load(joints)
     others = () if joints else joints_beside_arms(robot)
     if others:
@@ -163,7 +163,7 @@ def held_joints(robot: Robot) -> tuple[HeldJoint, ...]:
 
 
 def standing_position(description: Description, joint: Joint, known: Mapping[str, float]) -> float:
-    """Return the position of a locked joint: the given one, or nearest to zero [rad or m]."""
+    """Return the position of a locked joint [rad or m]: from `known`, or nearest to zero."""
     factors, position = leaders(description, joint, known)
     for name, factor in factors.items():
         leader = description.by_name[name]
@@ -175,7 +175,7 @@ def leaders(
     description: Description, joint: Joint, stop: Collection[str], above: tuple[str, ...] = ()
 ) -> tuple[dict[str, float], float]:
     """
-    Express a mimic joint's position as weighted sum of independent joints plus offset.
+    Express the position of a mimic joint as weighted sum of independent joints plus offset.
 
     Parameters
     ----------
@@ -235,12 +235,10 @@ def _by_name(description: Description, names: Sequence[str]) -> tuple[Joint, ...
         if known[name].kind not in MOVABLE:
             raise RobotError(f"joint '{name}' is fixed; joints to drive: {free}")
         if known[name].mimic:
-            raise RobotError(
-                f"joint '{name}' mimics another one and cannot be driven; joints to drive: {free}"
-            )
+            raise RobotError(f"joint '{name}' is a mimic joint; joints to drive: {free}")
         if name in description.passive:
             raise RobotError(
-                f"joint '{name}' is passive, in a closed loop; joints to drive: {free}"
+                f"joint '{name}' is a passive joint of a closed loop; joints to drive: {free}"
             )
         if name in named:
             raise RobotError(f"joint '{name}' is named twice among the driven joints")
@@ -249,7 +247,7 @@ def _by_name(description: Description, names: Sequence[str]) -> tuple[Joint, ...
 
 
 def _carriers(description: Description, joints: Iterable[str]) -> set[str]:
-    """Return all joints between the base and the given joints."""
+    """Return the names of all joints between the base and the joints `joints`."""
     by_child = {joint.child: joint for joint in description.joints}
     found: set[str] = set()
     for joint in joints:

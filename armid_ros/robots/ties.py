@@ -80,7 +80,7 @@ def leg_ties(exo: Robot, human: Robot, segments: Sequence[str] = SEGMENTS) -> tu
     """
     unknown = [segment for segment in segments if segment not in SEGMENTS]
     if unknown:
-        raise ModelError(f"there is no segment '{unknown[0]}'; segments are {', '.join(SEGMENTS)}")
+        raise ModelError(f"unknown segment '{unknown[0]}'; segments are {', '.join(SEGMENTS)}")
     joints = [_MOVED_BY[SEGMENTS.index(segment)] for segment in segments]
     ties = centroid_ties(exo, human, [(f'exo_{j}', f'human_{j}') for j in joints])
     return tuple(replace(tie, name=s) for tie, s in zip(ties, segments, strict=True))

@@ -172,7 +172,7 @@ def two_link_set(name: str) -> TwoLinkSet:
     with reading(path, RobotError):
         content = load_yaml(text)
         if name not in content['sets']:
-            raise RobotError(f"there is no set '{name}'; sets are {', '.join(content['sets'])}")
+            raise RobotError(f"unknown parameter set '{name}'; use {', '.join(content['sets'])}")
         assumed = {key: entry['value'] for key, entry in content['assumptions'].items()}
         parameters = TwoLinkParameters(**content['sets'][name], **content['drive'])
     return TwoLinkSet(parameters, MappingProxyType(assumed))

@@ -165,7 +165,7 @@ def main() -> None:
 
 
 class _Arguments(dict[str, str]):
-    """Arguments of a xacro file, and all argument names that it declares or uses."""
+    """Arguments of a xacro file, and all argument names that the file declares or uses."""
 
     def __init__(self, given: Mapping[str, str]) -> None:
         super().__init__(given)
@@ -264,7 +264,7 @@ def _reason(error: Exception, request: dict[str, Any], missing: dict[str, str]) 
     if missing:
         lines = '; '.join(f"package '{name}' ({file})" for name, file in missing.items())
         first = next(iter(missing))
-        return f'not found: {lines}; clone or install it, or add --package {first}=FOLDER ({text})'
+        return f'not found: {lines}; clone or install, or add --package {first}=FOLDER ({text})'
     return text if place == path else f'{place}: {text}'
 
 

@@ -164,7 +164,7 @@ class TestDrivenJoints:
         arm = robot_from_urdf(robot(ARM, linked, wrist))
         assert arm.joints == ('shoulder', 'wrist')
         assert arm.moving == ('shoulder', 'elbow', 'wrist')
-        with pytest.raises(RobotError, match="'elbow' mimics"):
+        with pytest.raises(RobotError, match="'elbow' is a mimic joint"):
             robot_from_urdf(robot(ARM, linked, wrist), joints=['elbow'])
 
     @pytest.mark.parametrize(
