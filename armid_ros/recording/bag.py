@@ -81,7 +81,7 @@ class Bag(Source):
 
     @property
     def damage(self) -> str:
-        """Return a description of the damage found so far; empty if none was found."""
+        """Description of the damage that was found so far; empty without damage."""
         problems = (*(source.damage for source in self._sources), str(self._damage))
         return '; '.join(dict.fromkeys(filter(None, problems)))
 
@@ -113,7 +113,7 @@ class Bag(Source):
         fits: Callable[[Topic], bool] | None = None,
     ) -> Topic:
         """
-        Return the topic with a given name, or the only topic of a message type.
+        Return the topic `wanted`, or by default the only topic of a message type.
 
         Raises
         ------
@@ -134,7 +134,7 @@ class Bag(Source):
         called = f' and name {wanted}' if wanted else ''
         damage = f' ({self.damage})' if self.damage else ''
         if damage and not topics:
-            raise RecordingError(f'{self.path}: no message can be read, record again{damage}')
+            raise RecordingError(f'{self.path}: no message can be read; record again{damage}')
         raise RecordingError(
             f'{self.path}: the bag has {len(found)} topics of type {type_name}{called}, but one '
             f'is needed; its topics are {listed(topics)}{damage}'
@@ -162,7 +162,7 @@ class Bag(Source):
             )
 
     def decoded(self, topic: Topic, cdr: bytes) -> Any:
-        """Return a message of a topic as an object; RecordingError if it is damaged."""
+        """Decode a CDR message of a topic; RecordingError if the message is damaged."""
         store = store_for(topic.message_type)
         try:
             return store.deserialize_cdr(cdr, topic.type_name)

@@ -40,7 +40,7 @@ _OPTIONS = {'rate_hz': '--rate', 'effort_scale': '--effort-scale or --current-ga
 @dataclass(frozen=True)
 class ColumnSettings:
     """
-    Columns and units of recorded quantities; values of None are guessed from the file.
+    Columns and units of recorded quantities; settings of None are guessed from the file.
 
     Attributes
     ----------
@@ -100,7 +100,7 @@ class ColumnSettings:
 
 
 def renamed(name: str, rules: Rules) -> str:
-    """Rename a joint by rules (old, new); `old` is the complete old name or its beginning."""
+    """Rename a joint by rules (old, new), which replace a complete name or its beginning."""
     for old, new in sorted(rules, key=lambda rule: rule[0] != name):
         if name.startswith(old):
             return new + name[len(old) :]
@@ -108,7 +108,7 @@ def renamed(name: str, rules: Rules) -> str:
 
 
 def name_in_file(name: str, rules: Rules) -> str:
-    """Undo ``renamed``: return the name that a joint has in the file."""
+    """Return the name that a joint has in the file, before `rules` rename the joint."""
     for old, new in sorted(rules, key=lambda rule: rule[1] != name):
         before = old + name[len(new) :]
         if name.startswith(new) and renamed(before, rules) == name:
@@ -117,7 +117,7 @@ def name_in_file(name: str, rules: Rules) -> str:
 
 
 def renaming(joints: Sequence[str], names: Sequence[str]) -> str:
-    """Return a rule OLD:NEW that turns the joint names of a file into the given ones, or ''."""
+    """Return a rule OLD:NEW that renames `names` of a file to `joints`; '' if there is none."""
     ends = [(name[:end], name[end:]) for name in names for end in range(len(name))]
     # first try rules that replace complete words of a name
     for old, rest in sorted(ends, key=lambda end: not end[0].endswith(('_', '/'))):
@@ -156,7 +156,7 @@ def numbers(text: str | None) -> tuple[float, ...]:
 
 
 def per_joint(values: Sequence[float], joints: Sequence[str], setting: str) -> FloatArray:
-    """Return one value per joint, shape (n,), from n values or from one value for all."""
+    """Return one value per joint, shape (n,), from n values or from one value for all joints."""
     if len(values) not in (1, len(joints)):
         raise RecordingError(
             f'{setting} has {len(values)} values; give one value for all joints, or '
@@ -167,7 +167,7 @@ def per_joint(values: Sequence[float], joints: Sequence[str], setting: str) -> F
 
 def refuse_columns(path: str | Path, settings: ColumnSettings, *, copied: bool = False) -> None:
     """
-    Raise RecordingError if settings that apply to tables only are given for a bag.
+    Raise RecordingError if the settings of a bag include settings that apply to tables only.
 
     Parameters
     ----------
@@ -190,7 +190,7 @@ def refuse_columns(path: str | Path, settings: ColumnSettings, *, copied: bool =
                 'convert the tables to a bag with armid convert'
             )
         raise RecordingError(
-            f'{path}: {option} has no effect on a copied bag; give it to the command that reads '
+            f'{path}: {option} has no effect on a copied bag; use it with the command that reads '
             'the bag'
         )
 
@@ -240,12 +240,12 @@ def in_si(
 
 
 def _position(joint: str, joints: Sequence[str]) -> int:
-    """Return the index of a joint that is given by its name, or by its number from 1 on."""
+    """Return the index of `joint`, which is a joint name or the number (from 1) of a joint."""
     if joint in joints:
         return list(joints).index(joint)
     if joint.isdigit() and 1 <= int(joint) <= len(joints):
         return int(joint) - 1
     raise RecordingError(
-        f"the coupling has the joint '{joint}', which the recording does not have; give a name "
+        f"the coupling has the unknown joint '{joint}'; give a name "
         f'of {", ".join(joints)}, or a number from 1 to {len(joints)}'
     )

@@ -72,7 +72,7 @@ def decompressed(stored: _Buffer, compression: str, size: int, settings: ReadSet
 
 
 class _Zstd(threading.local):
-    """Decompressor for zstd, one for each thread because its creation takes long."""
+    """One zstd decompressor per thread, which is reused because creation takes long."""
 
     def __init__(self) -> None:
         self.decompressor = zstandard.ZstdDecompressor()

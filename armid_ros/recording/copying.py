@@ -16,7 +16,7 @@ from armid_ros.recording.writer import atomic_bag
 @dataclass(frozen=True)
 class Copied:
     """
-    Report on the copy of a bag: paths, copied topics, and damage of the original.
+    Report on the copy of a bag: paths, copied topics, and damage of the source.
 
     Attributes
     ----------

@@ -15,7 +15,7 @@ def draw_joints(
     joints: Sequence[str], curves: Mapping[str, tuple[FloatArray, FloatArray]], quantity: str
 ) -> npt.NDArray[np.object_]:
     """
-    Plot curves over time, each joint in axes of its own, one below the other.
+    Plot curves over time in one subplot per joint; return the axes of the subplots.
 
     Parameters
     ----------

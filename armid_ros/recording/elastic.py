@@ -30,7 +30,7 @@ _ACCELERATION = slice(25, 28)
 
 def write_runs(path: str | Path, runs: Sequence[ElasticRun], robot: Robot) -> None:
     """
-    Write experiments with an elastic arm to one bag, with pauses of 1 s in between.
+    Write experiments with an elastic arm to one bag, separated by pauses of 1 s.
 
     Raises
     ------
@@ -72,7 +72,7 @@ def read_accelerations(
     path: str | Path, topic: str, settings: ReadSettings = DEFAULT
 ) -> tuple[IntArray, FloatArray]:
     """
-    Read linear accelerations from the Imu messages of one topic of a bag.
+    Read time stamps and linear accelerations from the Imu messages of a topic.
 
     Returns
     -------

@@ -89,7 +89,7 @@ def message_type(name: str, definition: str | None = None) -> MessageType:
 
 @cache
 def store_for(described: MessageType) -> Typestore:
-    """Return a type store that decodes messages as the definition in their bag states."""
+    """Return a type store that decodes messages by the message definition in their bag."""
     if not described.definition:
         store = get_typestore(Stores.ROS2_JAZZY)
         if described.name not in store.fielddefs:

@@ -169,7 +169,7 @@ def read_metadata(bag: Path) -> BagMetadata:
 
 
 def parse_qos(text: str | None) -> tuple[Qos, ...]:
-    """Parse QoS profiles from a YAML text of any rosbag2 version; empty if it is invalid."""
+    """Parse QoS profiles from a YAML text of any rosbag2 version; empty for invalid text."""
     default: dict[str, Any] = dict(metadata.dump_qos_v9([VOLATILE])[0])
     default |= dict.fromkeys(('reliability', 'durability', 'liveliness'), 'unknown')
     try:

@@ -51,7 +51,7 @@ def read_recording(
     settings: ReadSettings = DEFAULT,
 ) -> Recording:
     """
-    Read positions, velocities and torques of some joints from a bag or a table.
+    Read positions, velocities and torques of joints from a bag or a table.
 
     Parameters
     ----------
@@ -131,7 +131,7 @@ def read_recording(
 
 
 def is_table(path: Path) -> bool:
-    """Return whether a path is a table; without the plug-in `tables`, whether it is no bag."""
+    """Return whether a path is a table or, without the plug-in `tables`, any file but a bag."""
     if find_spec(_TABLES) is None:
         return path.is_file() and not is_bag_file(path)
     from armid_ros.recording import tables
@@ -190,7 +190,7 @@ def assembled(
     decoder: JointStateDecoder,
     damage: str,
 ) -> Recording:
-    """Build a recording from decoded samples; empty the list of samples to free memory."""
+    """Build a recording from decoded samples; clear the list `pieces` to free memory."""
     where = f'{path}: {topic}'
     if not decoder.messages:
         raise RecordingError(f'{where}: the topic has no messages; record again')
@@ -245,7 +245,7 @@ def read_pieces(
     settings: ReadSettings = DEFAULT,
 ) -> Iterator[tuple[Recording, bool]]:
     """
-    Read some joints of a bag as successive short recordings, to limit the memory.
+    Read joints of a bag as successive short recordings, to limit the use of memory.
 
     Parameters
     ----------
@@ -369,7 +369,7 @@ def topics(path: str | Path, settings: ReadSettings = DEFAULT) -> tuple[Topic, .
 
 def read_robot_description(path: str | Path, settings: ReadSettings = DEFAULT) -> str | None:
     """
-    Return the URDF in the last message of a bag's topic '.../robot_description'.
+    Return the URDF in the last message of the topic '.../robot_description' of a bag.
 
     Parameters
     ----------

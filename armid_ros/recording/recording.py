@@ -42,7 +42,7 @@ class TimeGap:
     Attributes
     ----------
     t : float
-        Time of the last sample before it [s], on the time base of the recording.
+        Time of the last sample before the gap [s], on the time base of the recording.
     length : float
         Duration of the gap [s].
 
@@ -309,7 +309,7 @@ class Recording:
 
     def plot(self, quantity: Literal['q', 'dq', 'tau'] = 'tau') -> npt.NDArray[np.object_]:
         """
-        Plot a quantity, such as torque, over time, each joint in axes of its own.
+        Plot a quantity, such as torque, over time in one subplot per joint.
 
         Parameters
         ----------
@@ -374,7 +374,7 @@ def recorded_together(
     recording: Recording, other: Recording, robot: Robot, ties: Sequence[Tie] = ()
 ) -> Recording:
     """
-    Add the positions of a connected machine to a recording, at the recording's times.
+    Add the positions of a connected machine to a recording, interpolated in time.
 
     Parameters
     ----------
@@ -414,7 +414,7 @@ def recorded_together(
 
 def given_twice(fitted: Sequence[Recording], held_out: Sequence[Recording] = ()) -> str:
     """
-    Return the names of recordings that were given more than once; empty if there are none.
+    Return the names of recordings that occur more than once, as text; '' if none.
 
     A recording given twice would have twice the weight, and a fitted recording cannot be held
     out. Recordings are equal if their positions and torques are equal, since two simulated runs
@@ -442,7 +442,7 @@ def given_twice(fitted: Sequence[Recording], held_out: Sequence[Recording] = ())
 
 
 def require_once(fitted: Sequence[Recording], held_out: Sequence[Recording] = ()) -> None:
-    """Raise RecordingError if a recording is given more than once."""
+    """Raise RecordingError if a recording occurs more than once."""
     names = given_twice(fitted, held_out)
     if names:
         raise RecordingError(

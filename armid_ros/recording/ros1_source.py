@@ -32,7 +32,7 @@ from rosbags.typesys.base import TypesysError
 
 
 class Ros1Source(Source):
-    """Reader of a ROS 1 bag file; messages whose type ROS 2 does not have are skipped."""
+    """Reader of a ROS 1 bag file; messages of types that ROS 2 does not have are skipped."""
 
     def __init__(self, path: Path, settings: ReadSettings = DEFAULT) -> None:
         """Open a ROS 1 bag; checksums are not compared, and one chunk at a time is in memory."""

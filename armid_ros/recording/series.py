@@ -35,7 +35,7 @@ MAX_NOT_FINITE = 0.2
 
 
 def gather(pieces: Sequence[JointSamples]) -> list[JointSamples]:
-    """Concatenate all samples that have the same joints."""
+    """Concatenate samples with the same joints; return one item per set of joints."""
     by_joints: dict[tuple[str, ...], list[JointSamples]] = {}
     for piece in pieces:
         by_joints.setdefault(piece.joints, []).append(piece)
@@ -52,7 +52,7 @@ def gather(pieces: Sequence[JointSamples]) -> list[JointSamples]:
 def clock_problem(
     stamps: IntArray, position: FloatArray | None, receive: IntArray | None = None
 ) -> str:
-    """Return why time stamps are unusable, such as 'do not advance'; empty if they are usable."""
+    """Return why time stamps are unusable, such as 'do not advance'; empty if usable."""
     first = int(np.argmax(stamps != 0))
     if first and np.count_nonzero(stamps[first:] == 0) <= 0.01 * len(stamps):
         stamps = stamps[first:]  # simulated time is zero until the first /clock
@@ -219,7 +219,7 @@ def _sorted(series: JointSamples, counts: Counter[str]) -> JointSamples:
 def _resampled(
     series: JointSamples, stamps: IntArray
 ) -> tuple[JointSamples, npt.NDArray[np.bool_], npt.NDArray[np.bool_]]:
-    """Interpolate samples at N times; return N samples, and which are valid and measured."""
+    """Interpolate samples at N stamps; also return masks (N,) of valid and measured samples."""
     if len(series) == len(stamps) and np.array_equal(series.stamps, stamps):
         everywhere = np.ones(len(stamps), np.bool_)
         return series, everywhere, everywhere
@@ -241,7 +241,7 @@ def _resampled(
 def _finite(
     where: str, joints: tuple[str, ...], series: JointSamples, counts: Counter[str]
 ) -> tuple[JointSamples, tuple[str, ...], tuple[str, ...]]:
-    """Return the samples with finite values, with names of missing and non-finite quantities."""
+    """Drop samples with non-finite values; also return missing and non-finite quantities."""
     absent: list[str] = []
     quantities: list[FloatArray | None] = []
     for name, values in zip(QUANTITIES, series.values, strict=True):

@@ -48,7 +48,7 @@ class ReadSettings:
     temperatures: bool = True
 
     def __post_init__(self) -> None:
-        """Raise RecordingError unless the memory limit is positive."""
+        """Raise RecordingError if the memory limit is not positive."""
         if self.memory_limit <= 0:
             raise RecordingError(
                 f'memory_limit is {self.memory_limit} bytes; give a positive number'
@@ -215,7 +215,7 @@ class Source(ABC):
 
     @property
     def damage(self) -> str:
-        """Return a description of the damage found so far; empty if none was found."""
+        """Description of the damage that was found so far; empty without damage."""
         return str(self._damage)
 
     @abstractmethod

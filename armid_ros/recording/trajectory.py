@@ -133,7 +133,7 @@ def read_waypoints(
             f'{", ".join(found.joints)}'
         )
     if len(found.t) < 2:
-        raise RecordingError(f'{where}: a trajectory needs two points, but has {len(found.t)}')
+        raise RecordingError(f'{where}: a trajectory needs two points, not {len(found.t)}')
     return found.of_joints(tuple(joints))
 
 

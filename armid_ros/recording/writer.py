@@ -189,7 +189,7 @@ class BagWriter:
         encoding: str = 'ros2msg',
     ) -> None:
         """
-        Add a topic to the bag; adding it again with the same type has no effect.
+        Add a topic to the bag; no effect if the bag has this topic with the same type.
 
         Parameters
         ----------
@@ -295,7 +295,7 @@ class BagWriter:
         self, topic: str, messages: npt.NDArray[np.void], log_times_ns: IntArray
     ) -> None:
         """
-        Write serialised messages of equal length, which are the elements of an array.
+        Write an array of serialised messages of equal length.
 
         Parameters
         ----------
@@ -397,7 +397,7 @@ class BagWriter:
         return ''
 
     def _open_records(self) -> list[bytes]:
-        """Return the list that collects records for the next chunk."""
+        """Return the list of records for the next chunk."""
         # flush() does not empty the list, because it may be interrupted after writing. Records
         # have the number of their chunk, and are removed when that chunk is in the file.
         if self._open[0] != self._mcap.committed.chunks:
@@ -421,7 +421,7 @@ class BagWriter:
             raise RecordingError(f'{self.path}: the bag is closed and cannot be written to')
 
     def _channel(self, topic: str) -> int:
-        """Return the MCAP channel of a topic; RecordingError if it was not added."""
+        """Return the MCAP channel of a topic; RecordingError if the topic was not added."""
         channel = self._channels.get(topic)
         if channel is None or self._closed:
             self._check_open()
@@ -434,7 +434,7 @@ class BagWriter:
 
 
 def _joined(records: list[bytes]) -> tuple[bytes, IntArray]:
-    """Join records; return their bytes, and the byte position of each message record."""
+    """Join MCAP records; return bytes, and the byte position of each message record."""
     lengths = np.array([len(record) for record in records], np.int64)
     is_message = np.array([record[0] == Opcode.MESSAGE for record in records], np.bool_)
     return b''.join(records), (np.cumsum(lengths) - lengths)[is_message]

@@ -66,7 +66,7 @@ def _inside(described: MessageType) -> str:
 
 @cache
 def _standard(described: MessageType) -> bool:
-    """Return whether the definition of JointState in a bag is that of ROS 2."""
+    """Return whether the definition of JointState in a bag equals the definition of ROS 2."""
     stated = described.type_hash if described.name == JOINT_STATE else ''
     if not described.definition or stated == JOINT_STATE_HASH:
         return True

@@ -71,7 +71,7 @@ class JointSamples:
 
 class JointStateDecoder:
     """
-    Decoder of the JointState messages of one topic; it caches the message layouts.
+    Decoder of the JointState messages of one topic, with a cache of message layouts.
 
     Attributes
     ----------
@@ -182,7 +182,7 @@ class JointStateDecoder:
         return free[:count]
 
     def _plan_for(self, first: npt.NDArray[np.void]) -> _Plan | None:
-        """Return how to decode messages with this message's layout; None if it is malformed."""
+        """Return the plan for decoding messages like `first`; None if `first` is malformed."""
         length = first.dtype.itemsize
         known = self._plans.setdefault(length, [])
         for plan in known:
@@ -257,7 +257,7 @@ class JointStateValues(NamedTuple):
 
 
 class JointStateMessages:
-    """Decoder of single JointState messages as they arrive; it caches message layouts."""
+    """Decoder of single JointState messages, with a cache of message layouts."""
 
     def __init__(self) -> None:
         self._known: list[JointStateLayout] = []

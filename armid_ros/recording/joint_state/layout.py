@@ -57,7 +57,7 @@ class JointStateLayout:
     @classmethod
     def of(cls, cdr: bytes) -> JointStateLayout:
         """
-        Find the byte positions of the fields in a serialised JointState message.
+        Parse the layout of a serialised JointState message.
 
         Raises
         ------
@@ -67,7 +67,7 @@ class JointStateLayout:
         """
         order = BYTE_ORDERS.get(cdr[:2])
         if order is None:
-            raise MalformedMessage(f'the first bytes {cdr[:2].hex(" ")!r} are not those of CDR')
+            raise MalformedMessage(f'the first bytes {cdr[:2].hex(" ")!r} are not a CDR header')
         counts: list[int] = []
         try:
             (frame_length,) = struct.unpack_from(order + 'I', cdr, _FRAME_OFFSET)
@@ -102,7 +102,7 @@ class JointStateLayout:
 
     @property
     def names_offset(self) -> int:
-        """Return the byte position of the field that has the number of joint names."""
+        """Return the byte position of the field that states the number of joint names."""
         return _align(_FRAME_OFFSET + 4 + self.frame_length, 4)
 
     @cached_property
@@ -115,7 +115,7 @@ class JointStateLayout:
 
     @cached_property
     def places(self) -> tuple[tuple[int, int], ...]:
-        """Return for each quantity the byte positions of its length field and first value."""
+        """Return the byte positions of the length field and the first value of each quantity."""
         places, position = [], self.names_end
         for count in self.counts:
             at = _align(position, 4)
@@ -176,7 +176,7 @@ class JointStateLayout:
 
     @cached_property
     def values(self) -> tuple[tuple[int, int], ...]:
-        """Return for each quantity the number of values and the byte position of the first."""
+        """Return the number of values and the byte position of the first value, by quantity."""
         return tuple((n, begin) for n, (_, begin) in zip(self.counts, self.places, strict=True))
 
     @cached_property
@@ -202,7 +202,7 @@ class JointStateLayout:
 
     @cached_property
     def _fixed_bits(self) -> tuple[int, int]:
-        """Return bytes and mask of `fixed` as integers, which are compared faster."""
+        """Return the bytes and the mask of `fixed` as integers, for fast comparison."""
         fixed, mask = (int.from_bytes(record.tobytes(), 'little') for record in self.fixed)
         return fixed, mask
 

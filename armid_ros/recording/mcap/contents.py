@@ -118,7 +118,7 @@ def _read_group(
 
 
 def _content(found: FileMap, chunk: Chunk, settings: ReadSettings) -> bytes | memoryview:
-    """Return the decompressed content of a chunk; raise one of CORRUPT if it is damaged."""
+    """Return the decompressed content of a chunk; raise one of CORRUPT for a damaged chunk."""
     stored = memoryview(found.data)[chunk.begin : chunk.end]
     if chunk.compression not in ('', 'zstd', 'lz4'):
         raise ValueError(

@@ -114,7 +114,7 @@ class FileMap:
     damage: Damage = field(default_factory=Damage)
 
     def span(self, chunk: Chunk) -> str:
-        """Return the time range of a chunk's messages as text, for reports of damage."""
+        """Return the time range of the messages of a chunk as text, for reports of damage."""
         begin = min((c.start_time for c in self.chunks if c.end_time), default=0)
         start, end = (1e-9 * (time - begin) for time in (chunk.start_time, chunk.end_time))
         return f'from {start:.3f} to {end:.3f} s after the beginning'
@@ -171,7 +171,7 @@ def map_file(data: bytes | mmap.mmap, path: Path, *, check: bool = True) -> File
 
 
 def _walk(found: FileMap) -> tuple[list[tuple[int, int, int]], int | None, int | None, int]:
-    """Scan a file into its map; return definitions, and the ends of data, footer and records."""
+    """Fill a file map; return definitions, and positions of data end, footer and scan end."""
     data = found.data
     definitions: list[tuple[int, int, int]] = []
     data_end = footer = None
@@ -228,7 +228,7 @@ def add_definition(found: FileMap, opcode: int, content: bytes) -> None:
 
 
 def _add_chunk(found: FileMap, begin: int, end: int, *, complete: bool = True) -> None:
-    """Add a chunk to the map of a file, unless the file ends within the chunk's header."""
+    """Add a chunk to the map of a file, unless the file ends within the header of the chunk."""
     data = found.data
     if end - begin < _CHUNK_HEADER.size:
         return
@@ -250,7 +250,7 @@ def _add_chunk(found: FileMap, begin: int, end: int, *, complete: bool = True) -
 
 
 def _add_data(found: FileMap, opcode: int, begin: int, end: int) -> None:
-    """Add a chunk, the message index of a chunk, or a message outside chunks to a file map."""
+    """Add a chunk, a message index of a chunk, or a message outside chunks to a file map."""
     if opcode == Opcode.CHUNK:
         _add_chunk(found, begin, end)
     elif opcode == Opcode.MESSAGE and end - begin < MESSAGE_HEADER:

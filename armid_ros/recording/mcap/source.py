@@ -128,7 +128,7 @@ class McapSource(Source):
     def _pieces(
         self, chunks: Sequence[Chunk], channels: Sequence[int]
     ) -> Iterator[tuple[int, bytes | mmap.mmap, IntArray]]:
-        """Yield groups of messages of given channels: first time, buffer, byte positions."""
+        """Yield messages of `channels` in groups: first log time [ns], buffer, byte positions."""
         data, loose = self._found.data, np.array(self._found.loose, np.int64)
         for contents in read_chunks(self._found, chunks, self._settings):
             offsets = self._possible(*messages_in(self._found, contents), channels)
@@ -160,7 +160,7 @@ class McapSource(Source):
         return self._counts
 
     def _possible(self, offsets: IntArray, rows: _Rows, wanted: Sequence[int]) -> IntArray:
-        """Return the byte positions of messages in wanted channels with times before 2262."""
+        """Return the byte positions of messages in channels `wanted` with times before 2262."""
         channels = rows['channel']
         chosen = np.isin(channels, wanted) if len(wanted) != 1 else channels == wanted[0]
         late = (rows['log_time'] < 0) | (rows['publish_time'] < 0)
@@ -173,7 +173,7 @@ class McapSource(Source):
         return offsets if chosen.all() else offsets[chosen]
 
     def _compare_count(self, topic: str, channels: Collection[int], count: int) -> None:
-        """Record damage if fewer or more messages were read than the writer has counted."""
+        """Report damage if the number of messages read differs from the count of the writer."""
         summary = self._found.statistics
         if not (self._found.finished and summary and summary.channel_message_counts):
             return

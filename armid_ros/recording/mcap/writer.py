@@ -145,7 +145,7 @@ class McapWriter:
 
     def write_chunk(self, content: bytes, offsets: IntArray) -> None:
         """
-        Write a chunk of records, followed by the indexes of its messages.
+        Write a chunk of records, and then the indexes of the messages in the chunk.
 
         Parameters
         ----------
@@ -213,7 +213,7 @@ class McapWriter:
         self.committed = self.committed._replace(position=end, metadata=len(self._metadata))
 
     def finish(self) -> None:
-        """Write the summary and close the file; can be repeated if it was interrupted."""
+        """Write the summary and close the file; an interrupted call can be repeated."""
         if not self._stream.closed:
             self._append(self._summary())
             self._stream.close()
@@ -262,7 +262,7 @@ class McapWriter:
         self._index.close()
 
     def _append_index(self, record: bytes) -> int:
-        """Append a chunk's index to the temporary index file; return the new size of that file."""
+        """Append the index of a chunk to the temporary index file; return the size of the file."""
         position, rest = self.committed.index_size, memoryview(record)
         try:
             while len(rest):

@@ -119,7 +119,7 @@ def choose(
     rename: Rules = (),
 ) -> QuantityColumns:
     """
-    Return the columns of a quantity whose names match the user's pattern.
+    Return the columns of a quantity, whose names match the pattern of the user.
 
     Parameters
     ----------
@@ -257,13 +257,13 @@ def _family(
 
 
 def _by_number(label: str) -> tuple[int, str]:
-    """Return a sort key with which labels of digits are sorted as numbers."""
+    """Return a sort key that sorts labels of digits as numbers."""
     digits = label.lstrip('0')
     return len(digits), digits
 
 
 def _matching(table: Table, pattern: str) -> list[tuple[str, TableColumn]]:
-    """Return the columns that match a pattern, each with the joint's part of its name."""
+    """Return the columns that match a pattern, each with the joint label in its name."""
     exact = table.column(pattern)
     if exact is not None:
         return [('1', exact)]
@@ -303,7 +303,7 @@ def _matching(table: Table, pattern: str) -> list[tuple[str, TableColumn]]:
 def _patterns(
     column: TableColumn, joints: Sequence[str] | None, rename: Rules
 ) -> Iterator[tuple[str, str]]:
-    """Yield all splits of a column name into a pattern and the joint's part."""
+    """Yield all splits of a column name into a pattern and the label of a joint."""
     name = column.bare_name
     if column.array and name.endswith(']'):
         element = name[len(column.array) + 1 : -1]
@@ -333,7 +333,7 @@ def _patterns(
 
 
 def _score(pattern: str, quantity: QuantityName) -> float:
-    """Return how well a column pattern fits a quantity, by its words; zero if it does not fit."""
+    """Return a score of how well the words of a pattern fit a quantity; zero if they do not."""
     words = words_of(pattern)
     scores = {
         name: max((table.get(word, 0.0) for word in words), default=0.0)

@@ -90,7 +90,7 @@ def _suffix(path: Path) -> str:
 
 
 def _with_names(table: Table) -> Table:
-    """Replace numbered columns by columns named after joints that text columns list."""
+    """Replace numbered columns by columns of joints, whose names are in columns of text."""
     names: dict[str, dict[str, npt.NDArray[np.str_]]] = {}  # by the text before 'name', and number
     for name, cells in table.words.items():
         match = _NAME.fullmatch(name)
@@ -212,7 +212,7 @@ def read_hdf5(path: Path) -> Table:
 
 
 def _require_possible(array: str, size: int, stored: int) -> None:
-    """Raise RecordingError if the size that an array states is impossible or too large."""
+    """Raise RecordingError if the stated size of an array is impossible or too large."""
     # deflate compresses by 1:1032 at most
     if size > 1100 * stored:
         raise RecordingError(
@@ -234,7 +234,7 @@ def _flattened(
 
 
 def read_parquet(path: Path) -> Table:
-    """Read the columns of a Parquet file; a column of lists becomes a column per element."""
+    """Read the columns of a Parquet file; a column of k-element lists becomes k columns."""
     arrays, words = _columns(path)
     return replace(table_of_arrays(str(path), arrays, 'Parquet'), words=words)
 
@@ -252,7 +252,7 @@ def _read_lerobot(path: Path, episode: int | None = None) -> Table:
         total = int(info.get('total_episodes', 1))
         rate = finite(info['fps'], 'fps') if 'fps' in info else None
         if rate is not None and rate <= 0.0:
-            raise RecordingError(f'fps (samples per second) is {rate:g}, but has to be positive')
+            raise RecordingError(f'fps (samples per second) is {rate:g}; it has to be positive')
     chosen = episode or 0
     files = sorted((path / 'data').glob('**/*.parquet'))
     own = [file for file in files if file.name == f'episode_{chosen:06d}.parquet']

@@ -157,7 +157,7 @@ def plan(
             )
         of_joints = f' of {", ".join(joints)}' if joints else ''
         raise RecordingError(
-            f'{table.source}: no columns seem to be positions{of_joints}; give them, such as '
+            f'{table.source}: no columns of positions{of_joints} were found; name the columns by '
             f"--position 'q{{}}' or --position a,b,c. The columns are {table.listed()}"
         )
     names = tuple(joints) if joints else position.joints(settings.rename)
@@ -219,7 +219,7 @@ def _scaled(
     joints: Sequence[str],
     slides: npt.NDArray[np.bool_],
 ) -> QuantityColumns:
-    """Apply the user's units to columns of a quantity; degrees apply to revolute joints only."""
+    """Apply units of the user to columns of a quantity; degrees are for revolute joints only."""
     if source.quantity == 'temperature':
         return source
     if source.quantity == 'effort':
@@ -284,8 +284,8 @@ def _time(table: Table, settings: ColumnSettings) -> tuple[TableColumn | None, s
     rate = settings.rate_hz or table.rate_hz
     if rate is None:
         raise RecordingError(
-            f'{table.source}: no column seems to be the time; give a column with --time, or the '
-            f'samples per second with --rate. The columns are {table.listed()}'
+            f'{table.source}: no column seems to be the time; name a column with --time, or give '
+            f'the samples per second with --rate. The columns are {table.listed()}'
         )
     return None, 's', rate
 
@@ -375,7 +375,7 @@ def converted(plan: TablePlan) -> Recording:
 def _temperatures(
     plan: TablePlan, recording: Recording, t: FloatArray, start: int
 ) -> Temperatures | None:
-    """Return temperatures in a table on a recording's time base; None without temperatures."""
+    """Return temperatures of a table on the time base of a recording; None without any."""
     for source in plan.sources:
         if source.quantity == 'temperature':
             own = t + 1e-9 * (start - recording.start_ns)
@@ -388,7 +388,7 @@ def _temperatures(
 
 
 def _times(plan: TablePlan) -> tuple[FloatArray, int]:
-    """Return row times [s] relative to a stamp, and this stamp [ns], by default 1 s."""
+    """Return the times of rows [s] after a start stamp, and this stamp [ns], by default 10^9."""
     if plan.time is None:
         assert plan.rate_hz is not None
         return np.arange(len(plan.table)) / plan.rate_hz, 10**9

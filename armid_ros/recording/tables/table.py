@@ -138,7 +138,7 @@ class Table:
 
     def column(self, name: str) -> TableColumn | None:
         """
-        Return the column with this name, with or without unit; None if there is none.
+        Return the column with this name, with or without unit; None if missing.
 
         Raises
         ------
@@ -183,7 +183,7 @@ class Table:
 
 
 def _at_most(names: Sequence[str]) -> str:
-    """Return the first forty names as text, and how many more there are."""
+    """Return the first forty names and the number of further names as text."""
     most = 40
     more = f' and {len(names) - most} more' if len(names) > most else ''
     return ', '.join(names[:most]) + more
@@ -202,7 +202,7 @@ def table_of_arrays(
     labels: Mapping[str, Sequence[str]] = MappingProxyType({}),
 ) -> Table:
     """
-    Return a table of named arrays; their most frequent length is the number of rows.
+    Build a table from named arrays; the most frequent length is the number of rows.
 
     Parameters
     ----------
@@ -261,7 +261,7 @@ def side_by_side(tables: Sequence[Table]) -> Table:
     if len({len(table) for table in tables}) > 1:
         lengths = ', '.join(f'{table.source} has {len(table)} rows' for table in tables)
         raise RecordingError(
-            f'files that are read together need the same number of rows, but {lengths}'
+            f'tables that are read together need equal numbers of rows, but {lengths}'
         )
     shared = Counter(name for table in tables for name in {c.name for c in table.columns})
     columns: list[TableColumn] = []

@@ -129,7 +129,7 @@ def _split(line: str, separator: str) -> list[str]:
 
 
 def _number(cell: str, separator: str) -> float:
-    """Convert a cell to a number, an empty one to NaN; raise ValueError for text."""
+    """Convert a cell to a number, an empty cell to NaN; raise ValueError for text."""
     if cell.lower() in _EMPTY:
         return np.nan
     if separator != ',' and _DECIMAL_COMMA.fullmatch(cell):
@@ -144,7 +144,7 @@ def _numbers(
     names: list[str],
     first_line: int,
 ) -> tuple[FloatArray, dict[str, Sequence[str]], tuple[str, ...], tuple[str, ...]]:
-    """Return values (N, columns), text cells, and notes on content and damage."""
+    """Parse rows; return values (N, columns), cells of text, notes on content and on damage."""
     with suppress(ValueError):  # fast path if every cell is a number
         delimiter = None if separator == ' ' else separator
         values = np.loadtxt(io.StringIO('\n'.join(rows)), delimiter=delimiter, ndmin=2)
