@@ -28,7 +28,7 @@ NO_FRICTION = 1e-12
 
 
 class Displacement(NamedTuple):
-    """Small changes of joint positions, velocities and accelerations, (N, n, ...) each."""
+    """Small changes of joint positions, velocities and accelerations, of shape (N, n, ...)."""
 
     q: FloatArray
     dq: FloatArray
@@ -38,7 +38,7 @@ class Displacement(NamedTuple):
 @dataclass(frozen=True)
 class DryFriction:
     """
-    Dry friction: at zero velocity, the torque takes any value between two levels.
+    Dry friction of joints; its torque at zero velocity can be any value between two levels.
 
     Attributes
     ----------
@@ -58,7 +58,7 @@ class DryFriction:
 
     def torque(self, dq: FloatArray, load: FloatArray) -> FloatArray:
         """
-        Return the friction torque of each joint; at rest it is the mean of both levels.
+        Return the friction torques (..., n) [N m]; an element at rest has its mean level.
 
         Parameters
         ----------
@@ -73,12 +73,12 @@ class DryFriction:
         return np.asarray((half * np.sign(dq @ self.directions.T) + middle) @ self.directions)
 
     def largest(self, load: FloatArray) -> FloatArray:
-        """Return the largest friction torque (..., n) that each joint can have under a load."""
+        """Return the largest possible friction torque of each joint under a load, (..., n)."""
         half = (self.upper - self.lower) / 2 + self.widening(load)
         return np.asarray(half @ np.abs(self.directions))
 
     def widening(self, load: FloatArray) -> FloatArray:
-        """Return how much a load increases the friction levels of each element, (..., m) [N m]."""
+        """Return the increase of each element's friction level by a load, (..., m) [N m]."""
         if self.load_share is None:
             return np.zeros((*load.shape[:-1], len(self.lower)))
         return np.asarray(self.load_share * np.abs(load @ self.directions.T))
@@ -86,7 +86,7 @@ class DryFriction:
 
 def direction(motion: Motion, joints: Sequence[int] | None = None) -> FloatArray:
     """
-    Return the direction of motion (-1 to 1) of joints or of their common shaft.
+    Return the direction of motion of each joint, or of a shaft that joints share, from -1 to 1.
 
     Parameters
     ----------
@@ -136,7 +136,7 @@ class Transmission:
 @dataclass(frozen=True)
 class Action:
     """
-    Physical terms that effects add to plant and sensors in a simulation; None if absent.
+    Terms that effects add to the equations of plant and sensors; absent terms are None.
 
     On the motor side, the actuators have to supply damping @ dq + inertia @ ddq + dry friction +
     hysteresis + torque(t, q, dq). On the link side, they have to supply the torque of the rigid
@@ -211,13 +211,13 @@ class Action:
         return tau
 
     def torque_derivatives(self, motion: Motion) -> tuple[FloatArray, FloatArray]:
-        """Return the derivatives (N, n, n) of `torque` by q, and by dq."""
+        """Return the derivatives of `torque` with respect to q and dq, (N, n, n) each."""
         assert self.torque is not None
         return law_derivatives(self.torque, motion)
 
 
 def law_derivatives(law: TorqueLaw, motion: Motion) -> tuple[FloatArray, FloatArray]:
-    """Return the derivatives (N, n, n) of a torque function by q, and by dq."""
+    """Return the derivatives of a torque function with respect to q and dq, (N, n, n) each."""
     n = motion.n_joints
     size = 1e-6  # of the differences [rad, m, rad/s or m/s]
     slopes = np.empty((2, len(motion), n, n))
@@ -233,7 +233,7 @@ def law_derivatives(law: TorqueLaw, motion: Motion) -> tuple[FloatArray, FloatAr
 
 def merge_actions(robot: Robot, actions: Sequence[Action]) -> Action:
     """
-    Combine the actions of several effects on one robot.
+    Combine the actions of several effects on one robot into a single action.
 
     Matrices and torques are summed. Dry friction along one direction becomes one element.
     Actions on readings are applied in the given order.
@@ -292,7 +292,7 @@ def merge_actions(robot: Robot, actions: Sequence[Action]) -> Action:
 
 
 def sum_laws(laws: Sequence[TorqueLaw]) -> TorqueLaw | None:
-    """Return the sum of several torque functions of time and motion; None if there are none."""
+    """Return the sum of torque functions as a function of t, q and dq; None if there are none."""
 
     def torque(t: FloatArray, q: FloatArray, dq: FloatArray) -> FloatArray:
         return np.asarray(sum(law(t, q, dq) for law in laws))
@@ -303,7 +303,7 @@ def sum_laws(laws: Sequence[TorqueLaw]) -> TorqueLaw | None:
 
 
 def _merge_friction(elements: list[DryFriction]) -> DryFriction | None:
-    """Merge dry friction elements with equal direction: add their levels."""
+    """Merge dry-friction elements of equal direction by adding their levels."""
     if not elements:
         return None
     directions = np.vstack([e.directions for e in elements])

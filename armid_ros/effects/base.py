@@ -86,13 +86,13 @@ class Effect(ABC):
     lasting: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
-        """Set default shape parameters, or check the number and range of given ones."""
+        """Set default shape parameters, or check number and range of the given values."""
         defaults = tuple(s.default for s in self.shapes) * len(self.owners)
         values = tuple(float(value) for value in self.shape) or defaults
         if len(values) != len(defaults):
             raise ModelError(
-                f'{self.name}: {len(values)} shape values were given, but {len(defaults)} are '
-                f'needed: for each joint {", ".join(s.name for s in self.shapes) or "none"}'
+                f'{self.name}: {len(values)} shape values are given instead of {len(defaults)}; '
+                f'needed for each joint: {", ".join(s.name for s in self.shapes) or "none"}'
             )
         for index, value in enumerate(values):
             shape = self.shapes[index % len(self.shapes)]
@@ -106,7 +106,7 @@ class Effect(ABC):
     @classmethod
     def on(cls, robot: Robot, joints: tuple[str, ...] | None = None) -> Effect:
         """
-        Create the effect for a robot, on the given joints or on its default joints.
+        Create the effect for a robot, on given joints or on the default joints of the effect.
 
         Raises
         ------
@@ -129,7 +129,7 @@ class Effect(ABC):
 
     @classmethod
     def _possible_joints(cls, robot: Robot) -> tuple[str, ...]:
-        """Return the joints on which the effect can act: those with an actuator."""
+        """Return the names of the joints on which the effect can act: joints with an actuator."""
         return robot.joints
 
     @classmethod
@@ -137,14 +137,14 @@ class Effect(ABC):
         return cls._possible_joints(robot)
 
     def in_usual_place(self, robot: Robot) -> bool:
-        """Return whether the effect acts on its default joints and no others."""
+        """Return whether all joints of the effect are among its default joints."""
         default = self._default_joints(robot)
         return bool(self.joints) == bool(default) and set(self.joints) <= set(default)
 
     @classmethod
     def places(cls, robot: Robot) -> tuple[tuple[str, ...], ...]:
         """
-        Return all sets of joints on which the effect can act: joints, pairs, or the whole arm.
+        Return all places where the effect can act: single joints, pairs, or () for the whole arm.
 
         Raises
         ------
@@ -157,33 +157,33 @@ class Effect(ABC):
 
     @classmethod
     def as_change(cls) -> type[Effect]:
-        """Return the effect class for changes of this effect since the baseline recordings."""
+        """Return the effect class that models a change of this effect since the baseline."""
         return cls
 
     def particulars(self) -> dict[str, Any]:
-        """Return further entries for model.yaml, such as reference temperatures and ties."""
+        """Return the effect's own entries for model.yaml, such as reference temperatures."""
         return {}
 
     def with_particulars(self, entry: Mapping[str, Any]) -> Self:
-        """Return the effect with the entries of model.yaml that `particulars` wrote."""
+        """Return a copy of the effect with the entries of model.yaml from `particulars`."""
         return self
 
     def named_as(self, values: FloatArray, arm: Arm) -> tuple[tuple[Effect, FloatArray], ...]:
-        """Return the equivalent effects of the catalogue with their values, for a report."""
+        """Return the equivalent effects of the catalogue for a report, each with its values."""
         return ((self, values),)
 
     def _default_shape(self, robot: Robot) -> FloatArray:
-        """Return default shape parameters for a robot, one row for each of the `owners`."""
+        """Return the default shape parameters for a robot, shape (number of owners, S)."""
         return self.shape_values
 
     @property
     def shape_values(self) -> FloatArray:
-        """Array of the S shape parameters, one row for each of the `owners`."""
+        """Values of the S shape parameters, one row for each joint or one for the whole arm."""
         return np.array(self.shape).reshape(len(self.owners), len(self.shapes))
 
     def with_shape(self, values: npt.ArrayLike) -> Effect:
         """
-        Return the effect with other shape parameters.
+        Return a copy of the effect with other shape parameters.
 
         Parameters
         ----------
@@ -201,17 +201,17 @@ class Effect(ABC):
             spread = np.broadcast_to(np.asarray(values, dtype=float), size)
         except ValueError:
             raise ModelError(
-                f'{self.name}: the shape array has to have size {size}, not {np.shape(values)}: a '
-                f'row for each joint, columns {", ".join(s.name for s in self.shapes) or "none"}'
+                f'{self.name}: shape parameters need an array of size {size}, not '
+                f'{np.shape(values)}: joints by {", ".join(s.name for s in self.shapes) or "none"}'
             ) from None
         return replace(self, shape=tuple(spread.ravel().tolist()))
 
     def spread(self, robot: Robot) -> FloatArray:
-        """Return the largest expected absolute value of each of the P parameters, shape (P,)."""
+        """Return the largest expected absolute values of the P parameters, shape (P,)."""
         return np.full(len(self.parameters(robot)), np.inf)
 
     def shape_parameters(self, robot: Robot) -> tuple[ParameterName, ...]:
-        """Return names and units of the shape parameters of the effect, joint by joint."""
+        """Return name, joint and unit of each shape parameter, joint by joint."""
         return tuple(
             ParameterName(s.name, owner, joint_unit(s.unit, owner, robot))
             for owner in self.owners
@@ -220,7 +220,7 @@ class Effect(ABC):
 
     def shape_starts(self, unexplained: Unexplained, arm: Arm) -> tuple[FloatArray, ...]:
         """
-        Return G start values of each shape parameter for a search, as arrays (owners, G).
+        Return start values for a search of each shape parameter, arrays of shape (owners, G).
 
         Parameters
         ----------
@@ -234,11 +234,11 @@ class Effect(ABC):
 
     @property
     def owners(self) -> tuple[str, ...]:
-        """Joints that have their own parameters; an empty name stands for the whole arm."""
+        """Names of the joints that have parameters of their own; ('',) for the whole arm."""
         return self.joints or ('',)
 
     def parameters(self, robot: Robot) -> tuple[ParameterName, ...]:
-        """Return names and units of the P parameters of the effect, joint by joint."""
+        """Return name, joint and unit of each of the P parameters, joint by joint."""
         return tuple(
             ParameterName(q.name, owner, joint_unit(q.unit, owner, robot), self.name)
             for owner in self.owners
@@ -246,37 +246,37 @@ class Effect(ABC):
         )
 
     def bounds(self) -> tuple[FloatArray, FloatArray]:
-        """Return the physical bounds of the parameters: lower and upper, each of shape (P,)."""
+        """Return the lower and the upper physical bounds of the parameters, shape (P,) each."""
         lower = np.array([q.lower for q in self.quantities] * len(self.owners))
         upper = np.array([q.upper for q in self.quantities] * len(self.owners))
         return lower, upper
 
     def adds_to(self, robot: Robot) -> tuple[int, ...]:
-        """Return the indices of the rigid-body parameters to which values are added, if any."""
+        """Return the indices of the rigid-body parameters that the effect changes; () if none."""
         return ()
 
     @property
     def reference_temperatures(self) -> dict[str, float]:
-        """Reference temperature of each joint [degC]; empty if the effect has none."""
+        """Reference temperatures by joint name [degC]; empty if the effect has none."""
         return {}
 
     @property
     def points(self) -> tuple[str, ...]:
-        """Names of the points outside the arm at which springs of the effect end."""
+        """Names of the points outside the arm to which springs of the effect are attached."""
         return ()
 
     def along(self, motion: Motion) -> Self:
-        """Return the effect with the recorded signals that it depends on, such as temperatures."""
+        """Return a copy of the effect with the recorded signals it needs, such as temperatures."""
         return self
 
     def referred_to(self, temperatures: Mapping[str, float]) -> Self:
-        """Return the effect with given reference temperatures [degC], if it depends on them."""
+        """Return a copy with other reference temperatures [degC], if the effect has any."""
         return self
 
     @abstractmethod
     def columns(self, motion: Motion, arm: Arm) -> FloatArray:
         """
-        Return the derivatives of the joint torques by the parameters of the effect (regressor).
+        Return the regressor: derivatives of the joint torques with respect to the parameters.
 
         Parameters
         ----------
@@ -294,19 +294,19 @@ class Effect(ABC):
         """
 
     def checked_columns(self, motion: Motion, arm: Arm) -> FloatArray:
-        """Return `columns`; raise a ModelError if their shape is not (N, n, P)."""
+        """Return the regressor of `columns`; raise a ModelError if its shape is not (N, n, P)."""
         columns = self.columns(motion, arm)
         wanted = (*motion.q.shape, len(self.owners) * len(self.quantities))
         if np.shape(columns) != wanted:
             raise ModelError(
                 f"effect '{self.name}': columns() returned an array of shape {np.shape(columns)} "
-                f'instead of {wanted}: samples, joints of the arm, parameters'
+                f'instead of {wanted} (samples, joints of the arm, parameters)'
             )
         return columns
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
         """
-        Return the terms that the effect with given values adds to plant and sensors.
+        Return the terms that the effect adds to plant and sensors, for given parameter values.
 
         By default, the torque on the link side is columns @ values. This is correct for a torque
         that is linear in the values and depends on time, position and velocity only.
@@ -331,7 +331,7 @@ class Effect(ABC):
 
     def plausible(self, values: FloatArray, std: FloatArray, arm: Arm) -> bool:
         """
-        Return whether fitted values, already within bounds, are physically plausible together.
+        Return whether the combination of fitted values within bounds is physically plausible.
 
         ``std``, shape (P,), has standard deviations for white noise. The arm does not contain
         the effect.
@@ -347,18 +347,18 @@ class Effect(ABC):
 @dataclass(frozen=True)
 class Unexplained:
     """
-    Residual torque of a model in all recordings, which a new effect should explain.
+    Residual torques of a model in all recordings, which an additional effect should explain.
 
     Attributes
     ----------
     motion : Motion
-        All samples, with the recordings concatenated.
+        All N samples, with the recordings concatenated.
     q : ndarray, shape (M, n)
-        Positions of the rows [rad or m].
+        Joint positions at the M samples that are compared [rad or m].
     residual : ndarray, shape (M, n)
         Residual torque [N m].
     weight : ndarray, shape (M, n)
-        One over the standard deviation of the noise, zero for a row without information [1/(N m)].
+        One over the standard deviation of the noise, zero for an unused torque [1/(N m)].
     nuisance : ndarray, shape (M, n, f)
         Columns of parameters that are fitted together with any effect.
 
@@ -372,48 +372,48 @@ class Unexplained:
 
 
 class Arm(Protocol):
-    """Protocol of an arm model: rigid body with effects, such as `armid_ros.arm.ArmModel`."""
+    """Interface of an arm model (rigid body with effects), such as `armid_ros.arm.ArmModel`."""
 
     @property
     def robot(self) -> Robot:
-        """Robot of the description, without effects."""
+        """The robot as described, without effects."""
 
     @property
     def body(self) -> Robot:
-        """Return the rigid body including effects that change it, such as a payload."""
+        """The robot with all effects that change its rigid body, such as a payload."""
 
     def values_of(self, effect: Effect) -> FloatArray:
-        """Return the parameter values of an effect, shape (P_e,)."""
+        """Return the parameter values of one effect of the model, shape (P,)."""
 
     def action(self) -> Action:
-        """Return the terms that all effects together add to plant and sensors."""
+        """Return the combined action of all effects on plant and sensors."""
 
     def link_motion(self, motion: Motion) -> Motion:
-        """Return the true motion of the links for a motion that sensors recorded."""
+        """Return the true motion of the links that belongs to a recorded motion."""
 
     def link_frames(self, motion: Motion) -> LinkFrames:
-        """Return the frames of all links in each sample of a recorded motion."""
+        """Return the frames of all links at each sample of a recorded motion."""
 
     def smoothed(self, motion: Motion) -> Motion:
-        """Return a recorded motion without frequencies above its band limit `band_hz`."""
+        """Return a recorded motion without the frequencies above its band limit [Hz]."""
 
     def load(self, motion: Motion) -> FloatArray:
         """Return the torque of the rigid body along a motion of the links, (N, n) [N m]."""
 
     def load_derivatives(self, motion: Motion) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return the derivatives of the rigid body's torque by q, dq and ddq, (N, n, n) each."""
+        """Return the derivatives of the rigid-body torque by q, dq and ddq, (N, n, n) each."""
 
     def body_columns(self, motion: Motion) -> FloatArray:
         """Return the regressor of the rigid body along a recorded motion, (N, n, 10 n)."""
 
     def gravity_columns(self, motion: Motion) -> FloatArray:
-        """Return the derivatives of the rigid body's torque by the gravity vector, (N, n, 3)."""
+        """Return the derivatives of the rigid-body torque by the gravity vector, (N, n, 3)."""
 
     def joint_torque(self, motion: Motion) -> FloatArray:
-        """Return the true joint torques along a recorded motion, (N, n) [N m]."""
+        """Return the joint torques without sensor errors along a recorded motion, (N, n) [N m]."""
 
     def torque_before(self, effect: Effect, motion: Motion) -> FloatArray:
-        """Return the torque at the input of a sensor effect, along a motion, (N, n) [N m]."""
+        """Return the torque that is the input of a sensor effect in a motion, (N, n) [N m]."""
 
     def torque_change(self, motion: Motion, change: Displacement) -> FloatArray:
-        """Return how the joint torques change with a small change of the links' motion."""
+        """Return the first-order torque change by link displacements, (N, n, ...) [N m]."""

@@ -93,7 +93,7 @@ for _kind in _EFFECTS:
 
 class Catalogue(Mapping[str, type[Effect]]):
     """
-    Mapping from effect names to effect classes, the shipped effects first.
+    Mapping from effect names to effect classes; the shipped effects come first.
 
     Attributes
     ----------
@@ -109,7 +109,7 @@ class Catalogue(Mapping[str, type[Effect]]):
         self.broken: dict[str, str] = {}
 
     def __getitem__(self, name: str) -> type[Effect]:
-        """Return the effect class with this name; also search installed packages."""
+        """Return the effect class with this name, shipped or from an installed package."""
         if name not in self._kinds:
             self._complete_once()
         return self._kinds[name]
@@ -126,7 +126,7 @@ class Catalogue(Mapping[str, type[Effect]]):
 
     def find(self, name: str) -> type[Effect]:
         """
-        Return the effect class with this name; raise an error that suggests a similar name.
+        Return the effect class with this name; the error for an unknown name suggests others.
 
         Raises
         ------
@@ -140,19 +140,19 @@ class Catalogue(Mapping[str, type[Effect]]):
         near = nearest(name, self)
         if near:
             raise ModelError(
-                f"no effect '{name}'; did you mean '{near}'? 'armid effects' lists all of them"
+                f"no effect '{name}'; did you mean '{near}'? 'armid effects' lists all effects"
             )
         broken = ''.join(
             f'; {package} cannot be loaded: {why}' for package, why in self.broken.items()
         )
         raise ModelError(
             f"no effect '{name}'; the catalogue has {', '.join(self)}{broken}"
-            '; install a package to add its effects'
+            '; to use another effect, install the package that contains it'
         )
 
     def add(self, kind: type[Effect]) -> None:
         """
-        Add an effect class to the catalogue, or replace its old version.
+        Add an effect class to the catalogue, or replace an earlier definition of the class.
 
         Raises
         ------
@@ -165,7 +165,7 @@ class Catalogue(Mapping[str, type[Effect]]):
         if there is not None and _home(there) != _home(kind):
             raise ModelError(
                 f"the name '{kind.name}' of {_home(kind)} is already used by {_home(there)}; "
-                'choose another one'
+                'choose another name'
             )
         taken = {
             name: other.name
@@ -187,7 +187,7 @@ class Catalogue(Mapping[str, type[Effect]]):
             self._kinds.pop(name, None)
 
     def _complete_once(self) -> None:
-        """Load the effects of all installed packages, once."""
+        """Load the effects of all installed packages at the first call; then do nothing."""
         if self._complete:
             return
         self._complete = True
@@ -208,7 +208,7 @@ class Catalogue(Mapping[str, type[Effect]]):
 
 def check_kind(kind: type[Effect]) -> None:
     """
-    Raise an error unless a class has the required attributes of an effect.
+    Check that a class has the required attributes of an effect; raise a ModelError if not.
 
     Raises
     ------
@@ -224,19 +224,19 @@ def check_kind(kind: type[Effect]) -> None:
         raise ModelError(f"{class_path}: 'name' has to be like 'viscous_friction', not {name!r}")
     lacking = sorted(getattr(kind, '__abstractmethods__', ()))
     if lacking:
-        raise ModelError(f'{name} ({class_path}) has no method {" and no method ".join(lacking)}')
+        raise ModelError(f'{name} ({class_path}) has to define {" and ".join(lacking)}()')
     summary = getattr(kind, 'summary', None)
     if not isinstance(summary, str) or not summary.strip():
         raise ModelError(f"{name} ({class_path}): 'summary' has to be a text of one line")
     quantities: tuple[Quantity, ...] = getattr(kind, 'quantities', ())
     if not quantities or not all(isinstance(one, Quantity) for one in quantities):
-        raise ModelError(f"{name} ({class_path}): 'quantities' has to be a tuple of Quantity")
+        raise ModelError(f"{name} ({class_path}): 'quantities' has to be a tuple of Quantity(...)")
     if not all(isinstance(one, Shape) for one in kind.shapes):
-        raise ModelError(f"{name} ({class_path}): 'shapes' has to be a tuple of Shape")
+        raise ModelError(f"{name} ({class_path}): 'shapes' has to be a tuple of Shape(...)")
     names = part_names(kind)
     twice = [part for part in names if names.count(part) > 1]
     if twice:
-        raise ModelError(f"{name} ({class_path}): two quantities are called '{twice[0]}'")
+        raise ModelError(f"{name} ({class_path}): '{twice[0]}' names two quantities or shapes")
 
 
 def part_names(kind: type[Effect]) -> list[str]:
@@ -261,7 +261,7 @@ _Kind = TypeVar('_Kind', bound=type[Effect])
 
 def register(kind: _Kind) -> _Kind:
     """
-    Add a user-defined effect class to the catalogue; to be used as class decorator.
+    Add a user-defined effect class to the catalogue; usable as a class decorator.
 
     The effect can then be named like a shipped effect: in ``make_effect``, in model.yaml and in
     ``effects='...'``. The diagnosis searches for it. A new definition of a class, as in a
@@ -342,7 +342,7 @@ EXAMPLES = 'viscous_friction:viscous_coefficient=0.1 or payload@wrist:payload_m=
 
 def parse_effect(text: str, robot: Robot) -> tuple[Effect, FloatArray]:
     """
-    Create an effect with its values from one line of text.
+    Create an effect and its parameter values from a text, such as 'payload:payload_m=0.3'.
 
     Parameters
     ----------
@@ -386,7 +386,7 @@ def parse_effect(text: str, robot: Robot) -> tuple[Effect, FloatArray]:
 
 
 def _number(text: str, effect: Effect, key: str, number: str) -> float:
-    """Convert the text of a value to a number; raise a ModelError if the text is no number."""
+    """Convert the text of a value to a finite number; raise a ModelError if this is impossible."""
     try:
         value = float(number)
     except ValueError:
@@ -397,8 +397,8 @@ def _number(text: str, effect: Effect, key: str, number: str) -> float:
         raise ModelError(f"{text}: '{number}' is not a number; write {effect.name}:{key}=0.1")
     first = effect.quantities[0].name
     raise ModelError(
-        f"{text}: '{key}' has no value. One value applies to all joints; for separate values, "
-        f'give the effect once per joint, as {effect.name}@{effect.joints[0]}:{first}=0.1'
+        f"{text}: '{key}' is not NAME=NUMBER. One number applies to all joints; for separate "
+        f'numbers, give the effect once per joint, as {effect.name}@{effect.joints[0]}:{first}=0.1'
     )
 
 

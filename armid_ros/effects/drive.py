@@ -19,7 +19,7 @@ import numpy as np
 @dataclass(frozen=True)
 class RotorInertia(Effect):
     """
-    Inertia of the rotor and gear, as it acts at the joint, tau = Ia ddq.
+    Inertia of rotor and gear, reflected to the joint, tau = Ia ddq.
 
     Ia is the rotor's inertia times the gear ratio squared; gyroscopic coupling is neglected, as is
     usual for geared arms. For the first joint, it is exactly collinear with Izz of the link.
@@ -32,11 +32,11 @@ class RotorInertia(Effect):
     quantities = (Quantity('rotor_inertia', 'kg m^2', lower=0.0, typical=(0.001, 1.1)),)
 
     def columns(self, motion: Motion, arm: Arm) -> FloatArray:
-        """Return the torque per rotor inertia, dtau/dIa = ddq [rad/s^2], shape (N, n, P)."""
+        """Return the torque per unit of Ia: ddq [rad/s^2], shape (N, n, P)."""
         return joint_columns(self, motion, motion.ddq)
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
-        """Return the rotor inertias as inertia that is added to the plant."""
+        """Return the rotor inertias as a constant inertia matrix of the plant."""
         (inertia,) = scatter(self, values, arm.robot)
         return Action(inertia=np.diag(inertia))
 
@@ -48,7 +48,7 @@ _MIN_RIPPLE_ORDER = 1.5
 @dataclass(frozen=True)
 class TorqueRipple(JointLaw):
     """
-    Torque that repeats at a fixed angle, tau = A sin(n q) + B cos(n q).
+    Torque that is periodic in the joint position, tau = A sin(n q) + B cos(n q).
 
     Cogging of a motor with N_c cycles per turn behind a gear of ratio N has n = N N_c per turn of
     the joint. The kinematic error of a strain-wave gear has n = 2 N. The order does not depend on
@@ -76,7 +76,7 @@ class TorqueRipple(JointLaw):
     )
 
     def shape_starts(self, unexplained: Unexplained, arm: Arm) -> tuple[FloatArray, ...]:
-        """Return the ripple orders that explain most of the residual, as start values."""
+        """Return start values: the ripple orders that best explain each joint's residual."""
         robot = arm.robot
         # Range of ripple orders in a search [1/rad, 1/m]. Gravity and springs cause lower orders;
         # filters remove higher orders. Screws and racks have a turn or tooth every 4 to 60 mm.
@@ -89,17 +89,17 @@ class TorqueRipple(JointLaw):
         return (np.array(orders),)
 
     def plausible(self, values: FloatArray, std: FloatArray, arm: Arm) -> bool:
-        """Return whether the ripple order is too high for torques of gravity or springs."""
+        """Return whether the ripple order exceeds the orders of gravity and spring torques."""
         return bool(np.all(self.shape_values > 1.05 * _MIN_RIPPLE_ORDER))
 
     def law(self, x: JointStates) -> tuple[FloatArray, ...]:
-        """Return the ripple torque per unit of amplitude, sin(n q) and cos(n q) [-]."""
+        """Return the ripple torque per unit of A and B: sin(n q) and cos(n q) [-]."""
         angle = self.shape_values[:, 0] * x.q
         return np.sin(angle), np.cos(angle)
 
 
 def _wave_orders(unexplained: Unexplained, joint: int, between: tuple[float, float]) -> FloatArray:
-    """Return the ripple orders in a range [1/rad or 1/m] that explain most of a residual, (K,)."""
+    """Return the ripple orders in a range [1/rad or 1/m] that best explain a joint's residual."""
     # all recordings are used together, because a ripple has the same order and phase in each
     count = 3  # of returned orders
     weight = unexplained.weight[:, joint]
@@ -122,13 +122,13 @@ def _wave_orders(unexplained: Unexplained, joint: int, between: tuple[float, flo
 
 
 def _wave_gains(
-    angle: FloatArray, rest: FloatArray, weight: FloatArray, orders: FloatArray
+    angle: FloatArray, residual: FloatArray, weight: FloatArray, orders: FloatArray
 ) -> FloatArray:
-    """Return by how much a sine and cosine of each order reduce the squared residual, (K,)."""
+    """Return the decrease of the squared residual by a sine and cosine of each order, (K,)."""
     # with few cycles, orders leak into each other; least squares separate them better than a
     # spectrum
     wave = np.exp(1j * np.outer(orders, angle))
-    aim, twice, count = wave @ (weight * rest), wave**2 @ weight**2, np.sum(weight**2)
+    aim, twice, count = wave @ (weight * residual), wave**2 @ weight**2, np.sum(weight**2)
     cosines, sines, mixed = count + twice.real, count - twice.real, twice.imag
     determinant = np.maximum(cosines * sines - mixed**2, 1e-6 * count**2)
     squares = sines * aim.real**2 - 2.0 * mixed * aim.real * aim.imag + cosines * aim.imag**2
@@ -138,7 +138,7 @@ def _wave_gains(
 @dataclass(frozen=True)
 class ActuatorSaturation(TorqueReading):
     """
-    Saturation: a drive does not supply, or does not report, torque beyond a level.
+    Drive saturation: torque beyond a level is partly not supplied, or partly not reported.
 
     With the excess over the level L, e(x) = sign(x) max(|x| - L, 0):
 
@@ -170,14 +170,14 @@ class ActuatorSaturation(TorqueReading):
         return np.where(known, 0.8 * limits, self.shape_values)
 
     def shape_starts(self, unexplained: Unexplained, arm: Arm) -> tuple[FloatArray, ...]:
-        """Return start values of the saturation level: shares of the highest torque."""
+        """Return start values of the level: 30 to 95 % of the highest torque of each joint."""
         motion = unexplained.motion
         tau = arm.joint_torque(motion) if motion.tau is None else motion.tau
         highest = np.maximum(np.max(np.abs(tau[:, self.indices(motion.joints)]), axis=0), 1e-3)
         return (np.outer(highest, [0.3, 0.4, *np.linspace(0.5, 0.95, 10)]),)
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
-        """Return the functions by which saturation limits the supplied and the reported torque."""
+        """Return the functions that saturate the supplied torque and the reported torque."""
         lost = scatter(self, values, arm.robot)[0]
         (level,) = scatter(self, self.shape_values, arm.robot)
 
@@ -198,20 +198,20 @@ class ActuatorSaturation(TorqueReading):
     def transfer(
         self, values: FloatArray, motion: Motion, tau: FloatArray, columns: FloatArray
     ) -> FloatArray:
-        """Convert the regressor of true torques to that of reported torques, shape (N, n, Q)."""
+        """Convert a regressor of true torques to a regressor of reported torques, (N, n, Q)."""
         lost, clipped, level = self._spread(values, motion)
         slope = (lost / (1.0 - lost) if motion.tau is None else 0.0) - clipped
         return np.asarray((1.0 + slope * (np.abs(tau) > level))[:, :, np.newaxis] * columns)
 
     def sensitivity(self, values: FloatArray, motion: Motion, tau: FloatArray) -> FloatArray:
-        """Return the derivatives of the reported torque by lost and clipped share, (N, n, P)."""
+        """Return the derivatives of the reported torque by lost_share and clipped_share [N m]."""
         lost, _, level = self._spread(values, motion)
         beyond = _excess(tau, level)
         asked = beyond / (1.0 - lost) ** 2 if motion.tau is None else _excess(motion.tau, level)
         return joint_columns(self, motion, asked, -beyond)
 
     def _spread(self, values: FloatArray, motion: Motion) -> tuple[FloatArray, ...]:
-        """Return lost and clipped torque share, and saturation level, of each joint, (n,) each."""
+        """Return lost share, clipped share and saturation level [N m] of all joints, (n,) each."""
         spread = np.zeros((3, motion.n_joints))
         spread[2] = np.inf
         columns = self.indices(motion.joints)

@@ -65,7 +65,7 @@ class CoulombFriction(Effect):
         return joint_columns(self, motion, direction(motion))
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
-        """Return Coulomb friction as dry friction of the plant, between -Fc and Fc."""
+        """Return Coulomb friction as dry friction of the plant, with the levels -Fc and Fc."""
         (coulomb,) = scatter(self, values, arm.robot)
         return Action(dry_friction=DryFriction(np.eye(len(coulomb)), -coulomb, coulomb))
 
@@ -128,7 +128,7 @@ class QuadraticFriction(JointLaw):
 @dataclass(frozen=True)
 class StribeckFriction(JointLaw):
     """
-    Friction in addition to Coulomb friction that decreases with velocity by lubrication.
+    Breakaway friction beyond Coulomb friction, which decreases as velocity increases.
 
     tau = dFs exp(-|dq / vs|^d) sign(dq), where dFs = Fs - Fc is the breakaway torque beyond the
     Coulomb torque. The additional friction is below 3 vs. Confounded with presliding_hysteresis,
@@ -175,7 +175,7 @@ class ThermalFriction(JointLaw):
 
     @classmethod
     def as_change(cls) -> type[Effect]:
-        """Return the effect class for changes of viscous friction since the baseline."""
+        """Return the effect class that models a change of viscous friction since the baseline."""
         return ThermalChange
 
     def law(self, x: JointStates) -> tuple[FloatArray, ...]:
@@ -186,7 +186,7 @@ class ThermalFriction(JointLaw):
 @dataclass(frozen=True)
 class ThermalChange(ThermalFriction):
     """
-    Change of viscous friction since the baseline, in the cold joint and while it warms up.
+    Change of viscous friction since the baseline, of the cold joint and during its warm-up.
 
     tau = (c + dFv (1 - exp(-t / T))) dq. A joint that starts colder has more friction at first,
     and the same friction when warm. Reported as thermal_friction and viscous_friction.
@@ -200,7 +200,7 @@ class ThermalChange(ThermalFriction):
         return *super().law(x), x.dq
 
     def named_as(self, values: FloatArray, arm: Arm) -> tuple[tuple[Effect, FloatArray], ...]:
-        """Return the equivalent effects thermal_friction and viscous_friction, with values."""
+        """Return the equivalent thermal_friction and viscous_friction, each with its values."""
         change, first = values.reshape(-1, 2).T
         return (
             (ThermalFriction(self.joints, self.shape), change),
@@ -241,25 +241,25 @@ class TemperatureDependentFriction(Effect):
     lasting = True
 
     def __post_init__(self) -> None:
-        """Set a default reference temperature for joints for which none is given."""
+        """Set the reference temperature of all joints without a given one to 25 degC."""
         super().__post_init__()
         known = dict.fromkeys(self.joints, _REFERENCE_TEMPERATURE) | dict(self.reference)
         object.__setattr__(self, 'reference', tuple(known.items()))
 
     def along(self, motion: Motion) -> Self:
-        """Return the effect with the joint temperatures that were measured with a motion."""
+        """Return a copy of the effect with the joint temperatures measured during a motion."""
         return replace(self, course=motion.temperature) if motion.temperature else self
 
     def referred_to(self, temperatures: Mapping[str, float]) -> Self:
-        """Return the effect with other reference temperatures [degC], by joint."""
+        """Return a copy with the given reference temperatures [degC], by joint name."""
         return replace(self, reference=tuple(temperatures.items()))
 
     def particulars(self) -> dict[str, Any]:
-        """Return the reference temperature of each joint as entry for model.yaml."""
+        """Return the reference temperature of each joint as an entry for model.yaml."""
         return {'reference_temperature': self.reference_temperatures}
 
     def with_particulars(self, entry: Mapping[str, Any]) -> Self:
-        """Return the effect with the reference temperatures of an entry of model.yaml."""
+        """Return a copy with the reference temperatures from an entry of model.yaml."""
         known = entry.get('reference_temperature', {})
         return self.referred_to({joint: finite(t, f'{joint}: T0') for joint, t in known.items()})
 
@@ -270,7 +270,7 @@ class TemperatureDependentFriction(Effect):
         return {joint: known[joint] for joint in self.joints}
 
     def plausible(self, values: FloatArray, std: FloatArray, arm: Arm) -> bool:
-        """Return whether friction changes by at most 5 % per kelvin and viscous friction falls."""
+        """Return whether friction changes by at most 5 %/K, and viscous friction does not rise."""
         action, n = arm.action(), arm.robot.n_joints
         known = np.zeros((2, n))
         if action.damping is not None:
@@ -289,7 +289,7 @@ class TemperatureDependentFriction(Effect):
         return joint_columns(self, motion, warmer * motion.dq, warmer * direction(motion))
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
-        """Return the friction as terms of the plant: dry friction, and a function of motion."""
+        """Return the friction as dry friction of the plant and a function of time and velocity."""
         viscous, coulomb = scatter(self, values, arm.robot)
         if self.course is None:
             return Action()
@@ -303,7 +303,7 @@ class TemperatureDependentFriction(Effect):
         return Action(dry_friction=DryFriction(np.eye(len(level)), -level, level), torque=torque)
 
     def warmer(self, t: FloatArray, joints: tuple[str, ...]) -> FloatArray:
-        """Return joint temperatures minus T0, zero where not measured, shape (N, n) [K]."""
+        """Return joint temperatures minus T0 at times t, zero if not measured, (N, n) [K]."""
         if self.course is None:
             return np.zeros((np.size(t), len(joints)))
         known = dict(self.reference)

@@ -24,7 +24,7 @@ from scipy.spatial.transform import Rotation
 
 
 class _GravityEffect(Effect):
-    """Base class of changes of gravity, which act on the whole arm."""
+    """Base class of effects that change the gravity of the whole arm."""
 
     changes_body = True
 
@@ -54,16 +54,16 @@ class GravityMagnitude(_GravityEffect):
     quantities = (Quantity('gravity_difference', 'm/s^2', typical=(0.05, 10.0)),)
 
     def columns(self, motion: Motion, arm: Arm) -> FloatArray:
-        """Return the torque per change of gravity magnitude [N m per m/s^2], shape (N, n, 1)."""
+        """Return the joint torques per unit of dg [N m per m/s^2], shape (N, n, 1)."""
         direction = _unit(arm.robot.gravity)[:, np.newaxis]
         return np.asarray(arm.gravity_columns(motion) @ direction)
 
     def plausible(self, values: FloatArray, std: FloatArray, arm: Arm) -> bool:
-        """Return whether gravity keeps its direction; a reversal is a tilt of the base."""
+        """Return whether gravity keeps its direction; a reversal would be a tilt of the base."""
         return bool(values[0] > -np.linalg.norm(arm.robot.gravity))
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
-        """Return the robot with the changed magnitude of gravity, for the plant."""
+        """Return an action whose robot has gravity of the changed magnitude."""
         gravity = arm.robot.gravity
         return Action(robot=arm.robot.with_gravity(gravity + values[0] * _unit(gravity)))
 
@@ -89,7 +89,7 @@ class BaseTilt(_GravityEffect):
     linear = False
 
     def columns(self, motion: Motion, arm: Arm) -> FloatArray:
-        """Return the torque per angle of base tilt [N m/rad], shape (N, n, 2)."""
+        """Return the derivatives of the torques by tilt_x and tilt_y [N m/rad], (N, n, 2)."""
         values, size = arm.values_of(self), 1e-5  # step of the differences [rad]
         turned = [
             (_turned(arm.robot.gravity, values + step) - _turned(arm.robot.gravity, values - step))
@@ -99,7 +99,7 @@ class BaseTilt(_GravityEffect):
         return np.asarray(arm.gravity_columns(motion) @ np.transpose(turned))
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
-        """Return the robot with the gravity vector in the frame of its tilted base."""
+        """Return an action whose robot has the gravity vector in the frame of the tilted base."""
         return Action(robot=arm.robot.with_gravity(_turned(arm.robot.gravity, values)))
 
 
@@ -119,15 +119,15 @@ class GravityVector(_GravityEffect):
     quantities = tuple(Quantity(f'gravity_difference_{axis}', 'm/s^2') for axis in 'xyz')
 
     def columns(self, motion: Motion, arm: Arm) -> FloatArray:
-        """Return the torque per component of the gravity vector [N m per m/s^2], (N, n, 3)."""
+        """Return the joint torques per gravity component [N m per m/s^2], shape (N, n, 3)."""
         return arm.gravity_columns(motion)
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
-        """Return the robot with the changed gravity vector, for the plant."""
+        """Return an action whose robot has the changed gravity vector."""
         return Action(robot=arm.robot.with_gravity(arm.robot.gravity + values))
 
     def named_as(self, values: FloatArray, arm: Arm) -> tuple[tuple[Effect, FloatArray], ...]:
-        """Return the equivalent base tilt and change of gravity's magnitude, with values."""
+        """Return the equivalent base_tilt and gravity_magnitude, each with its values."""
         before = np.array(arm.robot.gravity)
         after = before + values
         lengths = np.linalg.norm(before), np.linalg.norm(after)
@@ -147,7 +147,7 @@ def with_exact_vector(kinds: Sequence[type[Effect]]) -> list[type[Effect]]:
 
 
 def _turned(gravity: FloatArray, tilt: FloatArray) -> FloatArray:
-    """Return the gravity vector in the frame of a base that is tilted by angles (2,) [rad]."""
+    """Return the gravity vector in the frame of a base that is tilted by two angles [rad]."""
     rotation = Rotation.from_rotvec(tilt @ _horizontal_axes(gravity))
     return np.asarray(rotation.inv().apply(np.array(gravity)))
 
@@ -156,12 +156,12 @@ def _unit(gravity: FloatArray) -> FloatArray:
     """Return the unit vector along gravity; raise a ModelError if gravity is zero."""
     length = np.linalg.norm(gravity)
     if not length > 0.0:
-        raise ModelError('gravity is zero, so no effect can tilt or scale it; set --gravity')
+        raise ModelError('gravity is zero, so no effect can change or tilt it; set --gravity')
     return np.asarray(gravity / length)
 
 
 def _horizontal_axes(gravity: FloatArray) -> FloatArray:
-    """Return two unit vectors perpendicular to gravity: x and y if gravity is along -z."""
+    """Return two unit vectors normal to gravity, shape (2, 3): x and y if gravity is along -z."""
     down = _unit(gravity)
     upright, _ = Rotation.align_vectors([-down], [[0.0, 0.0, 1.0]])
     return np.asarray(upright.apply(np.eye(3)[:2]))

@@ -78,12 +78,12 @@ class PreslidingHysteresis(Effect):
         return columns
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
-        """Return the friction as springs of the plant that slip at a torque level."""
+        """Return the friction as slipping springs of the plant."""
         if not np.any(values):
             return Action()
         return Action(hysteresis=self._elements(values, arm.robot.joints))
 
     def _elements(self, level: FloatArray, joints: tuple[str, ...]) -> Hysteresis:
-        """Return springs on the effect's joints that slip at given torque levels."""
+        """Return slipping springs on the joints of the effect, with given torque levels [N m]."""
         directions = np.eye(len(joints))[self.indices(joints)]
         return Hysteresis(directions, level, self.shape_values[:, 0])

@@ -36,14 +36,14 @@ _ATTACHMENT_SHAPES = tuple(
 
 @dataclass(frozen=True)
 class Attached(Effect):
-    """Base class of springs and similar effects that join points of links to anchors."""
+    """Base class of springs and dampers between points of links and anchors."""
 
     @classmethod
     def _possible_joints(cls, robot: Robot) -> tuple[str, ...]:
         return robot.moving
 
     def _default_shape(self, robot: Robot) -> FloatArray:
-        """Return shape parameters with the springs attached near the links' centres of mass."""
+        """Return default shape parameters: springs attached near the links' centres of mass."""
         values, model = self.shape_values, robot.model
         reach = max(float(np.linalg.norm(place.translation)) for place in model.jointPlacements)
         for row, joint in zip(values, self.joints, strict=True):
@@ -54,7 +54,7 @@ class Attached(Effect):
         return values
 
     def shape_starts(self, unexplained: Unexplained, arm: Arm) -> tuple[FloatArray, ...]:
-        """Return start values for the shape search: link points as given, others on grids."""
+        """Return start values of the shapes: present values of points, grids of all others."""
         return tuple(
             self.shape_values[:, [index]]
             if shape.unit == 'm' and shape.lower < 0.0
@@ -69,10 +69,10 @@ class Attached(Effect):
 
     @abstractmethod
     def _anchor(self, arm: Arm) -> Anchor:
-        """Return a function of time that gives position and velocity of the springs' anchors."""
+        """Return a function from times to positions and velocities of the springs' anchors."""
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
-        """Return the joint torques of the springs as a term of the plant."""
+        """Return the joint torques of the springs as a torque function of the plant's links."""
         robot, anchor = arm.robot, self._anchor(arm)
 
         def torque(t: FloatArray, q: FloatArray, dq: FloatArray) -> FloatArray:
@@ -91,18 +91,18 @@ class Attached(Effect):
     def _columns(
         self, frames: LinkFrames, dq: FloatArray, anchors: FloatArray, velocities: FloatArray
     ) -> FloatArray:
-        """Return `columns` for given motions of links and anchors, shape (N, n, P)."""
+        """Return the regressor for given motions of links and anchors, shape (N, n, P)."""
         positions, jacobians = frames.points(self.joints, self._attachments)
         rate = np.einsum('nkxj,nj->nkx', jacobians, dq) - velocities
         columns = self._of_springs(jacobians, positions - anchors, rate)
         return columns.reshape(*dq.shape, -1)
 
     @abstractmethod
-    def _of_springs(self, jacobians: FloatArray, way: FloatArray, rate: FloatArray) -> FloatArray:
+    def _of_springs(self, jacobians: FloatArray, span: FloatArray, rate: FloatArray) -> FloatArray:
         """
         Return the joint torque per unit of each quantity of k springs, shape (N, n, k, ...).
 
-        `jacobians` of the attachments have the shape (N, k, 3, n). `way` is the vector from the
+        `jacobians` of the attachments have the shape (N, k, 3, n). `span` is the vector from the
         anchor to the attachment [m], and `rate` its derivative, (N, k, 3) each.
 
         """
@@ -139,8 +139,8 @@ class HumanInteraction(Attached):
         middle = np.stack([frames.places(joint, point) for joint, point in points], axis=1)
         return lambda t: (middle, np.zeros((1, 1, 3)))
 
-    def _of_springs(self, jacobians: FloatArray, way: FloatArray, rate: FloatArray) -> FloatArray:
-        stretch, speed = (np.einsum('nkxj,nkx->njk', jacobians, x) for x in (way, rate))
+    def _of_springs(self, jacobians: FloatArray, span: FloatArray, rate: FloatArray) -> FloatArray:
+        stretch, speed = (np.einsum('nkxj,nkx->njk', jacobians, x) for x in (span, rate))
         forces = -jacobians.transpose(2, 0, 3, 1)
         # ties to known points have no constant forces
         return np.stack([stretch, speed, *forces][: len(self.quantities)], axis=-1)
@@ -172,7 +172,7 @@ class InterfaceSlack(Attached):
     )
 
     def _default_shape(self, robot: Robot) -> FloatArray:
-        """Return default shape parameters: the anchor is the link point in the mid-range pose."""
+        """Return default shapes; each anchor is where the attachment is in the mid-range pose."""
         values = super()._default_shape(robot)
         middle = LinkFrames.in_the_middle(robot)
         for row, joint in zip(values, self.joints, strict=True):
@@ -180,7 +180,7 @@ class InterfaceSlack(Attached):
         return values
 
     def shape_starts(self, unexplained: Unexplained, arm: Arm) -> tuple[FloatArray, ...]:
-        """Return start values of anchors and slacks that explain most of the residual."""
+        """Return the anchors and slacks that best explain the residual, as start values."""
         rows = np.unique(np.linspace(0, len(unexplained.q) - 1, 400).astype(int))
         weight = unexplained.weight[rows, :, np.newaxis]
         basis = np.linalg.qr((unexplained.nuisance[rows] * weight).reshape(weight.size, -1))[0]
@@ -211,12 +211,12 @@ class InterfaceSlack(Attached):
         fixed = self.shape_values[np.newaxis, :, 3:6], np.zeros((1, 1, 3))
         return lambda t: fixed
 
-    def _of_springs(self, jacobians: FloatArray, way: FloatArray, rate: FloatArray) -> FloatArray:
-        return np.asarray(np.einsum('nkxj,nkx->njk', jacobians, extension(way, self.slacks)))
+    def _of_springs(self, jacobians: FloatArray, span: FloatArray, rate: FloatArray) -> FloatArray:
+        return np.asarray(np.einsum('nkxj,nkx->njk', jacobians, extension(span, self.slacks)))
 
 
 def _proposals(places: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return candidate anchors (A, 3) and slacks (A,), given positions of a link point."""
+    """Return candidate anchors (A, 3) and slacks (A,) of a strap, for places of its link end."""
     middle, spread = places.mean(axis=0), float(places.std(axis=0).max())
     directions = np.array(
         [direction for direction in product((-1.0, 0.0, 1.0), repeat=3) if any(direction)]

@@ -23,7 +23,7 @@ class JointStates(NamedTuple):
     Attributes
     ----------
     t : ndarray, shape (..., 1)
-        Time since the begin of the recording [s].
+        Time since the start of the recording [s].
     q, dq : ndarray, shape (..., k)
         Positions [rad or m] and velocities.
     forwards : ndarray, shape (..., k)
@@ -39,7 +39,7 @@ class JointStates(NamedTuple):
 
 @dataclass(frozen=True)
 class JointLaw(Effect):
-    """Base class of effects whose torque depends only on time and the joint's own motion."""
+    """Base class of effects whose torque on a joint depends only on time and its own motion."""
 
     #: Whether the torque acts on the link side of an elastic transmission.
     on_links: ClassVar[bool] = False
@@ -47,7 +47,7 @@ class JointLaw(Effect):
     @abstractmethod
     def law(self, x: JointStates) -> tuple[FloatArray, ...]:
         """
-        Return the torque per unit of each parameter, arrays of shape (..., k).
+        Return the joint torques per unit of each quantity, one array (..., k) per quantity.
 
         A law that depends on the direction of motion holds the joint at rest, between two levels
         that depend on nothing else.
@@ -62,7 +62,7 @@ class JointLaw(Effect):
         return _placed(own, motion, self.law(JointStates(motion.t[:, np.newaxis], *states)))
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
-        """Return the torque as terms of the plant; torque that jumps at rest is dry friction."""
+        """Return the torque as plant terms; a jump at zero velocity becomes dry friction."""
         places, n = self.indices(arm.robot.joints), arm.robot.n_joints
         first, *others = values.reshape(len(places), -1).T
         # a slice takes less time than indices, and the plant calls the law in every step
@@ -122,7 +122,7 @@ def joint_columns(effect: Effect, motion: Motion, *quantities: FloatArray) -> Fl
 
 def scatter(effect: Effect, values: FloatArray, robot: Robot) -> FloatArray:
     """
-    Return effect values as an array with one column per joint of the robot, zero elsewhere.
+    Arrange an effect's values in an array with one column per robot joint; the rest is zero.
 
     Parameters
     ----------
@@ -145,7 +145,7 @@ def scatter(effect: Effect, values: FloatArray, robot: Robot) -> FloatArray:
 
 
 def _placed(own: list[int], motion: Motion, quantities: Sequence[FloatArray]) -> FloatArray:
-    """Build the regressor (N, n, P) from the torque of k joints per unit of each quantity."""
+    """Arrange torques of the joints `own`, per unit of each quantity, as a regressor (N, n, P)."""
     columns = np.zeros((*motion.q.shape, len(own), len(quantities)))
     for number, values in enumerate(quantities):
         columns[:, own, np.arange(len(own)), number] = values

@@ -75,13 +75,13 @@ class TorqueMap:
         shapes = self.points.shape, self.noise.shape, self.lengths.shape
         if shapes != ((count, len(INPUTS)), (count,), (len(INPUTS),)):
             raise ModelError(
-                f'torque map: its {count} weights do not agree with the shapes of its other '
-                f'arrays, {shapes}'
+                f'torque map: points, noise and lengths have shapes {shapes}; with {count} '
+                f'weights they need {(count, len(INPUTS))}, {(count,)} and {(len(INPUTS),)}'
             )
         sizes = (*self.lengths, *self.noise, self.amplitude, self.knee)
         if not min(sizes) > 0.0:
             raise ModelError(
-                'torque map: length scales, deviations, amplitude and knee have to be positive'
+                'torque map: length scales, noise, amplitude and knee have to be positive'
             )
 
     def __eq__(self, other: object) -> bool:
@@ -103,16 +103,16 @@ class TorqueMap:
         return bool(np.isfinite(self.lengths[2]))
 
     def fitted_to(self, torque: FloatArray) -> TorqueMap:
-        """Return the torque map with other torques at its M inducing points, shape (M,) [N m]."""
+        """Return a copy of the map that is fitted to torques [N m] at the M inducing points."""
         return replace(self, weights=cho_solve(self._factor, torque))
 
     def torque(self, inputs: FloatArray) -> FloatArray:
-        """Return the learned torque at positions, velocities and loads, (..., 3), [N m or N]."""
-        return np.asarray(self._nearness(inputs) @ self.weights)
+        """Return the learned torque [N m or N] for inputs (..., 3): position, velocity, load."""
+        return np.asarray(self._kernel(inputs) @ self.weights)
 
     def std(self, inputs: FloatArray) -> FloatArray:
-        """Return the standard deviation of the learned torque at inputs (..., 3); see `torque`."""
-        near = self._nearness(inputs)
+        """Return the standard deviation of `torque` [N m or N] for the same inputs (..., 3)."""
+        near = self._kernel(inputs)
         solved = cho_solve(self._factor, near.reshape(-1, len(self.weights)).T).T
         explained = np.sum(near * solved.reshape(near.shape), axis=-1)
         return np.asarray(self.amplitude * np.sqrt(np.clip(1.0 - explained, 0.0, 1.0)))
@@ -120,16 +120,16 @@ class TorqueMap:
     @cached_property
     def _factor(self) -> Any:
         share = (self.noise / self.amplitude) ** 2
-        return cho_factor(self._nearness(self.points) + np.diag(share))
+        return cho_factor(self._kernel(self.points) + np.diag(share))
 
-    def _nearness(self, inputs: FloatArray) -> FloatArray:
-        """Return the kernel between inputs and inducing points, 1 at zero distance, (..., M)."""
+    def _kernel(self, inputs: FloatArray) -> FloatArray:
+        """Return the kernel k / s^2 between inputs and the M inducing points, shape (..., M)."""
         own, others = (scaled_inputs(x, self.knee) for x in (inputs, self.points))
         difference = (own[..., np.newaxis, :] - others) / self.lengths
         return np.asarray(np.exp(-0.5 * np.sum(difference**2, axis=-1)))
 
     def document(self) -> dict[str, Any]:
-        """Return the torque map as an entry for model.yaml, with a line per inducing point."""
+        """Return the torque map as an entry for model.yaml, with one line per inducing point."""
         rows = np.column_stack([self.points, self.weights, self.noise])
         return {
             'amplitude': float(self.amplitude),
@@ -141,7 +141,7 @@ class TorqueMap:
     @classmethod
     def of_document(cls, entry: Mapping[str, Any], joint: str) -> TorqueMap:
         """
-        Return the torque map from an entry of model.yaml that `document` wrote.
+        Create the torque map of a joint from an entry of model.yaml that `document` wrote.
 
         Raises
         ------
@@ -157,7 +157,7 @@ class TorqueMap:
         except (TypeError, ValueError) as error:
             raise ModelError(f'{torque_map}: {error}') from None
         if not np.all(np.isfinite(table)) or np.any(np.isnan(lengths)):
-            raise ModelError(f'{torque_map}: a number is not finite; learn the map again')
+            raise ModelError(f'{torque_map} has a number that is not finite; learn the map again')
         size, knee = (
             finite(entry[key], f'{key} of the {torque_map}') for key in ('amplitude', 'knee')
         )
@@ -190,12 +190,12 @@ class LearnedTorque(Effect):
     learned = True
 
     def __post_init__(self) -> None:
-        """Check that there is a torque map for each joint."""
+        """Check that there is one torque map per joint, or none at all."""
         super().__post_init__()
         if self.maps and len(self.maps) != len(self.joints):
             raise ModelError(
-                f'{self.name}: there are {len(self.maps)} maps, but {len(self.joints)} joints: '
-                f'{", ".join(self.joints)}'
+                f'{self.name}: {len(self.maps)} torque maps are given for {len(self.joints)} '
+                f'joints, {", ".join(self.joints)}; give one for each joint'
             )
 
     def particulars(self) -> dict[str, Any]:
@@ -204,7 +204,7 @@ class LearnedTorque(Effect):
         return {'maps': [{'joint': joint, **own.document()} for joint, own in rows]}
 
     def with_particulars(self, entry: Mapping[str, Any]) -> Self:
-        """Return the learned torque with the torque maps in an entry of model.yaml."""
+        """Return a copy of the effect with the torque maps from an entry of model.yaml."""
         found = {str(row['joint']): row for row in entry.get('maps', ())}
         if not found:
             return self
@@ -225,13 +225,13 @@ class LearnedTorque(Effect):
 
 
 def scaled_inputs(inputs: FloatArray, knee: float) -> FloatArray:
-    """Scale the velocities in inputs (position, velocity, load) as a `TorqueMap` does."""
+    """Return inputs (..., 3) with their velocities scaled by the law of `TorqueMap`."""
     velocity = knee * np.arcsinh(inputs[..., 1] / knee)
     return np.stack([inputs[..., 0], velocity, inputs[..., 2]], axis=-1)
 
 
 def holding_torque(robot: Robot, q: FloatArray) -> FloatArray:
-    """Return the torques that hold the rigid body at rest in poses q, shape (..., n) [N m]."""
+    """Return the torques that hold the rigid body at rest at positions q, (..., n) [N m]."""
     poses = np.reshape(q, (-1, robot.n_joints))
     still = Motion.of_states(robot.joints, poses, 0.0, 0.0)
     return inverse_dynamics(robot, still).reshape(np.shape(q))

@@ -23,23 +23,23 @@ class _LinkBody(Effect):
     changes_body = True
 
     def parameters(self, robot: Robot) -> tuple[ParameterName, ...]:
-        """Return parameter names; the units are the same for revolute and prismatic joints."""
+        """Return names and units of the parameters; units do not depend on the joint type."""
         return tuple(
             ParameterName(q.name, owner, q.unit) for owner in self.owners for q in self.quantities
         )
 
     def columns(self, motion: Motion, arm: Arm) -> FloatArray:
-        """Return the torque per inertial parameter of the added bodies, shape (N, n, P)."""
+        """Return the torque per unit of each inertial parameter of the bodies, (N, n, P)."""
         return arm.body_columns(motion)[:, :, list(self.adds_to(arm.robot))]
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
-        """Return the robot whose links include the added bodies, for the plant."""
+        """Return an action whose robot has the added bodies in its links."""
         parameters = arm.robot.rigid_parameters.copy()
         parameters[list(self.adds_to(arm.robot))] += values
         return Action(robot=arm.robot.with_inertias(parameters))
 
     def spread(self, robot: Robot) -> FloatArray:
-        """Return the largest expected errors of the links' described parameters, shape (P,)."""
+        """Return the largest expected errors of the parameters in the description, (P,)."""
         return robot.described_spread.ravel()[list(self.adds_to(robot))]
 
     def adds_to(self, robot: Robot) -> tuple[int, ...]:
@@ -55,7 +55,7 @@ class _LinkBody(Effect):
 @dataclass(frozen=True)
 class Payload(_LinkBody):
     """
-    Body that is fixed to a link, by default the last: mass, first moments and inertia.
+    Body fixed to a link, by default to the last link: mass, first moments and inertia.
 
     All ten parameters are about the frame of the link's joint. They add to the parameters of the
     link, and the torque is linear in them. They are exactly collinear with the parameters of the
@@ -81,16 +81,16 @@ class Payload(_LinkBody):
 
     @classmethod
     def places(cls, robot: Robot) -> tuple[tuple[str, ...], ...]:
-        """Return each moving link, by its joint, as a place where a payload may be fixed."""
+        """Return all places of a payload: each moving link, by the name of its joint."""
         return tuple((joint,) for joint in robot.moving)
 
     @classmethod
     def as_change(cls) -> type[Effect]:
-        """Return the effect class for changes of a payload, whose mass may be negative."""
+        """Return the effect class that models a change of payload; its mass may be negative."""
         return PayloadChange
 
     def plausible(self, values: FloatArray, std: FloatArray, arm: Arm) -> bool:
-        """Return whether a body within the arm's length can have the payload's parameters."""
+        """Return whether a body within the arm's length can have the fitted parameters."""
         if not self._weighs(values, std, arm):
             return False
         # the inertia of a body about the joint is at least that of a point mass at its centre
@@ -107,7 +107,7 @@ class Payload(_LinkBody):
         return not most * heaviest < np.maximum(aside, 0.0) ** 2
 
     def _weighs(self, values: FloatArray, std: FloatArray, arm: Arm) -> bool:
-        """Return whether the mass may be positive, with its centre within the arm's length."""
+        """Return whether, within errors, the mass is positive and its centre within reach."""
         if std[0] == 0.0:  # noqa: RUF069 - set exactly to zero if no motion identifies it, as for an inner link
             return bool(np.any(values[1:4]))
         places = [placement.translation for placement in arm.robot.model.jointPlacements]
@@ -118,7 +118,7 @@ class Payload(_LinkBody):
 
     def spread(self, robot: Robot) -> FloatArray:
         """
-        Return the parameters of the largest expected payload, with the mass of the arm.
+        Return the parameters of the largest expected payload, which is as heavy as the arm.
 
         First moments and inertia are proportional to the mass.
 

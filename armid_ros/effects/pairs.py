@@ -23,18 +23,18 @@ class _Pairs(Effect):
     """Base class of effects on pairs of joints; ``joints`` lists both joints of each pair."""
 
     def __post_init__(self) -> None:
-        """Check that the joints form pairs of different joints, without repeated pairs."""
+        """Check that the joints form pairs of two different joints, and that no pair repeats."""
         if not self.joints or len(self.joints) % 2:
             raise ModelError(
-                f'{self.name} needs pairs of joints, such as joint_5 and joint_6; got '
-                f'{", ".join(self.joints) or "none"}'
+                f'{self.name} needs pairs of joints, such as {self.name}@joint_5+joint_6; got '
+                f'{", ".join(self.joints) or "no joints"}'
             )
         pairs = list(zip(self.joints[::2], self.joints[1::2], strict=True))
         for first, second in pairs:
             if first == second or pairs.count((first, second)) > 1:
                 raise ModelError(
-                    f'{self.name}: {first} and {second} are the same joint, or a pair that is '
-                    'given twice'
+                    f'{self.name}: the pair {first}+{second} is given twice, or has the '
+                    'same joint twice'
                 )
         super().__post_init__()
 
@@ -42,26 +42,26 @@ class _Pairs(Effect):
     def _default_joints(cls, robot: Robot) -> tuple[str, ...]:
         if robot.n_joints < 2:
             raise ModelError(
-                f'{cls.name}: {robot.name} has only one joint, so that no pair exists'
+                f'{cls.name} needs a pair of joints, but {robot.name} has only one joint'
             )
         return tuple(chain.from_iterable(pairwise(robot.joints)))
 
     def in_usual_place(self, robot: Robot) -> bool:
-        """Return True: all pairs of joints are equally likely."""
+        """Return True, because no pair of joints is more usual than another."""
         return True
 
     @classmethod
     def places(cls, robot: Robot) -> tuple[tuple[str, ...], ...]:
-        """Return all pairs of neighbouring joints, which may be coupled."""
+        """Return all pairs of neighbouring joints, as the places where the effect can act."""
         return tuple(pairwise(robot.joints))
 
     @property
     def owners(self) -> tuple[str, ...]:
-        """First joint of each pair, which names the pair's parameters."""
+        """First joint of each pair, under which the pair's parameters are listed."""
         return self.joints[::2]
 
     def parameters(self, robot: Robot) -> tuple[ParameterName, ...]:
-        """Return names and units of the parameters of each pair."""
+        """Return names and units of the parameters, pair by pair."""
         return tuple(
             ParameterName(q.name, first, pair_unit(q.unit, first, second, robot))
             for first, second in zip(self.joints[::2], self.joints[1::2], strict=True)
@@ -69,7 +69,7 @@ class _Pairs(Effect):
         )
 
     def pairs(self, joints: tuple[str, ...]) -> list[tuple[int, int]]:
-        """Return the indices of the two joints of each pair among the given joints."""
+        """Return, for each pair of the effect, the indices of its two joints in `joints`."""
         columns = self.indices(joints)
         return list(zip(columns[::2], columns[1::2], strict=True))
 
@@ -104,7 +104,7 @@ class CoupledJointFriction(_Pairs):
         return super()._default_joints(robot)[-2:]
 
     def columns(self, motion: Motion, arm: Arm) -> FloatArray:
-        """Return the torque per unit of inertia, viscous and Coulomb friction, (N, n, P)."""
+        """Return the torque per unit of Ia, Fv and Fc of each pair, shape (N, n, P)."""
         columns = np.zeros((len(motion), motion.n_joints, 3 * len(self.owners)))
         for position, (i, k) in enumerate(self.pairs(motion.joints)):
             forwards = direction(motion, (i, k))
@@ -149,13 +149,13 @@ class JointCoupling(_Pairs):
     quantities = (Quantity('coupling_stiffness', 'N m/rad', typical=(0.1, 50.0)),)
 
     def __post_init__(self) -> None:
-        """Check that no joint is first in two pairs: their parameter names would be equal."""
+        """Check that no joint is first in two pairs; their parameter names would be equal."""
         super().__post_init__()
         twice = [joint for joint in self.owners if self.owners.count(joint) > 1]
         if twice:
             raise ModelError(
-                f'{self.name}: {twice[0]} is the first joint of two pairs; put it second in one '
-                'of them'
+                f'{self.name}: {twice[0]} is the first joint of two pairs; exchange the joints '
+                'of one pair'
             )
 
     @classmethod
@@ -195,11 +195,11 @@ class TorqueCrosstalk(_Pairs, TorqueReading):
 
     @classmethod
     def places(cls, robot: Robot) -> tuple[tuple[str, ...], ...]:
-        """Return all ordered pairs of joints: joint of the sensor, and joint that disturbs it."""
+        """Return all ordered pairs: the joint of the sensor, and the joint that disturbs it."""
         return tuple(permutations(robot.joints, 2))
 
     def parameters(self, robot: Robot) -> tuple[ParameterName, ...]:
-        """Return parameter names with the joint of the sensor and the joint that disturbs it."""
+        """Return the parameters, named by the joint of the sensor and the disturbing joint."""
         (quantity,) = self.quantities
         return tuple(
             ParameterName(
@@ -217,11 +217,11 @@ class TorqueCrosstalk(_Pairs, TorqueReading):
     def transfer(
         self, values: FloatArray, motion: Motion, tau: FloatArray, columns: FloatArray
     ) -> FloatArray:
-        """Convert the regressor of true torques to that of torque readings with crosstalk."""
+        """Convert a regressor of true torques to a regressor of readings with crosstalk."""
         return np.asarray(columns + self._shares(values, motion) @ columns)
 
     def sensitivity(self, values: FloatArray, motion: Motion, tau: FloatArray) -> FloatArray:
-        """Return the derivatives of the readings by the crosstalk shares, shape (N, n, P)."""
+        """Return the derivatives of the readings by the crosstalk shares, (N, n, P) [N m]."""
         columns = np.zeros((*tau.shape, len(values)))
         for position, (i, k) in enumerate(self.pairs(motion.joints)):
             columns[:, i, position] = tau[:, k]

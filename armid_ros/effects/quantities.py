@@ -70,7 +70,7 @@ class Quantity:
 
     def largest(self, joint: str, robot: Robot) -> float:
         """
-        Return the largest plausible value of the quantity on a joint, or on the whole arm ('').
+        Return the largest plausible value of the quantity on a joint ('' is the whole arm).
 
         The size is limited by the bounds, by the torque limit of the joint if described, and by a
         multiple of the typical size. It is inf without any of these limits.
@@ -90,7 +90,7 @@ class Quantity:
 @dataclass(frozen=True)
 class Shape:
     """
-    Parameter of an effect in which torque is nonlinear, per joint or for the whole arm.
+    Parameter in which the torque of an effect is nonlinear, per joint or for the whole arm.
 
     Attributes
     ----------
@@ -119,7 +119,7 @@ class Shape:
 
     def determined(self, value: float, half_width: float) -> bool:
         """
-        Return whether a confidence interval is narrow enough to determine the parameter.
+        Return whether a confidence interval is narrow enough to be informative.
 
         The interval is uninformative if it covers all possible values. The half width of a
         non-negative shape may be three times the value, or the smallest start value if that is
@@ -143,14 +143,14 @@ class Shape:
 
 
 def joint_unit(unit: str, joint: str, robot: Robot) -> str:
-    """Adapt a unit to a joint: 'N m' becomes 'N' on a prismatic joint."""
+    """Adapt a unit to the type of a joint: 'N m' becomes 'N' on a prismatic joint."""
     slides = joint and robot.slides(joint)
     return _PRISMATIC_UNITS.get(unit, unit) if slides else unit
 
 
 def pair_unit(unit: str, first: str, second: str, robot: Robot) -> str:
     """
-    Adapt a unit to a pair of joints, of which one or both may be prismatic.
+    Adapt a unit to the types of two joints, of which one or both may be prismatic.
 
     A coupling stiffness between a revolute and a prismatic joint has the unit N/rad. Dry friction
     is a force on one joint and a torque on the other. A share of a torque in the reading of a
@@ -164,7 +164,7 @@ def pair_unit(unit: str, first: str, second: str, robot: Robot) -> str:
 
 
 def written_units(unit: str) -> tuple[str, ...]:
-    """Return all forms of a unit: on revolute and prismatic joints, and between two joints."""
+    """Return the forms of a unit for revolute joints, prismatic joints and mixed pairs."""
     return tuple(
         dict.fromkeys((unit, _PRISMATIC_UNITS.get(unit, unit), *_MIXED_UNITS.get(unit, ())))
     )

@@ -26,12 +26,12 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Displacing(Effect):
-    """Base class of effects by which the link positions differ from the recorded ones."""
+    """Base class of effects that make link positions differ from recorded positions."""
 
     @abstractmethod
     def displacements(self, motion: Motion, arm: Arm) -> Displacement:
         """
-        Return true minus recorded motion of the links, per unit of each parameter.
+        Return the true minus the recorded motion of the links, per unit of each parameter.
 
         Returns
         -------
@@ -45,7 +45,7 @@ class Displacing(Effect):
         return arm.torque_change(motion, self.displacements(motion, arm))
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
-        """Return the link displacements for given parameter values, for plant and sensors."""
+        """Return an action that displaces the links, for given parameter values."""
 
         def displacement(motion: Motion) -> Displacement:
             parts = self.displacements(motion, arm)
@@ -56,12 +56,12 @@ class Displacing(Effect):
 
 @dataclass(frozen=True)
 class TorqueReading(Effect):
-    """Base class of sensor effects, which change the recorded torque."""
+    """Base class of sensor effects that change the recorded torque."""
 
     @abstractmethod
     def read(self, values: FloatArray, motion: Motion, tau: FloatArray) -> FloatArray:
         """
-        Return the torque readings for a true torque along a motion, shape (N, n) [N m].
+        Return the torque readings of a true torque along a motion, shape (N, n) [N m].
 
         Parameters
         ----------
@@ -78,27 +78,27 @@ class TorqueReading(Effect):
         self, values: FloatArray, motion: Motion, tau: FloatArray, columns: FloatArray
     ) -> FloatArray:
         """
-        Convert the regressor of true torques to that of torque readings, shape (N, n, Q).
+        Convert a regressor of true torques to a regressor of torque readings, shape (N, n, Q).
 
-        By default, the reading is linear in the torque, and `read` takes columns as well.
+        The default assumes a reading linear in the torque, and applies `read` to the columns.
 
         """
         return self.read(values, motion, columns)
 
     @abstractmethod
     def sensitivity(self, values: FloatArray, motion: Motion, tau: FloatArray) -> FloatArray:
-        """Return derivatives of the reading of a torque `tau` by the parameters, (N, n, P)."""
+        """Return the derivatives of the reading of `tau` by the parameters, shape (N, n, P)."""
 
     def memory(self, values: FloatArray) -> float:
-        """Return for how long past torques influence the reading [s]."""
+        """Return the time span of past torque that influences a reading [s]."""
         return 0.0
 
     def columns(self, motion: Motion, arm: Arm) -> FloatArray:
-        """Return the derivatives of the torque reading by the parameters, shape (N, n, P)."""
+        """Return the derivatives of the torque readings by the parameters, shape (N, n, P)."""
         return self.sensitivity(arm.values_of(self), motion, arm.torque_before(self, motion))
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
-        """Return the function from true torque to reading, for the sensors."""
+        """Return an action that converts true torques to torque readings."""
         if not np.any(values):
             return Action()
         return Action(reading=partial(self.read, values), reading_memory=self.memory(values))

@@ -13,7 +13,7 @@ import numpy as np
 @dataclass(frozen=True)
 class Hysteresis:
     """
-    Friction of m springs that slip: it grows with the travel since the last reversal.
+    Friction of m slipping springs, which grows with the travel since the last reversal.
 
     The state h of an element, from -1 to 1, follows dh = (1 - h sign(dx)) |dx| / distance along
     its travel x, at any speed. Its torque is level * h.
@@ -39,7 +39,7 @@ class Hysteresis:
         return np.asarray(np.sign(self.directions @ dq))
 
     def advance(self, state: FloatArray, dq: FloatArray) -> FloatArray:
-        """Return the spring states after a joint displacement dq without reversal."""
+        """Return the spring states (m,) after the joints moved by dq [rad or m], all one way."""
         travel = self.directions @ dq
         end = np.sign(travel)
         return np.asarray(end - (end - state) * np.exp(-np.abs(travel) / self.distance))
@@ -50,7 +50,7 @@ class Hysteresis:
 
     def along(self, q: FloatArray, dq: FloatArray) -> FloatArray:
         """
-        Return the spring states in each sample of a joint motion, shape (N, m).
+        Return the spring states at each sample of a joint motion, shape (N, m).
 
         Parameters
         ----------
@@ -71,7 +71,7 @@ class Hysteresis:
 
 
 def _monotone_parts(travel: FloatArray) -> list[tuple[int, int, float]]:
-    """Return each motion between two reversals: first sample, last sample, direction."""
+    """Return first sample, last sample and direction (-1, 0, 1) of motion between reversals."""
     step = np.sign(np.diff(travel))
     turns = np.flatnonzero(np.diff(step)) + 1
     ends = zip(np.append(0, turns), np.append(turns, len(step)), strict=True)

@@ -36,7 +36,7 @@ class JointSpring(JointLaw):
     on_links = True
 
     def law(self, x: JointStates) -> tuple[FloatArray, ...]:
-        """Return the spring torque per unit of stiffness (q) and per unit of preload (1)."""
+        """Return the spring torque per unit of stiffness, q, and per unit of preload, 1."""
         return x.q, np.ones_like(x.q)
 
     def plausible(self, values: FloatArray, std: FloatArray, arm: Arm) -> bool:
@@ -47,7 +47,7 @@ class JointSpring(JointLaw):
 @dataclass(frozen=True)
 class SoftLimit(JointLaw):
     """
-    Elastic stops at both ends of the joint range, with a torque beyond a position.
+    Elastic stops at both ends of the joint range, which push back beyond a position.
 
     tau = k_up max(q - q_up, 0) - k_low max(q_low - q, 0), zero between q_low and q_up. Confounded
     with a hardening joint_spring; motion outside the bumpers distinguishes them.
@@ -86,6 +86,6 @@ class SoftLimit(JointLaw):
         return lowest + depth, highest - depth
 
     def law(self, x: JointStates) -> tuple[FloatArray, ...]:
-        """Return the torque per unit of stop stiffness: the signed compression [rad]."""
+        """Return the torque per unit of lower and upper stiffness: signed compressions [rad]."""
         lower, upper = self.shape_values.T
         return -np.maximum(lower - x.q, 0.0), np.maximum(x.q - upper, 0.0)

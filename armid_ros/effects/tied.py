@@ -50,7 +50,7 @@ class Tied(Attached):
         cls, robot: Robot, ties: Sequence[Tie], partner: str, joints: Sequence[str] | None = None
     ) -> Self:
         """
-        Return the springs on given joints of a robot, by default on all joints that have a tie.
+        Create the springs on given joints of a robot, by default on all joints with a tie.
 
         Raises
         ------
@@ -62,15 +62,15 @@ class Tied(Attached):
         for tie in ties:
             if tie.joint in by_joint:
                 raise ModelError(
-                    f'{cls.name}: there are two ties on {tie.joint}; only one on each joint is '
-                    'identifiable'
+                    f'{cls.name}: joint {tie.joint} has two ties; only one per joint is '
+                    'identifiable, so remove the other'
                 )
             by_joint[tie.joint] = tie
         chosen = tuple(by_joint if joints is None else joints)
         for joint in chosen:
             if joint not in by_joint:
                 raise ModelError(
-                    f"{cls.name}: there is no tie on joint '{joint}'; there are ties on "
+                    f"{cls.name}: joint '{joint}' has no tie; joints with a tie are "
                     f'{", ".join(by_joint)}'
                 )
             robot.index(joint)
@@ -83,7 +83,7 @@ class Tied(Attached):
 
     def along(self, motion: Motion) -> Self:
         """
-        Return the springs with the recorded motion of their anchors.
+        Return a copy of the springs with the recorded motion of their anchors.
 
         Raises
         ------
@@ -94,9 +94,9 @@ class Tied(Attached):
         partner, names = motion.partner, self.points
         if partner is None or not set(names) <= set(partner.names):
             raise ModelError(
-                f'{self.name} of {", ".join(self.joints)} needs the motion of {", ".join(names)} '
-                f'on {self.partner or "another machine"}, whose joint states were not read; give '
-                f'the description of this machine with --partner'
+                f'{self.name} of {", ".join(self.joints)}: the motion of the points '
+                f'{", ".join(names)} on the other machine is not known; give the description of '
+                f'that machine ({self.partner or "URDF"}) with --partner'
             )
         columns = [partner.names.index(name) for name in names]
         position, velocity = partner.position[:, columns], partner.velocity[:, columns]
@@ -115,20 +115,20 @@ class Tied(Attached):
         def unknown(t: FloatArray) -> tuple[FloatArray, FloatArray]:
             raise ModelError(
                 f'{self.name} of {", ".join(self.joints)} needs the recorded motion of '
-                f'{self.partner or "a partner"}; to simulate, remove {self.name} from the model'
+                f'{self.partner or "a second machine"}; to simulate, remove the effect'
             )
 
         return self.anchor or unknown
 
     def shape_starts(self, unexplained: Unexplained, arm: Arm) -> tuple[FloatArray, ...]:
-        """Return start values of the slack of straps; the anchors are known."""
+        """Return start values of the slacks of straps; their anchors are known."""
         return Attached.shape_starts(self, unexplained, arm)
 
     def _default_shape(self, robot: Robot) -> FloatArray:
         return self.shape_values
 
     def particulars(self) -> dict[str, Any]:
-        """Return name of the other machine and end points of the springs, for model.yaml."""
+        """Return the entries for model.yaml: the other machine, and end points of the springs."""
         rows = [
             {
                 'name': tie.name,
@@ -144,7 +144,7 @@ class Tied(Attached):
 
 @dataclass(frozen=True)
 class TiedInteraction(Tied, HumanInteraction):
-    """Spring and damper to a point of known motion, tau = J^T (k (p - r) + d (v - w))."""
+    """Spring and damper from a link to a recorded point, tau = J^T (k (p - r) + d (v - w))."""
 
     quantities = HumanInteraction.quantities[:2]
     shapes = ()
@@ -152,7 +152,7 @@ class TiedInteraction(Tied, HumanInteraction):
 
 @dataclass(frozen=True)
 class TiedSlack(Tied, InterfaceSlack):
-    """Strap to a point of known motion: it pulls only when its slack is used up."""
+    """Strap from a link to a point of recorded motion; it pulls only when its slack is used up."""
 
     # start values [m]; straps stretch by millimetres
     shapes = (
@@ -175,7 +175,7 @@ def tied_as_written(entry: Mapping[str, Any], robot: Robot) -> Tied:
     known = {kind.name: kind for kind in (TiedInteraction, TiedSlack)}
     name = str(entry['name'])
     if name not in known:
-        raise ModelError(f"{name} cannot have 'ties'; effects that can are {', '.join(known)}")
+        raise ModelError(f"model.yaml: {name} cannot have 'ties'; only {', '.join(known)} can")
 
     def point(values: Sequence[float]) -> tuple[float, float, float]:
         x, y, z = (finite(value, 'a coordinate of a tie') for value in values)
@@ -197,7 +197,7 @@ def tied_as_written(entry: Mapping[str, Any], robot: Robot) -> Tied:
 @dataclass(frozen=True)
 class Partner:
     """
-    Second machine, and the springs that may connect the arm to it.
+    Second machine, and the springs that may connect the arm to this machine.
 
     Attributes
     ----------
@@ -215,6 +215,6 @@ class Partner:
     source: str = ''
 
     def tied(self, arm: Robot, joints: Sequence[str] | None = None, *, slack: bool) -> Effect:
-        """Create springs with dampers, or straps with slack, on given or all connected joints."""
+        """Create springs (straps if `slack`) on the given joints, or on all joints with ties."""
         kind = TiedSlack if slack else TiedInteraction
         return kind.of(arm, self.ties, self.source or self.robot.name, joints)

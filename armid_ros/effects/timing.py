@@ -21,7 +21,7 @@ from scipy.signal import butter, lfilter, sosfiltfilt
 
 @dataclass(frozen=True)
 class LateReading(TorqueReading):
-    """Base class of late torque readings, with an error proportional to the torque's rate."""
+    """Base class of late torque readings; their error is proportional to the rate of torque."""
 
     def columns(self, motion: Motion, arm: Arm) -> FloatArray:
         """
@@ -35,11 +35,11 @@ class LateReading(TorqueReading):
 
     @classmethod
     def places(cls, robot: Robot) -> tuple[tuple[str, ...], ...]:
-        """Return where a delay can act: on the whole arm with one value, or on a single joint."""
+        """Return the places where a delay can act: () for the whole arm, or a single joint."""
         return ((), *((joint,) for joint in robot.joints))
 
     def _joints_of_delays(self, motion: Motion) -> list[list[int]]:
-        """Return for each delay the indices of its joints: one joint or all."""
+        """Return the joint indices of each delay: a single joint, or all joints."""
         joints = self.indices(motion.joints)
         return [[joint] for joint in joints] or [list(range(motion.n_joints))]
 
@@ -77,7 +77,7 @@ class TimeDelay(LateReading):
         return float(np.max(np.abs(values)))
 
     def read(self, values: FloatArray, motion: Motion, tau: FloatArray) -> FloatArray:
-        """Delay torques [N m] or regressor columns, shape (N, n, ...)."""
+        """Return torques [N m] or regressor columns after the delay, shape (N, n, ...)."""
         return self._delayed(values, motion, tau)
 
     def _delayed(
@@ -134,18 +134,18 @@ class TorqueLag(LateReading):
 
 
 def rate_of_change(t: FloatArray, x: FloatArray) -> FloatArray:
-    """Return the time derivative of samples along the first axis."""
+    """Return the time derivative of samples x at times t, along the first axis."""
     if len(t) < 2:
         raise ModelError(
-            'delay, lag, elasticity and backlash depend on how fast the torque changes: they need '
-            'a motion of two samples or more'
+            'the motion has fewer than two samples, too few for delay, lag, elasticity or '
+            'backlash; use a longer recording, or leave out these effects'
         )
     return np.asarray(np.gradient(x, t, axis=0))
 
 
 def within_band(motion: Motion, x: FloatArray) -> FloatArray:
     """
-    Remove the frequencies of a signal above the band limit of its motion.
+    Low-pass filter a signal at the band limit of its motion.
 
     The second derivative of a torque contains the fourth derivative of the positions, in which
     noise dominates at high frequency. The filter runs forwards and backwards, without a time
@@ -166,14 +166,14 @@ def _sections(band_hz: float, rate_hz: float) -> FloatArray:
 
 
 def smoothed(motion: Motion) -> Motion:
-    """Remove the frequencies of q, dq and ddq above the band limit of the motion."""
+    """Low-pass filter q, dq and ddq of a motion at its band limit."""
     q, dq, ddq = (within_band(motion, x) for x in (motion.q, motion.dq, motion.ddq))
     return replace(motion, q=q, dq=dq, ddq=ddq)
 
 
 def low_pass(t: FloatArray, x: FloatArray, lag: float) -> FloatArray:
     """
-    Filter samples by a first-order low-pass, T dy/dt + y = x.
+    Filter samples by a first-order low-pass, T dy/dt + y = x, with T = `lag` [s].
 
     Samples are evenly spaced and begin at a constant rate. The filter is computed as y = x - T v,
     where v is the filtered rate of x, and the rate is linear between samples. It is of second
@@ -193,7 +193,7 @@ def low_pass(t: FloatArray, x: FloatArray, lag: float) -> FloatArray:
 
 
 def _as_columns(effect: TorqueReading, motion: Motion, values: FloatArray) -> FloatArray:
-    """Arrange derivatives (N, n) as a regressor, with one column per joint or one in total."""
+    """Arrange derivatives (N, n) as a regressor: a column per joint, or one for the whole arm."""
     if effect.joints:
         return joint_columns(effect, motion, values)
     return values[:, :, np.newaxis]

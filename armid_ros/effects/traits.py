@@ -16,7 +16,7 @@ from dataclasses import dataclass
 @dataclass(frozen=True)
 class Traits:
     """
-    Texts and prior knowledge on an effect class, which its equations do not contain.
+    Descriptions and prior knowledge of an effect class, in addition to its equations.
 
     Attributes
     ----------
@@ -47,7 +47,7 @@ class Traits:
     separate : tuple of tuple of int
         Groups of quantities that are separate causes; empty if all quantities are one cause.
     urdf_attribute, mjcf_attribute : str
-        Attribute of a joint in URDF and in MJCF that holds the quantity; '' if none.
+        Attribute of a joint in URDF and in MJCF that contains the quantity; '' if none.
 
     """
 

@@ -54,7 +54,7 @@ class JointElasticity(Displacing):
         return _twist(self, motion, load)
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
-        """Return springs and dampers for the plant, and the links' displacements."""
+        """Return an action with springs and dampers for the plant, and link displacements."""
         if not np.any(values):
             return Action()
         (compliance,) = scatter(self, values, arm.robot)
@@ -89,7 +89,7 @@ class Backlash(Displacing):
     instantaneous = False
 
     def displacements(self, motion: Motion, arm: Arm) -> Displacement:
-        """Return the link displacement per unit of backlash: minus the relative position."""
+        """Return the link displacement per unit of backlash: minus the twist, from -1/2 to 1/2."""
         load = arm.load(motion)
         inertia = np.diagonal(arm.load_derivatives(motion)[2], axis1=1, axis2=2)
         place = np.zeros(motion.q.shape)
@@ -100,7 +100,7 @@ class Backlash(Displacing):
         return _twist(self, motion, place)
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
-        """Return backlash for the plant, and the links' displacements."""
+        """Return an action with free play for the plant, and link displacements."""
         if not np.any(values):
             return Action()
         (gap,) = scatter(self, values, arm.robot)
@@ -110,7 +110,7 @@ class Backlash(Displacing):
 
 
 def place_in_gap(t: FloatArray, pull: FloatArray, width: float) -> FloatArray:
-    """Return the positions (N,) of a body between two stops, moved by a given acceleration."""
+    """Return the positions (N,) of a body between two stops, given its free acceleration."""
     speed = cumulative_trapezoid(pull, t, initial=0.0)
     way = cumulative_trapezoid(speed, t, initial=0.0)
     times, speeds, ways = t.tolist(), speed.tolist(), way.tolist()
@@ -134,7 +134,7 @@ def place_in_gap(t: FloatArray, pull: FloatArray, width: float) -> FloatArray:
 
 
 def _twist(effect: Displacing, motion: Motion, twist: FloatArray) -> Displacement:
-    """Return the link displacement per unit of each parameter, given transmission twists."""
+    """Return the link displacements by the twists of transmissions, per unit of parameter."""
     speed = rate_of_change(motion.t, twist)
     parts = (-twist, -speed, -rate_of_change(motion.t, speed))
     return Displacement(*(joint_columns(effect, motion, part) for part in parts))

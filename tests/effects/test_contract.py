@@ -90,7 +90,7 @@ def test_a_shape_belongs_to_each_joint(robot, motion):
 
 @pytest.mark.parametrize(
     ('values', 'message'),
-    [([-1.0, 2.0], 'stribeck_velocity has to be from'), ([1.0, 2.0, 3.0], 'have size')],
+    [([-1.0, 2.0], 'stribeck_velocity has to be from'), ([1.0, 2.0, 3.0], 'array of size')],
 )
 def test_impossible_shapes_are_named(robot, values, message):
     with pytest.raises(ModelError, match=message):
