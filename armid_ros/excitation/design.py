@@ -28,7 +28,7 @@ Progress = Callable[[float, float], None]
 @dataclass(frozen=True)
 class Design:
     """
-    Designed excitation, and the information on parameters that its recording would give.
+    Designed excitation, and the parameter information that its recording would contain.
 
     Attributes
     ----------
@@ -63,13 +63,13 @@ class Design:
     stopped: str = ''
 
     def robot_limits_used(self, arm: ArmModel) -> dict[str, FloatArray]:
-        """Return the peak of the excitation relative to each limit of the robot, by quantity."""
+        """Return the peak of the excitation as a share of each robot limit, by quantity."""
         full = Limits.of(arm.robot, speed=1.0, reserve=False)
         return replace(self, limits=full).limits_used(arm)
 
     def limits_used(self, arm: ArmModel) -> dict[str, FloatArray]:
         """
-        Return the peak of the excitation relative to each limit of the design, by quantity.
+        Return the peak of the excitation as a share of each limit of the design, by quantity.
 
         Transfers to and from the excitation do not count.
 
@@ -203,7 +203,7 @@ def with_run_in(problem: DesignProblem, trajectory: FourierTrajectory) -> Excita
                 return run
             reason = f'in {run_in:.3g} s, {faults}'
         run_in *= 1.5
-    raise TrajectoryError(f'no start from rest keeps the limits: {reason}; try another --seed')
+    raise TrajectoryError(f'no run-in from rest is within limits: {reason}; try another --seed')
 
 
 def evaluate(
@@ -214,7 +214,7 @@ def evaluate(
     stopped: str = '',
 ) -> Design:
     """
-    Compute information and cost of a given excitation or trajectory; return a `Design`.
+    Return the `Design` of a given excitation or trajectory, with its information and cost.
 
     Parameters
     ----------

@@ -32,7 +32,7 @@ class Faults(tuple[Violation | Approach, ...]):
     __slots__ = ()
 
     def __str__(self) -> str:
-        """Return all faults in one line."""
+        """Return all faults in one line, separated by semicolons."""
         return '; '.join(map(str, self))
 
 
@@ -43,7 +43,7 @@ def trajectory_faults(
     clearance: ClearanceModel | None,
 ) -> Faults:
     """
-    Return the limits that a periodic trajectory exceeds, and bodies that come too close.
+    Return the limits that a periodic trajectory exceeds, and the bodies that come too close.
 
     Parameters
     ----------
@@ -93,7 +93,7 @@ def _violations(arm: ArmModel, limits: Limits, motion: Motion) -> tuple[Violatio
 
 
 def _outward(values: FloatArray) -> FloatArray:
-    """Move signals away from their mean by a bound on their peaks between samples."""
+    """Move samples away from their mean by a bound on the overshoot between samples."""
     # the bound is h^2 M / 8 for second derivatives below M, estimated from second differences.
     # Nothing is added where dry friction makes the second differences jump
     bend = np.zeros_like(values)
@@ -165,7 +165,7 @@ def random_feasible(
 def _feasible_pose(
     arm: ArmModel, limits: Limits, rng: np.random.Generator, clearance: ClearanceModel | None
 ) -> FloatArray:
-    """Draw random poses within torque limits; return the pose with the largest clearance."""
+    """Draw random poses; return the pose within torque limits with the largest clearance."""
     lower, upper = limits.position_range()
     q = rng.uniform(lower, upper, (2000, len(lower)))
     motion = Motion.of_states(limits.joints, q, 0.0, 0.0)
@@ -176,9 +176,9 @@ def _feasible_pose(
         worst = int(load[best].argmax())
         limit, unit = limits.torque[worst], limits.unit('torque', worst)
         raise TrajectoryError(
-            f'joint {limits.joints[worst]}: its torque limit is {limit:.4g} {unit}, but holding '
-            f'still takes {load[best, worst] * limit:.4g} {unit} even in the pose with the least '
-            'load'
+            f'joint {limits.joints[worst]} cannot hold the arm in any pose: its torque limit is '
+            f'{limit:.4g} {unit}, and the pose with the least load needs '
+            f'{load[best, worst] * limit:.4g} {unit}'
         )
     if clearance is None:
         best = np.flatnonzero(held)[int(np.argmin(load[held].max(axis=1)))]
@@ -230,7 +230,7 @@ def _shrunk(
     clearance: ClearanceModel | None,
     shrinks: int,
 ) -> FourierTrajectory | None:
-    """Reduce the amplitudes of a trajectory until it is feasible; return None if this fails."""
+    """Reduce all amplitudes up to `shrinks` times, until feasible; return None if this fails."""
 
     def clear(q: FloatArray) -> bool:
         if clearance is None:
@@ -254,7 +254,7 @@ CLEARANCE = 0.01
 @dataclass(frozen=True)
 class Template:
     """
-    Settings for random motions of chosen joints at a share of the dynamic limits.
+    Settings for random motions of chosen joints, at a share of velocity and acceleration limits.
 
     Attributes
     ----------
@@ -324,7 +324,7 @@ _WHOLE_ARM = (
 
 
 def templates(joints: Sequence[str]) -> tuple[Template, ...]:
-    """Return templates of motions that reveal effects: of the whole arm, and of given joints."""
+    """Return templates of motions that identify effects: of the whole arm, and of given joints."""
     chosen = list(_WHOLE_ARM)
     if joints:
         names, alone = ', '.join(joints), tuple(joints)

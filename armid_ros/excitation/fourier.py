@@ -134,19 +134,19 @@ class FourierTrajectory:
         return self.motion(np.arange(n_samples) * (self.period / n_samples))
 
     def with_margins(self, n_samples: int) -> Motion:
-        """Return samples of a period, with `MARGIN` more samples before and after it."""
+        """Return samples of one period, and `MARGIN` further samples before and after it."""
         step = self.period / n_samples
         return self.motion(np.arange(-MARGIN, n_samples + MARGIN) * step)
 
     def shifted(self, time: float) -> FourierTrajectory:
-        """Return the same periodic motion, started later in its period by a time [s]."""
+        """Return the same periodic motion, which starts at a given time [s] within the period."""
         angle = self.angular_frequency * time * np.arange(1, self.harmonics + 1)
         cosine, sine = np.cos(angle), np.sin(angle)
         a = self.a * cosine + self.b * sine
         return replace(self, a=a, b=self.b * cosine - self.a * sine)
 
     def scaled(self, factor: npt.ArrayLike) -> FourierTrajectory:
-        """Return the trajectory with amplitudes multiplied by a factor per joint, shape (n,)."""
+        """Return the trajectory with each joint's amplitudes multiplied by a factor, (n,)."""
         factors = np.broadcast_to(np.asarray(factor, dtype=float), (self.n_joints,))[:, np.newaxis]
         return replace(self, a=self.a * factors, b=self.b * factors)
 
@@ -156,7 +156,7 @@ class FourierTrajectory:
         return replace(self, period=period, a=self.a * ratio, b=self.b * ratio)
 
     def acceleration_bound(self) -> FloatArray:
-        """Return an upper bound on the acceleration of each joint, shape (n,)."""
+        """Return an upper bound on the acceleration of each joint, (n,) [rad/s^2 or m/s^2]."""
         k = self.angular_frequency * np.arange(1, self.harmonics + 1)
         return np.asarray((k * np.hypot(self.a, self.b)).sum(axis=1))
 

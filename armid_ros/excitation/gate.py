@@ -80,7 +80,7 @@ class MotionGate:
 
     def deviation(self, monitor: PoseMonitor, begun: float) -> tuple[FloatArray, FloatArray]:
         """
-        Return position and velocity errors of each joint at the time of the measurement.
+        Return the measured minus the planned position and velocity of each joint.
 
         Parameters
         ----------
@@ -172,18 +172,18 @@ class MotionGate:
         near = clear_line(self.clearance, set_point, inside)
         if near is not None:
             raise TrajectoryError(
-                f'{near.first} and {near.second} would come within {near.distance:.4f} m'
+                f'{near.first} and {near.second} would be only {near.distance:.4f} m apart'
             )
         return self.rest(inside, step, speed)
 
     def rest(self, goal: FloatArray, step: FloatArray, speed: FloatArray) -> Motion:
-        """Return the motion to rest at a near goal, for a step and a speed of each joint, (n,)."""
+        """Return the motion to rest at a near goal, given each joint's step and speed, (n,)."""
         needed = max(self._time_of(step, speed), HANDOVER_TIME)
         t, still = needed + np.array([0.0, HANDOVER_TIME / 2.0]), np.zeros((2, len(step)))
         return Motion(self.limits.joints, t, np.vstack([goal, goal]), still, still)
 
     def _time_of(self, step: FloatArray, speed: FloatArray) -> float:
-        """Return the time [s] that joints need for a small step within their limits."""
+        """Return the time [s] that the joints need for small steps at given initial speeds."""
         velocity = np.where(np.isfinite(self.limits.velocity), self.limits.velocity, SLOW_VELOCITY)
         stopping = speed / self.limits.acceleration
         slowest = stopping + np.sqrt(stopping**2 + step / self.limits.acceleration)
@@ -233,7 +233,7 @@ class Ending:
     def stopped_again(
         self, monitor: PoseMonitor, now: float, tolerance: float, duration: float
     ) -> Motion | None:
-        """Return a further stop motion if the arm still moves along its path; otherwise None."""
+        """Return another stop motion if the arm still moves along its path; otherwise None."""
         phase = now - self.begun
         if self.last is None or now - self.sent < self.last.t[-1]:
             return None
@@ -313,7 +313,7 @@ class Ending:
     def _held(
         self, last: Motion, monitor: PoseMonitor, now: float, tolerance: float
     ) -> tuple[Ending, Motion | None, str]:
-        """Hold a blocked arm at the measured position if the step of the set point is allowed."""
+        """Move a blocked arm's set point to its measured position, if this step is allowed."""
         ending, measured, elapsed = replace(self, blocked=False), monitor.q, now - self.sent
         begin = self.gate.run.at([self.sent - self.begun])
         over = elapsed >= last.t[-1]

@@ -70,8 +70,8 @@ class Limits:
         for j, joint in enumerate(self.joints):
             if not self.lower[j] < self.upper[j]:
                 raise TrajectoryError(
-                    f'joint {joint}: no room between its position limits, '
-                    f'{self.lower[j]:.6g} and {self.upper[j]:.6g} {self.unit("position", j)}'
+                    f'joint {joint}: its lower position limit, {self.lower[j]:.6g}, has to be '
+                    f'below its upper limit, {self.upper[j]:.6g} {self.unit("position", j)}'
                 )
             for quantity in ('velocity', 'acceleration', 'torque'):
                 limit = getattr(self, quantity)[j]
@@ -89,7 +89,7 @@ class Limits:
         reserve: bool = True,
     ) -> Limits:
         """
-        Return the limits of a robot for a speed such as 'slow', by default minus a safety reserve.
+        Return the limits of a robot at a speed such as 'slow', by default with a safety reserve.
 
         Parameters
         ----------
@@ -135,11 +135,11 @@ class Limits:
         )
 
     def position_range(self) -> tuple[FloatArray, FloatArray]:
-        """Return lower and upper positions, each (n,), with a finite range for every joint."""
+        """Return lower and upper position limits, (n,) each; finite for unlimited joints, too."""
         return position_range(self.lower, self.upper)
 
     def unit(self, quantity: str, joint: int) -> str:
-        """Return the unit of 'position', 'velocity', 'acceleration' or 'torque' of a joint."""
+        """Return the unit of a joint's 'position', 'velocity', 'acceleration' or 'torque'."""
         slides = bool(self.prismatic[joint])
         length = 'm' if slides else 'rad'
         return {
@@ -318,7 +318,7 @@ def with_acceleration_limit(robot: Robot, limit: FloatArray) -> Robot:
 def _require_narrower(
     robot: Robot, quantity: str, given: FloatArray, described: FloatArray
 ) -> None:
-    """Raise a TrajectoryError if a given limit of a joint exceeds that of the robot."""
+    """Raise a TrajectoryError if a given joint limit exceeds the limit of the description."""
     for joint, value, limit, slides in zip(
         robot.joints, given, described, robot.prismatic, strict=True
     ):
@@ -344,7 +344,7 @@ def _with_file(robot: Robot, path: Path) -> Robot:
         document = load_yaml(text)
         entries = document.get('joint_limits') if isinstance(document, dict) else None
         if not isinstance(entries, dict):
-            raise TrajectoryError('the key joint_limits of MoveIt is missing, or has no mapping')
+            raise TrajectoryError('the key joint_limits of MoveIt is missing or not a mapping')
         if not entries.keys() & set(robot.joints):
             raise TrajectoryError(f'joint_limits has none of the joints {", ".join(robot.joints)}')
         for j, joint in enumerate(robot.joints):

@@ -85,12 +85,12 @@ class PoseMonitor:
 
     @property
     def q(self) -> FloatArray:
-        """Return the last accepted positions, shape (n,) [rad or m]; NaN if there is none."""
+        """Return the last accepted joint positions, (n,) [rad or m]; NaN before the first."""
         return np.array(self._q)
 
     @property
     def seen(self) -> FloatArray:
-        """Return the arrival time of each position, (n,) [s]; minus infinity if there is none."""
+        """Return the arrival times of the positions `q`, (n,) [s]; minus infinity if none."""
         return np.array(self._seen)
 
     @property
@@ -106,7 +106,7 @@ class PoseMonitor:
 
     @property
     def sources(self) -> int:
-        """Number of senders of joint states, if no joint has two senders."""
+        """Number of senders of joint states, assuming one sender per joint."""
         # lists of joint names with a common joint of the arm count as those of one sender
         groups = [set(source.joints) for source in self._sources.values()]
         others = groups.count(set())
@@ -188,7 +188,7 @@ class PoseMonitor:
         return self._sources[names]
 
     def contradiction(self, now: float, count: int = MIN_AGREEING) -> str:
-        """Return the last reason for rejection if there were many in 0.5 s; otherwise empty."""
+        """Return the last reason for rejection if `count` states were rejected in 0.5 s, or ''."""
         recent = [
             fault for arrived, fault in self._rejections if now - arrived <= _REJECTION_WINDOW
         ]
@@ -249,7 +249,7 @@ class PoseMonitor:
         return '' if len(decided) == len(self._joints) else None
 
     def _outside(self, source: _Source, q: list[float]) -> str:
-        """Return a message if a position is not finite or is outside the limits."""
+        """Return a message if a position is not finite or outside its limits; otherwise empty."""
         if all(map(le, source.lower, q)) and all(map(le, q, source.upper)):
             return ''
         ranges = zip(source.lower, q, source.upper, strict=True)
@@ -261,7 +261,7 @@ class PoseMonitor:
         )
 
     def _contradicted(self, source: _Source, state: _State, seen: float) -> str:
-        """Return a message if a state contradicts the last state of any sender."""
+        """Return a message if a state contradicts the last state of any sender, else empty."""
         fault = self._unreachable(source, state, source.states[-1]) if source.states else ''
         if fault or (source.states and source.states[-1].arrived >= seen):
             return fault
@@ -269,7 +269,7 @@ class PoseMonitor:
         return self._unreachable(source, state, others)
 
     def _unreachable(self, source: _Source, state: _State, last: _State) -> str:
-        """Return a message if a position is too far from the last one, or a stamp too old."""
+        """Return a message if a position cannot follow the last position, or its stamp is old."""
         if state.stamp_ns and state.stamp_ns <= last.stamp_ns:
             back = (last.stamp_ns - state.stamp_ns) * 1e-9
             return (

@@ -103,7 +103,7 @@ class DesignSettings:
             if name not in known:
                 raise TrajectoryError(f"there is no {kind} '{name}'; choose {', '.join(known)}")
         if self.focus and self.criterion == 'T':
-            raise TrajectoryError("focus and criterion 'T' were both given; leave out one")
+            raise TrajectoryError("focus is not available with criterion 'T'; leave out one")
         self._require_numbers()
 
     def _require_numbers(self) -> None:
@@ -132,7 +132,7 @@ class DesignSettings:
 
 def whole_period(duration: float, n_periods: int, run_in: float, rate: float) -> float:
     """
-    Return the period [s] of an excitation of given duration, as a multiple of the sample time.
+    Return the period [s] of an excitation of given duration, rounded to whole samples.
 
     Parameters
     ----------
@@ -214,8 +214,7 @@ class DesignProblem:
         noise = torque_noise(arm, settings)
         if (settings.criterion == 'T') != (rival is not None):
             raise TrajectoryError(
-                "criterion 'T' needs a rival model, and other criteria cannot use one: give both "
-                'or neither'
+                "a rival model is required with criterion 'T', and not allowed with other criteria"
             )
         model = arm if rival is None else _joined(arm, rival)
         motion = random_motion(arm.robot, rng)
@@ -253,13 +252,13 @@ class DesignProblem:
             if not criterion.wanted.any():
                 raise TrajectoryError(
                     f'focus: no motion distinguishes {", ".join(self.settings.focus)} from the '
-                    "rigid body; take target 'effects', where the rigid body is taken as known"
+                    "rigid body; use target 'effects', which assumes a known rigid body"
                 )
         elif not np.isfinite(criterion.cost(matrix)):
             names = ', '.join(effect.name for effect in self.arm.effects) or 'nothing'
             raise TrajectoryError(
-                f'no motion distinguishes the model with {names} from its rival, which can make '
-                'the same torques; change the values of the effects that the rival lacks'
+                f'no motion distinguishes the model with {names} from its rival: the rival can '
+                'produce the same torques; change the values of the effects that the rival lacks'
             )
 
     def columns(self, motion: Motion) -> FloatArray:
@@ -268,7 +267,7 @@ class DesignProblem:
         return (columns / self.noise[:, np.newaxis]).reshape(-1, columns.shape[-1])
 
     def recorded(self, trajectory: FourierTrajectory, n_periods: int) -> Information:
-        """Return the information on base parameters from n_periods recorded periods."""
+        """Return the Fisher information on the base parameters after n_periods periods."""
         # six times as many samples as in the search
         count, margin = 6 * self.settings.samples, MARGIN * trajectory.n_joints
         columns = self.columns(trajectory.with_margins(count))[margin:-margin]
@@ -277,7 +276,7 @@ class DesignProblem:
 
     def information(self, motion: Motion, n_recorded: float | None = None) -> Information:
         """
-        Return the information that a motion gives on the base parameters.
+        Return the Fisher information of a motion on the base parameters.
 
         Parameters
         ----------
@@ -330,7 +329,7 @@ def torque_noise(arm: ArmModel, settings: DesignSettings) -> FloatArray:
 
 
 def _joined(arm: ArmModel, rival: ArmModel) -> ArmModel:
-    """Return the rival model with the effects added that only the arm has."""
+    """Return the rival model, extended by the effects that only `arm` has."""
     known = {(effect.name, effect.joints) for effect in rival.effects}
     joined = replace(rival, robot=arm.robot)
     for effect, values in zip(arm.effects, arm.values, strict=True):

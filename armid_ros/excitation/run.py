@@ -43,7 +43,7 @@ class Run:
     rate: float
 
     def __post_init__(self) -> None:
-        """Check that approach and return join the excitation; round durations up to samples."""
+        """Check that approach and return meet the excitation; round durations up to samples."""
         ends = self.excitation.at([0.0, self.excitation.duration]).q
         for transfer, own, end in ((self.approach, -1, 0), (self.back, 0, 1)):
             # tolerance for rounding [rad or m]
@@ -117,7 +117,7 @@ class Run:
         if away[j] > 0.001:  # largest distance from the path [rad or m]
             raise TrajectoryError(
                 f"joint '{self.joints[j]}' would be {away[j]:.2g} rad or m off its path between "
-                f'{self.rate:g} waypoints per second: raise the rate, or take fewer harmonics'
+                f'{self.rate:g} waypoints per second: raise the rate, or use fewer harmonics'
             )
 
 
@@ -170,7 +170,7 @@ def plan_run(
 def _unwound(
     excitation: Excitation, arm: ArmModel, limits: Limits, start: FloatArray
 ) -> Excitation:
-    """Shift joints of an excitation by whole turns towards the start pose, if limits allow."""
+    """Shift joints of an excitation by whole turns towards the start pose, within the limits."""
     # A joint with a range of two turns reaches most poses at two positions. The path to one of the
     # two is often blocked, as the shoulder would hit the floor.
     trajectory = excitation.trajectory

@@ -93,7 +93,7 @@ class CollisionScene:
 
     @property
     def unchecked(self) -> tuple[str, ...]:
-        """Return what the safety checks leave out, such as a missing floor or limit."""
+        """Return the items that the safety checks leave out, such as an unknown floor."""
         robot = self.collision.robot
         found: list[str] = []
         if self.floor.height is None and not any(o.kind == 'plane' for o in self.obstacles):

@@ -60,7 +60,7 @@ class Excitation:
         """Check that the number of periods, the run-in and the duration are possible."""
         if int(self.n_periods) != self.n_periods or self.n_periods < 1:
             raise TrajectoryError(
-                f'excitation: {self.n_periods} periods are too few; at least one is needed'
+                f'excitation: n_periods is {self.n_periods}, but has to be a positive integer'
             )
         if not (np.isfinite(self.run_in) and self.run_in > 0.0):
             raise TrajectoryError(f'excitation: its run-in, {self.run_in} s, has to be positive')
@@ -183,7 +183,7 @@ class Excitation:
         return Motion(run.joints, t, run.q, run.dq, run.ddq)
 
     def sampled_duration(self, rate: float) -> float:
-        """Return the time of the last sample at a sampling rate [s]; see ``motion``."""
+        """Return the time of the last sample of ``motion`` [s], for a sampling rate [Hz]."""
         samples = 2 * self._run_in_samples(rate) + self.n_periods * self._period_samples(rate)
         return samples / rate
 
@@ -196,7 +196,7 @@ class Excitation:
         if abs(samples - nearest) > _SAMPLE_TOLERANCE * nearest:
             raise TrajectoryError(
                 f'a period of {self.trajectory.period:g} s is {samples:g} samples at {rate:g} Hz; '
-                f'it has to be a whole number: take {nearest / self.trajectory.period:.9g} Hz'
+                f'it has to be a whole number: use {nearest / self.trajectory.period:.9g} Hz'
             )
         return nearest
 
@@ -232,7 +232,7 @@ def load_excitation(path: str | Path) -> Excitation:
 
 def read_excitation(text: str, source: str) -> Excitation:
     """
-    Return the excitation in a YAML text.
+    Read an excitation from a YAML text.
 
     Parameters
     ----------
@@ -250,10 +250,10 @@ def read_excitation(text: str, source: str) -> Excitation:
     with reading(source, TrajectoryError):
         content: Any = load_yaml(text)
         if not isinstance(content, dict) or content.get('schema') != SCHEMA:
-            raise TrajectoryError(f'this is not an excitation: it needs schema: {SCHEMA}')
+            raise TrajectoryError(f"not an excitation: the key 'schema' has to be {SCHEMA}")
         if content.get('start') is not None:  # it changes the motion
             raise TrajectoryError(
-                'an excitation cannot contain a start pose; remove it, and give it with --start'
+                "an excitation cannot contain a start pose; remove the key 'start', use --start"
             )
         joints = content['joints']
         trajectory = FourierTrajectory(
@@ -270,7 +270,7 @@ def read_excitation(text: str, source: str) -> Excitation:
 
 
 def excitation_text(excitation: Excitation) -> str:
-    """Return an excitation as YAML."""
+    """Return the YAML text of an excitation."""
     trajectory = excitation.trajectory
     joints = [
         {

@@ -17,7 +17,7 @@ HANDOVER_TIME = 0.05
 
 
 class Path(Protocol):
-    """Protocol of a path to follow: a `Run`, an `Excitation` or a `Transfer`."""
+    """Interface of a path that an arm follows: a `Run`, an `Excitation` or a `Transfer`."""
 
     def at(self, t: npt.ArrayLike) -> Motion:
         """Return the motion on the path at given times [s]."""
@@ -194,7 +194,7 @@ class Rehearsal:
         return np.asarray(np.abs(self._arm.joint_torque(wanted)).max(axis=0))
 
     def report(self) -> tuple[str, tuple[str, ...]]:
-        """Return a summary of the rehearsal, and a sentence on each joint with odd torque."""
+        """Return a summary, and a sentence on each joint with more torque than predicted."""
         if not self._count:
             fault = 'no joint state was received during the rehearsal'
             return fault, (fault,)

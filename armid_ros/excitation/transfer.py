@@ -64,7 +64,7 @@ class TransferPlanner:
 
     @classmethod
     def of(cls, arm: ArmModel, scene: CollisionScene, speed: str | float) -> TransferPlanner:
-        """Return the planner of an arm among its obstacles, with the limits for a run's speed."""
+        """Return the planner for an arm in a collision scene, for a run at the given speed."""
         clearance = ClearanceModel.of(scene.bodies, scene.clearance)
         return cls(arm, transfer_limits(arm.robot, speed), clearance)
 
@@ -125,7 +125,7 @@ class TransferPlanner:
             if not violations:
                 return transfer
             transfer = transfer.lasting(1.3 * transfer.duration)
-        raise TrajectoryError(f'no transfer to the trajectory keeps the limits: {violations[0]}')
+        raise TrajectoryError(f'no transfer to the trajectory is within limits: {violations[0]}')
 
     def fault(self, q: FloatArray) -> str:
         """Return the reason why a pose (n,) is not allowed; empty if it is allowed."""
@@ -143,11 +143,11 @@ class TransferPlanner:
 
     @property
     def zero_pose(self) -> FloatArray:
-        """Return the pose with all joints at zero, clipped to the reduced position limits."""
+        """Return the pose with all joints at zero, clipped to the position limits with reserve."""
         return self._as_start(self.arm.robot.zero_pose)
 
     def _as_start(self, q: FloatArray) -> FloatArray:
-        """Clip poses (..., n) to the position limits with reserve."""
+        """Return poses (..., n) that are clipped to the position limits with reserve."""
         limits = Limits.of(self.arm.robot)
         return np.clip(q, limits.lower, limits.upper)
 

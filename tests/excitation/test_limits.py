@@ -112,7 +112,7 @@ def test_unknown_speed_is_refused(two_link, speed, message):
 
 
 def test_limits_without_room_are_refused_with_the_joint(limits):
-    with pytest.raises(TrajectoryError, match=r'elbow.*room'):
+    with pytest.raises(TrajectoryError, match=r'elbow.*below its upper'):
         replace(limits, lower=np.array([-1.0, 1.0]), upper=np.array([1.0, 1.0]))
     with pytest.raises(TrajectoryError, match=r'shoulder.*velocity'):
         replace(limits, velocity=np.array([0.0, 1.0]))

@@ -27,12 +27,12 @@ IntArray = npt.NDArray[np.intp]
 @dataclass(frozen=True)
 class NearPairs:
     """
-    The m occurrences of two bodies close to each other, in N poses.
+    Pairs of bodies that are close to each other in N poses: m entries of a pose and a pair.
 
     Attributes
     ----------
     sample, pair : ndarray of int, shape (m,)
-        Index of the pose, and index of the pair.
+        Index of the pose, and index of the pair of bodies.
     distance : ndarray, shape (m,)
         Signed distance [m].
     by_q : ndarray, shape (m, n)
@@ -88,7 +88,7 @@ class ClearanceModel:
     spheres : ndarray, shape (number of bodies, 4)
         Centre in the frame of that joint and radius of a sphere around each body [m].
     planes : ndarray, shape (number of bodies, 4)
-        Normal and offset [m] of half spaces, the points x with normal x <= offset; NaN for others.
+        Normal and offset [m] of half spaces, the points x with normal x <= offset; else NaN.
     numbers : ndarray of int, shape (number of pairs,)
         Number of each pair in the collision model.
     pairs : ndarray of int, shape (number of pairs, 2)
@@ -150,7 +150,7 @@ class ClearanceModel:
         return cls(collision, margin, joints, spheres, planes, numbers, pairs, between, most)
 
     def without_distant_pairs(self, q: FloatArray, reach: float) -> ClearanceModel:
-        """Return the model without pairs of bodies ``reach`` [m] or more apart in all poses q."""
+        """Return the model without pairs of bodies that stay ``reach`` [m] apart in poses q."""
         kept = np.unique(self.near(q, reach).pair)
         return replace(
             self,
@@ -209,7 +209,7 @@ class ClearanceModel:
         times: FloatArray,
     ) -> Approach | None:
         """
-        Return an approach below the margin along a path; None proves that there is none.
+        Return an approach of bodies below the margin along a path; None proves there is none.
 
         On an interval, the joints between two bodies move them by a limited travel. Their distance
         is at least the mean of the distances at both ends, minus half this travel. An interval
@@ -270,7 +270,7 @@ class ClearanceModel:
         return None
 
     def _bound(self, frames: LinkFrames) -> FloatArray:
-        """Return a lower bound on distances of all pairs of bodies, (N, number of pairs) [m]."""
+        """Return a lower bound on the distance of each pair of bodies, (N, number of pairs)."""
         centre = np.empty((frames.lines.shape[2], len(self.joints), 3))
         for body, joint in enumerate(self.joints):
             place = self.spheres[body, :3]
@@ -285,7 +285,7 @@ class ClearanceModel:
     def _measure(
         self, q: FloatArray, sample: IntArray, pair: IntArray, reach: float = -np.inf
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return distances of pairs; normals, and nearest points on the first bodies, in reach."""
+        """Return distances of pairs; if below `reach`, also normals and nearest points, (m, 3)."""
         model, geometry = self.collision.robot.model, self.collision.geometry
         data, placed = model.createData(), geometry.createData()
         q, distance = self.collision.robot.positions(q), np.empty(len(sample))

@@ -69,7 +69,7 @@ class Obstacle:
     ignore: tuple[str, ...] = field(default=())
 
     def __post_init__(self) -> None:
-        """Check names, kind, size and place of the obstacle."""
+        """Check names, kind, size, position and orientation of the obstacle."""
         if not all(isinstance(name, str) for name in (self.name, self.kind, *self.ignore)):
             raise TrajectoryError(
                 f"obstacle '{self.name}': names and kind have to be strings; quote them"
@@ -95,7 +95,7 @@ class Obstacle:
                     f"obstacle '{self.name}': {name} has to be 3 finite numbers, not {values}"
                 )
         if (self.kind == 'mesh') != (self.mesh is not None):
-            raise TrajectoryError(f"obstacle '{self.name}': only a mesh has a file, and needs one")
+            raise TrajectoryError(f"obstacle '{self.name}': kind 'mesh' needs a file, others none")
 
     def geometry(self) -> coal.CollisionGeometry:
         """Return the collision shape of the obstacle, in the frame of the obstacle."""
@@ -123,7 +123,7 @@ _ORIGIN = '_frame'
 
 def with_obstacles(collision: CollisionModel, obstacles: Sequence[Obstacle]) -> CollisionModel:
     """
-    Return the collision model of a robot together with the obstacles around it.
+    Return the collision model of a robot, extended by the obstacles around the robot.
 
     Every moving body is checked against every obstacle, except the links that the obstacle
     ignores. A link without a body gets a small sphere at the frame of its joint. The size of
@@ -153,7 +153,7 @@ def with_obstacles(collision: CollisionModel, obstacles: Sequence[Obstacle]) -> 
     names = [obstacle.name for obstacle in obstacles]
     for obstacle in obstacles:
         if names.count(obstacle.name) > 1:
-            raise TrajectoryError(f"two obstacles are named '{obstacle.name}'")
+            raise TrajectoryError(f"two obstacles are named '{obstacle.name}'; rename one")
         unknown = [link for link in obstacle.ignore if link not in links]
         if unknown:
             raise TrajectoryError(
@@ -172,14 +172,14 @@ def with_obstacles(collision: CollisionModel, obstacles: Sequence[Obstacle]) -> 
 
 
 def obstacles_alone(collision: CollisionModel, obstacles: Sequence[Obstacle]) -> CollisionModel:
-    """Return a collision model that ignores contacts between links: obstacles only."""
+    """Return a collision model that checks links against obstacles, not against each other."""
     geometry = collision.geometry.copy()
     geometry.removeAllCollisionPairs()
     return with_obstacles(replace(collision, geometry=geometry), obstacles)
 
 
 def body_name(collision: CollisionModel, number: int) -> str:
-    """Return the link, joint or obstacle of a collision body, as its name in messages."""
+    """Return the name of a collision body for messages: its link, joint or obstacle."""
     body = collision.geometry.geometryObjects[number]
     frame = int(body.parentFrame)
     link = str(collision.robot.model.frames[frame].name)
@@ -230,7 +230,7 @@ def load_environment(path: str | Path, robot: Robot | None = None) -> tuple[Obst
         for number, entry in enumerate(document, 1):
             if not isinstance(entry, dict) or not {'name', 'kind'} <= entry.keys() <= set(known):
                 raise TrajectoryError(
-                    f'obstacle {number} needs name and kind, and may have {", ".join(known[2:])}'
+                    f'obstacle {number} needs name and kind; allowed too: {", ".join(known[2:])}'
                 )
             values: dict[str, Any] = {
                 key: tuple(v) if isinstance(v, list) else v for key, v in entry.items()
@@ -307,7 +307,7 @@ def _shapes(entry: Mapping[str, Any], robot: Robot | None) -> Iterator[_Shape]:
 
 
 def _frame(name: str, robot: Robot | None) -> pin.SE3:
-    """Return the placement of a fixed frame with this name, in the base frame."""
+    """Return the placement of a fixed frame in the base frame, given its name."""
     if robot is None:
         return pin.SE3.Identity()
     model = robot.model

@@ -50,7 +50,7 @@ def lowest_point(
     collision: CollisionModel, up: FloatArray, motion: Motion, exempt: Sequence[str] = ()
 ) -> LowestPoint:
     """
-    Return the lowest point of the moving links in the samples of a motion.
+    Return the lowest point of the moving links over all samples of a motion.
 
     A link without a collision body is represented by the frame of its joint.
 
@@ -80,7 +80,7 @@ def link_heights(
     collision: CollisionModel, up: FloatArray, q: FloatArray, *, fixed: bool = False
 ) -> Iterator[tuple[str, FloatArray, FloatArray]]:
     """
-    Yield each link with the heights of its lowest and highest point in N poses, q (N, n).
+    Yield each link with the heights of its lowest and highest point in poses q, (N, n).
 
     Yields
     ------
@@ -124,7 +124,7 @@ def vertical(gravity: FloatArray) -> FloatArray:
 
 
 def outline(shape: coal.CollisionGeometry) -> tuple[FloatArray, float]:
-    """Return centres and radius of spheres whose convex hull encloses a body."""
+    """Return centres (K, 3) and radius [m] of spheres whose convex hull encloses a body."""
     if isinstance(shape, coal.Convex):
         return np.array(shape.points()), 0.0
     if isinstance(shape, coal.Sphere):
@@ -141,7 +141,7 @@ def outline(shape: coal.CollisionGeometry) -> tuple[FloatArray, float]:
 
 
 def _support(shape: coal.CollisionGeometry, direction: FloatArray) -> FloatArray:
-    """Return the extent of a body along N unit vectors, from its origin, (N,) [m]."""
+    """Return the extent of a body from its origin along N unit vectors, shape (N,) [m]."""
     if isinstance(shape, coal.Cylinder):
         axial = np.abs(direction[:, 2])
         radial = np.sqrt(np.maximum(1.0 - axial**2, 0.0))
@@ -275,8 +275,8 @@ def floor_obstacles(
         highest[link] = np.minimum(highest.get(link, np.inf), lowest)
     if all(lowest.max() < floor.height for lowest in highest.values()):
         raise TrajectoryError(
-            f'{robot.name}: every link is below the floor in all poses, {floor}; give its height '
-            'above the origin of the base [m] with --floor'
+            f'{robot.name}: all links are below the floor in all poses; the floor is {floor}. '
+            'Give its height above the origin of the base [m] with --floor'
         )
     touching = tuple(k for k, lowest in highest.items() if lowest.max() < floor.height + margin)
     x, y, z = floor.up
@@ -286,10 +286,10 @@ def floor_obstacles(
 
 
 def _why_not_standing(collision: CollisionModel, up: FloatArray) -> str:
-    """Return why an arm cannot stand on the plane of its base; empty if possible."""
+    """Return the reason why an arm cannot stand on its base plane; empty if the arm can."""
     normal = np.array([0.0, 0.0, 1.0])
     if up[2] < np.cos(np.pi / 4.0):
-        return 'gravity does not pull it onto its base plane'
+        return 'gravity does not press the arm onto its base plane'
     model = collision.robot.model
     # the fixed link that carries the first joint
     carrier = model.frames[model.frames[model.getFrameId(model.names[1])].parentFrame]
@@ -312,6 +312,6 @@ def _why_not_standing(collision: CollisionModel, up: FloatArray) -> str:
     if above > 0.0 and above >= -2.0 * below:
         return ''
     return (
-        f'with all joints at zero it reaches {max(above, 0.0):.2f} m above its base plane and '
+        f'at zero positions the arm reaches {max(above, 0.0):.2f} m above its base plane and '
         f'{max(-below, 0.0):.2f} m below it ({link})'
     )

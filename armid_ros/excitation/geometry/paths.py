@@ -97,7 +97,7 @@ def find_path(
 def clear_line(
     clearance: ClearanceModel | None, start: FloatArray, goal: FloatArray
 ) -> Approach | None:
-    """Return a too close approach of bodies on the straight line between poses; None if none."""
+    """Return an approach of bodies below the margin between two poses; None if there is none."""
     if clearance is None:
         return None
     difference = goal - start
@@ -152,7 +152,7 @@ class _Tree:
 
 
 def _shortened(path: list[FloatArray], free: _Free, rng: np.random.Generator) -> list[FloatArray]:
-    """Shorten a path at random; skip poses that a collision-free straight line replaces."""
+    """Shorten a path by random shortcuts along collision-free straight lines."""
     path = _skipped(path, free)
     # attempts to shorten the path
     for _ in range(60 if len(path) > 2 else 0):
@@ -167,7 +167,7 @@ def _shortened(path: list[FloatArray], free: _Free, rng: np.random.Generator) ->
 
 
 def _skipped(path: list[FloatArray], free: _Free) -> list[FloatArray]:
-    """Shorten a path: connect each pose to the farthest pose in a collision-free straight line."""
+    """Shorten a path: connect each pose to the farthest pose that a free straight line reaches."""
     short, here = [path[0]], 0
     while here < len(path) - 1:
         here = next(

@@ -171,7 +171,7 @@ class Criterion:
         return cost, (vectors * slope) @ vectors.T
 
     def _of_eigenvalues(self, values: FloatArray, norm: float) -> tuple[float, FloatArray]:
-        """Return cost and its derivative as functions of the ascending eigenvalues."""
+        """Return the cost and its derivatives by the eigenvalues, which are in ascending order."""
         if self.name == 'A':
             total = np.sum(1.0 / values)
             return float(np.log(total / len(values))), -1.0 / (values**2 * total)
@@ -188,7 +188,7 @@ class Criterion:
 
 
 def _log_norm(values: FloatArray, norm: float) -> tuple[float, FloatArray]:
-    """Return the logarithm of a p-norm of positive numbers, and its gradient."""
+    """Return the logarithm of the p-norm of positive values, and its gradient; p is `norm`."""
     powers = (values / values.max()) ** norm
     total = powers.sum()
     return float(np.log(values.max()) + np.log(total) / norm), powers / (total * values)

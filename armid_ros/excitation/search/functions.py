@@ -126,7 +126,7 @@ class Objective:
         return total
 
     def _state_columns(self, motion: Motion) -> list[FloatArray]:
-        """Return regressor columns of the rigid body and of effects without memory."""
+        """Return the regressor columns of the rigid body and of each instantaneous effect."""
         arm, target = self.problem.arm, self.problem.settings.target
         if target == 'effects':
             body = np.zeros((*motion.q.shape, len(arm.robot.rigid_parameters)))
@@ -136,7 +136,7 @@ class Objective:
         return [body, *(arm.columns_of(e, motion) for e in arm.effects if e.instantaneous)]
 
     def _past_columns(self, x: FloatArray) -> list[FloatArray]:
-        """Return regressor columns of effects that depend on the past motion."""
+        """Return the regressor columns of each effect that depends on the past motion."""
         problem = self.problem
         effects = [effect for effect in problem.arm.effects if not effect.instantaneous]
         path = FourierTrajectory.of(problem.limits.joints, problem.settings.period, x)
@@ -145,7 +145,7 @@ class Objective:
 
 
 def _weighted(blocks: Sequence[FloatArray], weights: FloatArray) -> FloatArray:
-    """Return the weighted sum of regressor columns in each sample of k motions, (k, N)."""
+    """Return the weighted sum of regressor columns at each sample of k motions, (k, N)."""
     total, start = 0.0, 0
     for block in blocks:
         stop = start + block.shape[2]
@@ -274,7 +274,7 @@ class Constraints:
         return totals, gradients
 
     def _clear(self, motion: Motion) -> Part:
-        """Return a clearance constraint for each of several equal parts of the period."""
+        """Return one clearance constraint for each of 20 equal parts of the period."""
         assert self.clearance is not None
         # unit of the constraint [m]; bodies that are 0.6 units beyond the margin are ignored. At a
         # sharpness of 60, their weight in the soft maximum is exp(-36)
@@ -301,7 +301,7 @@ class Constraints:
     def _between(
         self, values: FloatArray, lower: FloatArray, upper: FloatArray, unit: FloatArray
     ) -> tuple[npt.NDArray[np.intp], FloatArray, FloatArray]:
-        """Return the limited joints, soft maxima of their limit violations, and derivatives."""
+        """Return limited joints, the soft maximum of each joint's excess, and its derivatives."""
         limited = np.flatnonzero(np.isfinite(lower) | np.isfinite(upper))
         lower, upper, unit = (one[limited, np.newaxis] for one in (lower, upper, unit))
         over, under = values.T[limited] - upper, lower - values.T[limited]
@@ -310,7 +310,7 @@ class Constraints:
         return limited, totals, (weights[:, : len(values)] - weights[:, len(values) :]) / unit
 
     def _soft_maximum(self, excess: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return the soft maximum along the last axis, and its derivatives."""
+        """Return the soft maximum of excesses along the last axis, and its derivatives."""
         largest = excess.max(axis=-1, keepdims=True)
         weights = np.exp(self.sharpness * (excess - largest))
         total = weights.sum(axis=-1, keepdims=True)

@@ -51,7 +51,7 @@ class _OutOfTime(Exception):
 
 class Search:
     """
-    Search for the trajectory with least cost; an early stop keeps the best trajectory.
+    Search for the trajectory with the least cost; an early stop keeps the best trajectory.
 
     Parameters
     ----------
@@ -132,7 +132,7 @@ class Search:
         return ''
 
     def keep_best(self, trajectory: FourierTrajectory) -> float:
-        """Return the cost of a feasible trajectory; keep the trajectory with the least cost."""
+        """Return the cost of a feasible trajectory; store the trajectory if it is the best."""
         problem, prior = self.problem, self.prior
         matrix = problem.recorded(trajectory, problem.settings.n_periods).matrix
         cost = problem.criterion.cost(matrix if prior is None else matrix + prior)
@@ -149,7 +149,7 @@ class Search:
             raise _OutOfTime
 
     def _improve(self, starts: list[FourierTrajectory]) -> None:
-        """Optimise several trajectories in rounds; drop the worse half after certain rounds."""
+        """Optimise trajectories in rounds; drop the worse half after every second round."""
         objective, nearby = Objective(self.problem, self.prior), self.clearance
         if nearby is not None:  # ignore pairs of bodies that are far apart in many poses
             limits = self.problem.limits
@@ -170,7 +170,7 @@ class Search:
 
 @dataclass
 class _Branch:
-    """Local search from one start, with its last feasible trajectory and next settings."""
+    """Local search from one start: last feasible trajectory, and settings of the next round."""
 
     search: Search
     objective: Objective
@@ -179,7 +179,7 @@ class _Branch:
     cost: float = np.inf
 
     def __post_init__(self) -> None:
-        """Set the scales of the Fourier coefficients, and the bounds of scaled coefficients."""
+        """Set the scales of Fourier coefficients, and the bounds of the scaled coefficients."""
         limits, settings = self.search.problem.limits, self.search.problem.settings
         low, high = limits.position_range()
         half = 0.5 * (high - low)[:, np.newaxis]
@@ -195,7 +195,7 @@ class _Branch:
         self.times, self.box, self.sharpness = np.empty(0), _BOX_HALF_WIDTH, _SHARPNESS[0]
 
     def advance(self) -> None:
-        """Run the solver for one round, in a box around the last feasible trajectory."""
+        """Run the solver for one round, within a box around the last feasible coefficients."""
         if self.remaining <= 0:
             return
         problem, clearance = self.search.problem, self.search.clearance
@@ -233,7 +233,7 @@ class _Branch:
             self.sharpness = _SHARPNESS[-1]
 
     def _solve(self, constraints: Constraints, iterations: int) -> tuple[FloatArray, int]:
-        """Run SLSQP; return the scaled coefficients found, (n, 1 + 2 H), and the step count."""
+        """Run SLSQP; return the scaled coefficients, (n, 1 + 2 H), and the number of steps."""
         count, scale = 0, self.scale
         x = self.trajectory.coefficients / scale
 
@@ -279,7 +279,7 @@ class _Branch:
 def _made_feasible(
     problem: DesignProblem, clearance: ClearanceModel | None, trajectory: FourierTrajectory
 ) -> FourierTrajectory | None:
-    """Reduce the amplitudes of a trajectory until it is feasible; return None if this fails."""
+    """Reduce amplitudes of a trajectory until it is feasible; return None if this fails."""
     # a joint beyond its own limits is reduced alone; torque and clearance reduce all joints
     for _ in range(12):
         faults = trajectory_faults(problem.arm, problem.limits, trajectory, clearance)
