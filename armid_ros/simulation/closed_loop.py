@@ -68,7 +68,7 @@ class _Plant(Structure):
 
 class CompiledLoop:
     """
-    Plant and controller, stored in the data structures of the compiled kernel.
+    Plant and controller as data structures of the compiled kernel, which simulates steps fast.
 
     Parameters
     ----------
@@ -123,7 +123,7 @@ class CompiledLoop:
 
     @classmethod
     def of(cls, plant: Plant, controller: Controller) -> CompiledLoop | None:
-        """Return the compiled loop; None if the kernel is missing or cannot compute the plant."""
+        """Return the compiled loop; None if the kernel is missing or cannot simulate the plant."""
         action, dry = plant.action, plant.contacts
         usual = plant.springs is None and action.drive is None and action.hysteresis is None
         usual = usual and plant.robot.mechanism is None
@@ -215,7 +215,7 @@ class Trace(NamedTuple):
 def command(
     plant: Plant, controller: Controller, state: State, targets: Motion, row: int
 ) -> FloatArray:
-    """Return the controller's torque at one sample of the desired motion, limited, (n,) [N m]."""
+    """Return the controller's torque at one row of the targets, within limits, (n,) [N m]."""
     assert targets.tau is not None
     desired = targets.q[row], targets.dq[row], targets.ddq[row]
     q, dq = (state.q, state.dq) if state.rotors is None else plant.motors(state)[:2]

@@ -131,7 +131,7 @@ class Contacts:
 
     @classmethod
     def of(cls, friction: DryFriction) -> Contacts:
-        """Return contacts that consist of dry friction elements."""
+        """Return the contacts of dry friction elements, without joint stops."""
         joints = [np.flatnonzero(direction).tolist() for direction in friction.directions]
         axes = tuple(some[0] if len(some) == 1 else -1 for some in joints)
         loaded = None if friction.load_share is None else friction
@@ -139,7 +139,7 @@ class Contacts:
         return cls(friction.directions, friction.lower, friction.upper, axes, single, loaded)
 
     def with_load(self, load: FloatArray) -> Contacts:
-        """Return the contacts with the dry friction caused by a rigid-body torque, (n,) [N m]."""
+        """Return the contacts with friction levels widened by a rigid-body torque, (n,) [N m]."""
         if self.friction is None:
             return self
         more = self.friction.widening(load)
@@ -153,7 +153,7 @@ class Contacts:
 
 
 def split_constant(friction: DryFriction | None, n_joints: int) -> tuple[DryFriction, FloatArray]:
-    """Return the dry friction elements that can stick, and the sum of the constant torques."""
+    """Split friction into elements that can stick, and the sum of constant torques, (n,) [N m]."""
     if friction is None:
         return DryFriction(np.empty((0, n_joints)), np.empty(0), np.empty(0)), np.zeros(n_joints)
     span = friction.upper - friction.lower

@@ -76,7 +76,7 @@ class LinearFeedback:
     def torque(
         self, q: FloatArray, dq: FloatArray, desired: Desired, feedforward: FloatArray
     ) -> FloatArray:
-        """Return feedback plus feedforward torque, shape (n,) [N m]; see `Controller.torque`."""
+        """Return the sum of feedback and feedforward torque, (n,) [N m]; see `Controller`."""
         behind, slower = desired[0] - q, desired[1] - dq
         ddq = self.bandwidth**2 * behind
         ddq += 2.0 * self.bandwidth * slower
@@ -110,7 +110,7 @@ class Controller:
     feedback: LinearFeedback | None = None
 
     def __init__(self, feedback: LinearFeedback | None = None) -> None:
-        """Make a controller with a linear feedback law; a subclass may override `torque`."""
+        """Set the linear feedback law; a subclass with another law overrides `torque`."""
         self.feedback = feedback
 
     def in_initial_state(self) -> Controller:
@@ -128,7 +128,7 @@ class Controller:
         return desired.with_torque(self.feedforward(desired))
 
     def feedforward(self, desired: Motion) -> FloatArray:
-        """Return the controller torques that depend only on the reference, shape (N, n) [N m]."""
+        """Return the torques that depend on the desired motion only, shape (N, n) [N m]."""
         return np.zeros_like(desired.q)
 
     def torque(
@@ -185,7 +185,7 @@ class ComputedTorque(Controller):
 @dataclass(frozen=True, eq=False)
 class VelocityLoop:
     """
-    Gains of a proportional-integral control of motor velocities, sampled at every step.
+    Gains of proportional-integral controllers of motor velocities, updated at every step.
 
     tau_k = kp e_k + ki s_k, with e_k = reference - velocity and s_k = s_k-1 + dt e_k.
 
@@ -239,7 +239,7 @@ class MotorControl(Controller):
     @classmethod
     def of(cls, plant: Plant) -> MotorControl:
         """
-        Return velocity loops designed for an arm with elastic joints.
+        Return a controller with velocity loops that are designed for an arm with elastic joints.
 
         The feedforward uses the same arm. The velocity gain is the smallest of three gains: that
         of a rigid joint for 8 Hz; sqrt(K M), with the best damping of the link on its spring; and
@@ -272,7 +272,7 @@ class MotorControl(Controller):
 
     def targets(self, desired: Motion, previous: FloatArray | None = None) -> Motion:
         """
-        Return the desired motion of the motors for a motion of the links.
+        Return the desired motion of the motors for a desired motion of the links.
 
         The torque of the reference, if any, is added to the torque of the loops.
 

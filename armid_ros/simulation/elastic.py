@@ -70,7 +70,7 @@ def shipped_arm(robot: Robot) -> tuple[ArmModel, TwoLinkSet | None]:
 
 def elastic_joints(arm: ArmModel) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """
-    Return the names of the elastic joints with rotor inertia, and of those without.
+    Return the names of elastic joints with rotor inertia, and of elastic joints without.
 
     A motor without inertia has no independent motion. The twist of its spring follows the load
     without delay.
@@ -163,7 +163,7 @@ def multisine(
     rng: np.random.Generator,
 ) -> FloatArray:
     """
-    Return a period of random-phase multisine signals with all frequencies of a band.
+    Return one period of random-phase multisine signals with all frequencies of a band.
 
     Parameters
     ----------
@@ -300,7 +300,7 @@ def step_course(
 def _next_pose(
     robot: Robot, here: FloatArray, rng: np.random.Generator, clear: Clear, beyond: FloatArray
 ) -> FloatArray:
-    """Draw a pose that is reached in a free straight line, with room for a step beyond it."""
+    """Draw a pose that a free straight line reaches, and from which the next step is free, too."""
     middle = robot.middle_pose
     reach, tries = np.pi / 3.0, 1000  # largest distance from the middle [rad or m]; drawn poses
     lower = np.maximum(robot.lower, middle - reach)
@@ -312,16 +312,16 @@ def _next_pose(
             return np.asarray(there)
     raise TrajectoryError(
         f'{robot.name}: none of {tries} poses can be reached from the middle of the ranges in a '
-        'straight line without bodies coming too near each other'
+        'straight line without bodies coming too close to each other'
     )
 
 
 def _finite(robot: Robot, limit: FloatArray, quantity: str) -> FloatArray:
-    """Return a limit of each joint; raise a TrajectoryError if a joint has no such limit."""
+    """Return the limits (n,) of a quantity; raise a TrajectoryError if a limit is not finite."""
     for joint, value in zip(robot.joints, limit, strict=True):
         if not np.isfinite(value):
             raise TrajectoryError(
-                f'joint {joint}: the description has no {quantity} limit, but a share of it was '
-                'requested'
+                f'joint {joint}: the description has no {quantity} limit, but a share of it is '
+                'needed; add a <limit>'
             )
     return limit

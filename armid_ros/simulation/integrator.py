@@ -83,7 +83,7 @@ def _end_velocity(
     dq: FloatArray,
     modes: Modes,
 ) -> tuple[FloatArray, FloatArray, Modes]:
-    """Return velocity, acceleration and contact modes at the end of a time step."""
+    """Return velocities (n,), accelerations (n,) and contact modes at the end of a time step."""
     dt, directions = plant.dt, contacts.directions
     right = np.empty((1 + len(directions), len(force)))
     right[0], right[1:] = force, directions
@@ -122,7 +122,7 @@ def _stop(
     q_next: FloatArray,
     load: FloatArray | None,
 ) -> tuple[FloatArray, FloatArray, FloatArray, Modes]:
-    """Repeat a time step in which joints hit their stops, with contacts at these stops."""
+    """Repeat a time step with contacts at the stops that joints hit; return the new motion."""
     robot, count = plant.robot, len(state.modes)
     at_upper, at_lower = q_next > robot.upper, q_next < robot.lower
     while True:
@@ -180,7 +180,7 @@ def spring_substep(
 
 
 def _propagated(springs: ElasticJoints, rates: FloatArray, x: FloatArray) -> FloatArray:
-    """Return spring twists and velocities after a substep, and derivatives by friction torque."""
+    """Return twists and velocities after a substep, and their derivatives by friction torques."""
     e, size = len(springs.joints), len(x)
     z = np.zeros((size, size))
     z[:e, e:] = springs.to_twists
@@ -203,7 +203,7 @@ def _force(
     v: FloatArray,
     twist: FloatArray,
 ) -> tuple[FloatArray, FloatArray]:
-    """Return torques on motors and links in mid-substep, and the new hysteresis states."""
+    """Return torques on motors and links at mid-substep, (e + n,), and new hysteresis states."""
     robot, action, e = plant.robot, plant.action, len(springs.joints)
     t = state.t + 0.5 * springs.dt
     motor_speed = springs.to_motors.dot(v)
@@ -234,7 +234,7 @@ def _hold(
     modes: Modes,
     moved: FloatArray,
 ) -> None:
-    """Set velocity and motion of sticking motors to exactly zero."""
+    """Set the velocities and the travel of sticking motors to exactly zero, in place."""
     e = len(springs.joints)
     for axis, mode in zip(plant.contacts.axes, modes, strict=True):
         if mode != 0 or axis < 0:

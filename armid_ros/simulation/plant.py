@@ -25,7 +25,7 @@ from scipy.linalg import eigh, LinAlgError
 
 
 def require_masses(robot: Robot) -> None:
-    """Raise a ModelError if links of a robot have a negative mass; the message names them."""
+    """Raise a ModelError if a robot has links of negative mass; the message names the links."""
     masses = robot.rigid_parameters[::PER_LINK]
     negative = [
         f"'{name}' ({mass:g} kg)"
@@ -39,7 +39,7 @@ def require_masses(robot: Robot) -> None:
 
 def possible_loads(robot: Robot, values: FloatArray) -> bool:
     """
-    Return whether loads have physically possible inertial parameters, near the arm.
+    Return whether all loads are physically possible bodies within the reach of the arm.
 
     Parameters
     ----------
@@ -61,7 +61,7 @@ def possible_loads(robot: Robot, values: FloatArray) -> bool:
 
 def require_any_mass(robot: Robot) -> None:
     """
-    Raise a ModelError if no link of a robot has mass: all its torques would be zero.
+    Raise a ModelError if no link of a robot has mass; all joint torques would be zero.
 
     Raises
     ------
@@ -72,13 +72,13 @@ def require_any_mass(robot: Robot) -> None:
     if np.all(np.abs(robot.rigid_parameters[::PER_LINK]) < NO_MASS):
         raise ModelError(
             f'{robot.path or robot.name}: no link has a mass ({", ".join(robot.links)}), so there '
-            'is no model to compare with. Give them an <inertial>, or identify the arm first '
-            '(armid identify) and name its model.yaml with --model'
+            'is no model to compare with. Give the links an <inertial>, or identify the arm first '
+            '(armid identify) and give its model.yaml with --model'
         )
 
 
 def inertia_error(robot: Robot) -> ModelError:
-    """Return the error for an inertia matrix that is not positive definite."""
+    """Return the error to raise for an inertia matrix that is not positive definite."""
     odd = [
         f"'{name}' ({values[0]:g} kg)"
         for name, values in zip(
@@ -205,7 +205,7 @@ class Plant:
         elasticity: Elasticity | None = None,
     ) -> None:
         if not (math.isfinite(dt) and dt > 0.0):
-            raise ModelError(f'the step has to be a positive time, not {dt} s')
+            raise ModelError(f'the simulation step has to be a positive time, not {dt} s')
         self.arm, self.dt, self.hard_stops = arm, dt, hard_stops
         self.action: Action = arm.action()
         self.robot: Robot = self.action.robot or arm.robot
@@ -304,7 +304,7 @@ class Plant:
     def subtract_smooth_effects(
         self, force: FloatArray, t: float, q: FloatArray, dq: FloatArray, memory: FloatArray
     ) -> None:
-        """Subtract the torques of all smooth effects from motor torques (n,) in place [N m]."""
+        """Subtract the torques of smooth effects from motor torques `force` (n,), in place."""
         if self.constant is not None:
             force -= self.constant
         if self.torque is not None:

@@ -214,7 +214,7 @@ def whole_steps(time: float, dt: float, setting: str) -> int:
     steps = round(time / dt) if np.isfinite(time) else 0
     if steps < 1 or abs(steps * dt - time) > 1e-9 * time:
         raise ModelError(
-            f'{setting} does not fit the step of {dt:g} s: take {1.0 / dt:g} Hz divided by a '
+            f'{setting} does not fit the step of {dt:g} s: use {1.0 / dt:g} Hz divided by a '
             'whole number'
         )
     return steps

@@ -206,7 +206,7 @@ class RecentPast:
 
 def accelerometer_readings(robot: Robot, links: Motion, places: FloatArray) -> FloatArray:
     """
-    Return the readings of accelerometers with three axes, one on every link, along a motion.
+    Return the readings of three-axis accelerometers, one on every link, along a motion.
 
     Parameters
     ----------

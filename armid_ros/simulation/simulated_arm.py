@@ -162,7 +162,7 @@ class SimulatedArm:
 
     @property
     def ends_at(self) -> float:
-        """Time at which the present trajectory ends, or ended [s]."""
+        """End time of the present trajectory, which may be in the past [s]."""
         return self._begun * self.plant.dt + self._reference.duration
 
     def reset(self, steps: int = 0) -> None:
@@ -220,7 +220,7 @@ class SimulatedArm:
 
     def successor(self, arm: ArmModel) -> Plant:
         """
-        Return the plant of a new arm model, after a check that it can replace the present one.
+        Return the plant of a new arm model; raise an error if it cannot replace the present model.
 
         Raises
         ------
@@ -242,7 +242,7 @@ class SimulatedArm:
 
     def set_trajectory(self, reference: Reference) -> None:
         """
-        Begin a trajectory now; it replaces the present trajectory.
+        Start a trajectory now, in place of the present trajectory.
 
         If the time of the first point is later than zero, the arm moves to this point within that
         time.
@@ -276,7 +276,7 @@ class SimulatedArm:
 
     def advance(self, steps: int = 1) -> Sample:
         """
-        Simulate some steps, and return the sensor readings.
+        Simulate a number of steps, and return the sensor readings at the end.
 
         Parameters
         ----------
@@ -285,25 +285,25 @@ class SimulatedArm:
 
         """
         if steps < 1:
-            raise ValueError(f'an arm advances by 1 step or more, not {steps}')
+            raise ValueError(f'an arm has to advance by 1 step or more, not {steps}')
         self._ahead -= steps
         while self._ahead < 0:
             before = self._state, self._torque
             missing = -self._ahead
-            trace = self._take(missing if self._compiled is None else max(missing, _BLOCK))
+            trace = self._simulate(missing if self._compiled is None else max(missing, _BLOCK))
             self._block_start = before
             self._ahead += len(trace.tau) - 1
         return self.read()
 
     def traces(self, steps: int) -> Iterator[Trace]:
-        """Simulate some steps; yield the results in traces of some hundred steps each."""
+        """Simulate a number of steps; yield the results in traces of at most 1000 steps."""
         self._end_block()
         while steps:
-            trace = self._take(steps)
+            trace = self._simulate(steps)
             steps -= len(trace.tau) - 1
             yield trace
 
-    def _take(self, steps: int) -> Trace:
+    def _simulate(self, steps: int) -> Trace:
         """Simulate steps, at most up to the last computed target; return their trace."""
         row = self._row + 1
         if row >= len(self._targets):
@@ -317,7 +317,7 @@ class SimulatedArm:
         return trace
 
     def _end_block(self) -> None:
-        """Discard steps simulated ahead of time; compute the state at the present time."""
+        """Discard the steps simulated ahead of time; compute the state at the present time."""
         if self._ahead <= 0:
             return
         (state, torque), present = self._block_start, self.steps
@@ -328,7 +328,7 @@ class SimulatedArm:
         self._state, self._torque, self._ahead = trace.state, trace.tau[-1], 0
 
     def read(self) -> Sample:
-        """Return the sensor readings at present."""
+        """Return the sensor readings at the present time."""
         q, dq, tau = self._past.latest(self._ahead)
         q, dq, tau = self.sensors.measure(q[np.newaxis], dq[np.newaxis], tau[np.newaxis], self.rng)
         link = None
@@ -366,7 +366,7 @@ class SimulatedArm:
         return q, dq, acceleration
 
     def _begin(self, reference: Reference, steps: int) -> None:
-        """Start at the first point of a reference, with an empty sensor history."""
+        """Set the arm to the first point of a reference, with an empty sensor history."""
         first = reference.sample(np.zeros(1))
         self._state = self.plant.state(first.q[0], first.dq[0], first.ddq[0], steps)
         self._ahead = 0
@@ -383,12 +383,12 @@ class SimulatedArm:
         return self._state.steps - self._first
 
     def _look_ahead(self, commanded: FloatArray | None = None, steps: int = 1000) -> None:
-        """Compute the controller's targets for the next steps from the last commanded position."""
+        """Compute the controller's targets of the next steps from the last commanded position."""
         self._first = self._state.steps
         self._targets = self.controller.targets(self._desired(steps + 1), commanded)
 
     def _desired(self, count: int) -> Motion:
-        """Return the desired motion at the present and the following time steps."""
+        """Return the desired motion at `count` time steps, from the present step on."""
         first, times = self._state.steps, self.plant.times
         motion = self._reference.sample(times(first - self._begun, count))
         return replace(motion, t=times(first, count))

@@ -156,12 +156,12 @@ class ElasticJoints:
         )
 
     def _pull_of(self, stiffness: FloatArray, damping: FloatArray) -> FloatArray:
-        """Return the matrix that maps twists and velocities to torques, (e + n, e + e + n)."""
+        """Return `pull` for given stiffness and damping, shape (e + n, e + e + n)."""
         w = self.to_twists
         return np.hstack([-w.T * stiffness, -self.damping - (w.T * damping) @ w])
 
     def meshing(self, twist: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return `pull` for the springs in contact, and torque offsets (e,) due to backlash."""
+        """Return `pull` of the springs in contact, and torque offsets (e,) by backlash [N m]."""
         springs = self.transmission
         meshes = np.abs(twist) > springs.gap
         stiffness = np.where(meshes, springs.stiffness, 0.0)
@@ -179,7 +179,7 @@ class ElasticJoints:
 
 
 def _required_springs(robot: Robot, action: Action) -> Transmission:
-    """Return the springs of an arm; raise a ModelError if the simulation cannot use them."""
+    """Return the springs of an arm; raise a ModelError if they cannot be simulated."""
     springs = action.transmission
     if springs is None or not np.any(np.isfinite(springs.stiffness)):
         raise ModelError(

@@ -42,7 +42,7 @@ def temperature_course(text: str, n_joints: int, duration: float) -> Temperature
     except ValueError:
         raise ModelError(
             f"temperature '{text}' cannot be read: write 25, or 20:45:600 for 20 to 45 degC with "
-            f'a time constant of 600 s; or write {n_joints} of these, with commas, one per joint'
+            f'a time constant of 600 s; or {n_joints} of these with commas, one for each joint'
         ) from None
     return Temperatures(t, values)
 
