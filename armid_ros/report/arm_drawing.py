@@ -73,7 +73,7 @@ class ArmDrawing(Templated):
 
 def draw_poses(collision: CollisionModel, poses: FloatArray, path: FloatArray) -> list[ArmDrawing]:
     """
-    Draw an arm and its obstacles in each of several poses, with the path of its last body.
+    Draw an arm and its obstacles, once for each of K poses, with the path of its last body.
 
     Parameters
     ----------
@@ -119,7 +119,7 @@ def draw_arm(
     robot: Robot, marked: Sequence[str], q: FloatArray | None = None, label: str = ''
 ) -> ArmDrawing:
     """
-    Draw an arm in one pose, by default the one with the largest visible area.
+    Draw an arm in the pose of `q` with the largest visible area, by default in its middle pose.
 
     Parameters
     ----------
@@ -172,7 +172,7 @@ def draw_arm(
 
 @dataclass(frozen=True)
 class _Solid:
-    """Body to draw: the hull of spheres around given points, in the frame of a joint."""
+    """Body to draw: convex hull of equal spheres around points in the frame of a joint."""
 
     joint: int
     of_arm: bool
@@ -180,7 +180,7 @@ class _Solid:
     radius: float
 
     def seen(self, frame: pin.SE3) -> tuple[FloatArray, float]:
-        """Return the body's outline in the drawing plane, and its nearness to the viewer [m]."""
+        """Return the outline in the drawing plane (K, 2), and the depth towards the viewer [m]."""
         points = self.points @ frame.rotation.T + frame.translation
         turn = np.linspace(0.0, 2.0 * np.pi, _CIRCLE_CORNERS, endpoint=False)
         ring = max(self.radius, 1e-4) * np.column_stack([np.cos(turn), np.sin(turn)])
@@ -191,7 +191,7 @@ class _Solid:
 
 
 def _solids(robot: Robot, geometry: pin.GeometryModel) -> list[_Solid]:
-    """Return collision bodies of an arm and its obstacles, and bars for links without a body."""
+    """Return the bodies to draw: collision bodies, and bars for links without such a body."""
     solids = []
     for body in geometry.geometryObjects:
         shape = body.geometry
@@ -231,7 +231,7 @@ _Picture = list[tuple[FloatArray, _Solid]]
 
 
 def _picture(solids: Sequence[_Solid], frames: Sequence[pin.SE3]) -> _Picture:
-    """Return the outlines of all bodies, for the frames of all joints."""
+    """Return the outlines of all bodies, the farthest first, given the frames of all joints."""
     seen = [(*solid.seen(frames[solid.joint]), solid) for solid in solids]
     return [(hull, solid) for hull, _, solid in sorted(seen, key=lambda one: one[1])]
 
@@ -248,7 +248,7 @@ class _Canvas:
 
     @classmethod
     def around(cls, shapes: Sequence[FloatArray], room: tuple[float, float]) -> _Canvas:
-        """Return a canvas of at most a given size [px] that shows all points of some shapes."""
+        """Return a canvas of at most the size `room` [px] that contains all points of shapes."""
         points, margin = np.concatenate(shapes), 0.03  # around a drawing [m]
         left, low = (points.min(axis=0) - margin).tolist()
         right, high = (points.max(axis=0) + margin).tolist()
@@ -268,5 +268,5 @@ class _Canvas:
     def bodies(
         self, picture: _Picture, colour: Callable[[_Solid], str]
     ) -> tuple[tuple[str, str], ...]:
-        """Return SVG outline and colour of each body."""
+        """Return SVG outline and colour of each body of a picture."""
         return tuple((self.svg(hull), colour(solid)) for hull, solid in picture)

@@ -76,7 +76,7 @@ class IntervalTrack:
     reference: float | None
 
     def place(self, number: float) -> float:
-        """Return where a number is on the axis [% of its width]."""
+        """Return the position of a number on the axis, in per cent of the axis width."""
         span = max(abs(self.value) + self.reach, abs(self.reference or 0.0)) or 1.0
         return round(50.0 + 45.0 * max(-1.0, min(1.0, number / span)), 2)
 
@@ -152,12 +152,12 @@ class BulletList(Templated):
 @dataclass(frozen=True)
 class Fold(Templated):
     """
-    Line of text which opens and closes the blocks below it.
+    Summary line that shows or hides the blocks below the line.
 
     Attributes
     ----------
     summary : str
-        The line.
+        Text of the line.
     blocks : sequence of Templated
         Content below the line.
     opened : bool
@@ -311,6 +311,6 @@ class VerdictSection(Templated):
 
 
 def next_steps(steps: Sequence[str]) -> list[Section]:
-    """Return the section with all next steps; [] if the verdict box shows the only one."""
+    """Return the section with the next steps; [] for one step, which the verdict box shows."""
     bullets = BulletList([(step, '') for step in steps], True)
     return [Section('What to do next', [bullets])] if steps[1:] else []

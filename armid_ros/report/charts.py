@@ -141,7 +141,7 @@ class Chart(Templated):
 
 def thinned(*series: npt.ArrayLike, most: int = 3000) -> npt.NDArray[np.intp]:
     """
-    Return indices of the samples with which curves look the same as with all samples.
+    Return the indices of samples that suffice to draw curves without a visible difference.
 
     Parameters
     ----------
@@ -183,7 +183,7 @@ def joined(parts: Sequence[FloatArray]) -> FloatArray:
 
 
 def joined_time(parts: Sequence[FloatArray]) -> FloatArray:
-    """Concatenate times of gap-free sections, as `joined` does with values."""
+    """Concatenate times of gap-free sections, with one more time per gap, to match `joined`."""
     pieces = [part for stretch in parts for part in (stretch, stretch[-1:])]
     return read_only(np.concatenate(pieces[:-1]))
 

@@ -73,7 +73,7 @@ def compare_report(comparison: Comparison, origin: ResultOrigin) -> str:
 
 
 def verdict(comparison: Comparison) -> tuple[str, str]:
-    """Return the verdict on two identifications: words for the badge, and its colour."""
+    """Return the verdict on two identifications: text and colour of the badge."""
     if comparison.unusable:
         return 'unusable', 'bad'
     if comparison.anything:
@@ -176,7 +176,7 @@ def _count_sentence(comparison: Comparison) -> str:
 
 
 def _residuals(comparison: Comparison) -> Iterator[str]:
-    """Yield a sentence on each joint whose residual changed, and one on possible reasons."""
+    """Yield a sentence on each joint whose residual changed, and a sentence on the reason."""
     for change in comparison.changed_residuals:
         errors = change.before_error, change.after_error
         ranks = ('second', 'first') if change.ratio > 1.0 else ('first', 'second')

@@ -146,7 +146,7 @@ def diagnosis_report(
 
 
 def _at_fault(diagnosis: Diagnosis, read: Mapping[str, Sequence[Recording]]) -> list[str]:
-    """Return the recordings that a verdict bad_data names, else all; [] for other verdicts."""
+    """Return the recordings that a bad_data verdict names, or all of the fit; otherwise []."""
     if diagnosis.verdict != 'bad_data':
         return []
     sources = [one.source for several in read.values() for one in several if one.source]
@@ -175,7 +175,7 @@ def _verdict(diagnosis: Diagnosis, worse: Sequence[str], step: str) -> VerdictSe
 @dataclass(frozen=True)
 class Story(Templated):
     """
-    Drawing of the arm, and facts on the causes and the patched model.
+    Drawing of the arm, and facts on the causes and on the model with the named effects.
 
     Attributes
     ----------
@@ -212,7 +212,7 @@ class Story(Templated):
 
     @property
     def rows(self) -> list[tuple[str, list[str]]]:
-        """Names and values of facts: times of the causes, model, meaning of effects and others."""
+        """Names and values of facts, such as times of the causes and meaning of the effects."""
         diagnosis, patched = self.diagnosis, not self.diagnosis.harmful
         meaning = {effect.name: effect.summary for effect in diagnosis.arm.effects}
         names = list(dict.fromkeys(one.name for one in diagnosis.findings if patched))
@@ -314,7 +314,7 @@ def overlay_section(diagnosis: Diagnosis, gap: Gap) -> Section:
 
 
 def _worst(diagnosis: Diagnosis, gap: Gap) -> int:
-    """Return the index of the joint with the largest gap, or that does not repeat."""
+    """Return the index of the joint with the largest gap, or of a joint that does not repeat."""
     if diagnosis.verdict != 'not_repeatable':
         return int(np.argmax(gap.chi2_before))
     # the floor contains the part of the torque that does not repeat
@@ -322,7 +322,7 @@ def _worst(diagnosis: Diagnosis, gap: Gap) -> int:
 
 
 def _of_recording(gap: Gap, shown: Overlay, joint: int) -> tuple[FloatArray, ...]:
-    """Return times of a recording, and a joint's torque: measured, and from both models."""
+    """Return times, measured torque and the torque of both models, of a joint in a recording."""
     here = shown.trajectory.source, shown.trajectory.fold
     parts = [(one, one.trajectory) for one in gap.overlays]
     own = [one for one, part in parts if (part.source, part.fold) == here]
@@ -333,7 +333,7 @@ def _of_recording(gap: Gap, shown: Overlay, joint: int) -> tuple[FloatArray, ...
 
 def whole_overlays(diagnosis: Diagnosis, recordings: Sequence[Recording]) -> Gap | None:
     """
-    Return residuals and torque curves; whole recordings are shown if a cause acts temporarily.
+    Return the gap with its torque curves, of whole recordings if a cause acts temporarily.
 
     Parameters
     ----------

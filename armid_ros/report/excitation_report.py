@@ -142,7 +142,7 @@ def _verdict(
     notes: Sequence[str],
     step: str,
 ) -> VerdictSection:
-    """Return the verdict box: violated limits, clearance, and identifiable parameters."""
+    """Return the verdict box: use of limits, clearance, and identifiable parameters."""
     settings, links, joints = design.settings, robot.links, design.limits.joints
     unseen = [
         full_label(name, links)

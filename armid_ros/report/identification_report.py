@@ -129,7 +129,7 @@ def parameter_sections(
     name: str = 'description',
 ) -> list[Section]:
     """
-    Return the sections on all parameters and, if fitted, on physical consistency.
+    Return the sections on all parameters and, if it was enforced, on physical consistency.
 
     Parameters
     ----------

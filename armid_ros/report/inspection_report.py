@@ -142,7 +142,7 @@ def headline(remarks: Sequence[Remark], found: LinkCheck | None) -> tuple[str, .
 
 
 def _wrong_mass(found: LinkCheck, k: int) -> str:
-    """Return words on the significant error of a link's mass, else ''."""
+    """Return a text such as 'is 0.8 kg too light at elbow'; '' for an insignificant error."""
     change, reach = found.measured_mass[k] - found.mass[k], HALF_WIDTH * found.mass_std[k]
     if not abs(change) > reach:
         return ''
@@ -169,7 +169,7 @@ def link_rows(found: LinkCheck) -> list[tuple[str, ...]]:
 
 
 def _interval(values: FloatArray, std: FloatArray) -> str:
-    """Format values with their largest 95 % half-width; NaN becomes '-'."""
+    """Format values with the largest of their 95 % half-widths; NaN becomes '-'."""
     if np.isnan(values).any():
         return '-'
     reach = float(HALF_WIDTH * std.max())
@@ -294,7 +294,7 @@ def _curves_section(found: Inspection) -> Section:
 
 
 def joint_heads(found: Inspection) -> tuple[str, ...]:
-    """Return the heads of the joint table's columns, with units if all joints share them."""
+    """Return the column heads of the joint table, with units if all joints have equal units."""
     alike, unit = len(set(found.units)) == 1, found.units[0]
     length, speed, torque = (
         f' [{one}]' if alike else '' for one in (unit, f'{unit}/s', 'N' if unit == 'm' else 'N m')

@@ -33,7 +33,7 @@ def pretty(unit: str) -> str:
 
 
 def digits(value: float, count: int = 2) -> str:
-    """Format a number with `count` significant digits, or all its integer digits."""
+    """Format a number with `count` significant digits, or more for a large integer part."""
     if not abs(value) < _MAX_NUMBER:
         return DASH
     if 10.0**count <= abs(value) < 1e7:
@@ -42,7 +42,7 @@ def digits(value: float, count: int = 2) -> str:
 
 
 def plain(value: float, count: int = 3) -> str:
-    """Format a number without trailing zeros; very small and large ones with exponent."""
+    """Format a number without trailing zeros; very small or large numbers have an exponent."""
     rounded = 10.0**count - 0.5 <= abs(value) < 1e7
     return f'{value:.0f}' if rounded else f'{value:.{count}g}'
 
@@ -112,7 +112,7 @@ def robot_label(source: str) -> str:
 
 def common_prefix(names: Sequence[str]) -> str:
     """
-    Return the prefix that all joint and link names share, such as 'panda_'; '' if short.
+    Return the prefix that all joint and link names share, such as 'panda_', or ''.
 
     Parameters
     ----------

@@ -37,7 +37,7 @@ _LABELS = re.compile(
 
 class Templated:
     """
-    Base class of page blocks; a Jinja template renders each, and sees it as `block`.
+    Base class of page blocks; a Jinja template with the variable `block` renders each block.
 
     Attributes
     ----------

@@ -97,7 +97,7 @@ def parameter_folds(
     order: Callable[[int], float] = float,
 ) -> list[Fold]:
     """
-    Return a foldable table of parameters for each link and each kind of effect.
+    Return foldable tables of parameters, one per link and one per parameter of effects.
 
     Parameters
     ----------
@@ -225,7 +225,7 @@ def joint_columns(
     result: Identification, description: ArmModel, held_out: Sequence[Fit]
 ) -> dict[str, list[str]]:
     """
-    Return table columns with error, friction and deviation from the URDF of each joint.
+    Return table columns by head: error, friction and deviation from the URDF of each joint.
 
     Parameters
     ----------
@@ -260,7 +260,7 @@ def joint_columns(
 
 def not_as_described(result: Identification, description: ArmModel) -> dict[str, tuple[int, int]]:
     """
-    Return for each joint how many inertial parameters differ from the description.
+    Return the number of inertial parameters of each joint that differ from the description.
 
     Parameters
     ----------

@@ -67,7 +67,7 @@ class ResultOrigin:
     step: str = ''
 
     def of(self, known: str) -> ResultOrigin:
-        """Return the origin; a missing robot name is replaced by the given one."""
+        """Return a copy in which the name `known` replaces missing names of the robot."""
         return replace(self, robot=self.robot or known, source=self.source or known)
 
 

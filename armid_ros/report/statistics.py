@@ -105,7 +105,7 @@ class Whiteness:
 
 def torque_reach(result: Identification, fits: Sequence[Fit]) -> FloatArray:
     """
-    Return the 95 % half-width (n,) of predicted torques that parameter errors cause.
+    Return the 95 % half-width of each joint's predicted torque by parameter errors, (n,).
 
     The half-widths are root mean squares over a motion [N m].
 

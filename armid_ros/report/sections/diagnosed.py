@@ -49,7 +49,7 @@ _DETECTABLE = (
 
 
 def share_bars(diagnosis: Diagnosis) -> BarChart:
-    """Return bars that divide the squared torque error among causes and unexplained rest."""
+    """Return bars with the share of the squared torque error that each cause explains."""
     rows, taken = [], 0.0
     for group in by_cause(diagnosis.findings):
         one = group[0]
@@ -119,7 +119,7 @@ def named_section(findings: Sequence[Finding]) -> Section:
 
 
 def evidence_section(diagnosis: Diagnosis) -> Section:
-    """Return the section with residuals of the worst joints over position, velocity and others."""
+    """Return the section with residuals of the worst joints over position and other variables."""
     folds = []
     total = 'the explained part' if diagnosis.findings else 'the difference'
     for number, place in enumerate(diagnosis.where[:3]):
@@ -181,7 +181,7 @@ def minor_section(diagnosis: Diagnosis, patched: bool) -> Section:
 
 
 def detectable_section(sizes: Sequence[Detectable]) -> Section:
-    """Return the section with the detectable size of each effect, best and worst joint."""
+    """Return the section with the detectable size of each effect, at the best and worst joint."""
     rows = [_detectable_row(name, sizes) for name in dict.fromkeys(one.name for one in sizes)]
     return Section(
         'Smallest detectable effects',
@@ -199,7 +199,7 @@ def detectable_section(sizes: Sequence[Detectable]) -> Section:
 
 
 def isolability_section(isolability: Isolability) -> Section:
-    """Return the section on which effects a planned motion can detect and separate."""
+    """Return the section on the effects that a planned motion can detect and distinguish."""
     kinds, apart = isolability.of_kinds()
     near = (apart < DISTINCT) & ~np.eye(len(kinds), dtype=bool)
     names = [name_in_words(kind) for kind in kinds]
@@ -330,7 +330,7 @@ def gap_section(diagnosis: Diagnosis, gap: Gap) -> Section:
 
 
 def gap_bars(diagnosis: Diagnosis, gap: Gap) -> BarChart:
-    """Return bars of each joint's torque error in units of its usual error, worst first."""
+    """Return bars of each joint's torque error over its usual error, the worst joint first."""
     robot = diagnosis.arm.robot
     roles: list[tuple[Role, str, FloatArray]] = [
         ('before', 'given model', gap.before),

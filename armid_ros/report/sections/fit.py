@@ -210,7 +210,7 @@ def forward_section(
 def _worst_joint(
     robot: Robot, pair: ForwardValidation, models: Sequence[tuple[Role, str, ForwardScore]]
 ) -> list[Templated]:
-    """Return a chart of the position error of the worst joint."""
+    """Return a chart, with a caption, of the position error of the worst joint over time."""
     farthest = max((score for *_, score in models), key=lambda one: one.position_error.max())
     worst, motion = int(farthest.position_error.argmax()), pair.after.motion
     curves = [1e3 * (score.simulated[:, worst] - motion.q[:, worst]) for *_, score in models]
