@@ -80,18 +80,18 @@ class ArmWatch:
         )
 
     def take_effort(self) -> FloatArray:
-        """Return the efforts that arrived since the last call, (n,) [N m or N]; NaN: none."""
+        """Return the latest efforts since the last call, (n,) [N m or N]; NaN if none arrived."""
         new, self._efforts = self._efforts, {}
         return np.array([new.get(joint, math.nan) for joint in self._robot.joints])
 
     @property
     def behind(self) -> float:
-        """Return the time since the oldest stamp of the present positions [s]; NaN: no stamp."""
+        """Age of the oldest time stamp of the present joint positions [s]; NaN without a stamp."""
         stamp, now = self.monitor.last_stamp_ns, self._node.get_clock().now().nanoseconds
         return (now - stamp) * 1e-9 if stamp else math.nan
 
     def now(self) -> float:
-        """Return the time for message ages [s]: of a steady clock, or of /clock if used."""
+        """Return the time [s] of a steady clock, or with use_sim_time the time of /clock."""
         return self._age_clock(self._node.get_clock().now().nanoseconds)
 
     def catch_up(self) -> None:
@@ -101,7 +101,7 @@ class ArmWatch:
                 self._states.callback(taken[0])
 
     def fault_since(self, q: FloatArray, behind: float, simulated: bool) -> str:
-        """Return why an arm that was at rest at `q` and `behind` may have moved; else empty."""
+        """Return a message if the arm moved from `q` or sent no joint states; otherwise ''."""
         self.catch_up()
         silence = self.behind - behind
         if silence > self._node.value('state_timeout') and not simulated:
@@ -114,7 +114,7 @@ class ArmWatch:
 
     def fault_on_path(self, q: FloatArray, effort: FloatArray, largest: FloatArray) -> str:
         """
-        Return why an arm does not follow its path; empty for an arm that follows.
+        Return a message if the arm deviates from its planned position or effort; otherwise ''.
 
         A joint is off its planned position, or three of its efforts in a row are too large.
 
@@ -145,13 +145,13 @@ class ArmWatch:
         )
 
     def interruption(self, gap: float) -> str:
-        """Return a message if a time without supervision [s] is too long; otherwise empty."""
+        """Return a message if the time `gap` [s] between two checks is too long; otherwise ''."""
         if gap <= self._node.value('state_timeout'):
             return ''
         return f'the arm was not supervised for {gap:.2f} s, as no joint state was processed'
 
     def staleness(self, timeout: float) -> str:
-        """Return a message on joints without a new position for `timeout` [s]; empty if none."""
+        """Return a message if a joint has no new position for `timeout` [s]; otherwise ''."""
         fault = self.monitor.staleness(self.now(), timeout)
         topic = self._states.topic_name
         if (
@@ -163,7 +163,7 @@ class ArmWatch:
         return f'{fault}; the quality of service of the publisher of {topic} is incompatible'
 
     def fault_at_start(self, simulated: bool) -> str:
-        """Return why the arm, real or simulated, must not be started now; otherwise empty."""
+        """Return a message if a motion of the arm must not start now; otherwise ''."""
         value = self._node.value
         timeout = value('state_timeout')
         # largest difference between stamps and the clock of the node [s]
@@ -199,7 +199,7 @@ class ArmWatch:
         )
 
     def _age_clock(self, clock_ns: int) -> float:
-        """Convert a time of the node's clock [ns] to the time scale of `now` [s]."""
+        """Convert a time of the node's clock [ns] to the time [s] that `now` would return."""
         if not self._node.get_clock().ros_time_is_active:
             return float(self._steady.now().nanoseconds * 1e-9)
         return (clock_ns - self._stepped_ns) * 1e-9

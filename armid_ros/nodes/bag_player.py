@@ -35,7 +35,7 @@ from trajectory_msgs.msg import JointTrajectory
 
 
 class _JumpGuard:
-    """Guard that passes a recorded trajectory only if it starts at the measured position."""
+    """Check that a recorded trajectory starts at the measured joint positions."""
 
     def __init__(self, node: ArmidNode) -> None:
         self._node = node
@@ -46,7 +46,7 @@ class _JumpGuard:
         )
 
     def describe(self, cdr: bytes) -> None:
-        """Read velocity limits from a serialised robot_description."""
+        """Read the velocity limits of the joints from a serialised robot_description."""
         try:
             robot = robot_from_urdf(deserialize_message(cdr, String).data)
         except ArmidError:
@@ -54,7 +54,7 @@ class _JumpGuard:
         self._limits = dict(zip(robot.joints, robot.velocity_limit.tolist(), strict=True))
 
     def objection(self, cdr: bytes) -> str:
-        """Return why a recorded trajectory must not be sent; empty if nothing is wrong."""
+        """Return a message if a serialised trajectory must not be sent; otherwise ''."""
         try:
             reference = waypoints_of(deserialize_message(cdr, JointTrajectory))
         except ArmidError as error:
@@ -180,7 +180,7 @@ class BagPlayerNode(ArmidNode):
 
     @property
     def failure(self) -> str:
-        """Reason why a trajectory was not sent; empty if all were sent."""
+        """Reason why a recorded trajectory was not sent; '' if all trajectories were sent."""
         return self._refused
 
     @property
@@ -190,11 +190,11 @@ class BagPlayerNode(ArmidNode):
 
     @property
     def position(self) -> float:
-        """Time in the bag, from its first message on [s]."""
+        """Time of the playback since the first message of the bag [s]."""
         return (self._position - self._first) * 1e-9
 
     def play(self) -> None:
-        """Publish all messages that are due at the present time in the bag."""
+        """Publish all messages up to the present time of the playback."""
         now = self._pace.now().nanoseconds
         if self._anchor is None:
             if (self._lock_step and now == 0) or not self._ready():
@@ -242,7 +242,7 @@ class BagPlayerNode(ArmidNode):
             self._clock_publisher = self.create_publisher(ClockMessage, '/clock', 10)
 
     def condition(self) -> tuple[str, Mapping[str, object]]:
-        """Return missing subscribers, number of published messages, and time in the bag."""
+        """Return missing subscribers, and values: published messages and playback time."""
         values = {
             'messages': self.published.total(),
             'position': self.position,
@@ -283,7 +283,7 @@ class BagPlayerNode(ArmidNode):
         return publishers
 
     def _read_messages(self) -> Iterator[RawMessage]:
-        """Yield the messages of the played topics from the start of the bag."""
+        """Yield the messages of the played topics, from the start of the bag."""
         return (m for m in self._bag.messages() if m.topic in self._topics)
 
     def _ready(self) -> bool:

@@ -91,7 +91,7 @@ class ArmidNode(Node):
     def create_subscription(
         self, msg_type: Any, topic: str, callback: Callable[[Any], None], *args: Any, **more: Any
     ) -> Subscription:
-        """Subscribe as rclpy does; exceptions in the callback do not end the node."""
+        """Subscribe to a topic as rclpy does; exceptions in the callback do not end the node."""
         return super().create_subscription(
             msg_type, topic, self.guarded(callback, topic), *args, **more
         )
@@ -104,7 +104,7 @@ class ArmidNode(Node):
         return super().create_timer(timer_period_sec, safe, *args, **more)
 
     def guarded(self, callback: Callable[..., Any], source: str) -> Callable[..., Any]:
-        """Wrap a callback so that its exceptions are logged as faults of an input."""
+        """Return a callback whose exceptions are logged as faults of the input `source`."""
 
         @wraps(callback)
         def call(*args: Any) -> Any:
@@ -128,7 +128,7 @@ class ArmidNode(Node):
 
     @property
     def missing_clock(self) -> str:
-        """Return why /clock is missing; empty if it is there or not used."""
+        """Message if simulated time is used but /clock has no time; otherwise ''."""
         clock = self.get_clock()
         if not clock.ros_time_is_active:
             return ''
@@ -143,7 +143,7 @@ class ArmidNode(Node):
         return ''
 
     def log_trouble(self) -> None:
-        """Log a new problem of the node, once; missing simulated time is a problem."""
+        """Log a new problem of the node once, such as missing simulated time."""
         missing = self.missing_clock
         if missing and not self._clock_missed:
             self.get_logger().warning(f'{missing}; until then the node waits')
@@ -154,7 +154,7 @@ class ArmidNode(Node):
         self._trouble_logged = bool(trouble)
 
     def warn_of_unknown(self) -> None:
-        """Log parameters given at the start that the node does not have."""
+        """Log each parameter that was set at the start and that the node does not have."""
         known = self.get_parameters_by_prefix('')
         given = [name for name in overrides(self) if not name.startswith('qos_overrides.')]
         wrong = [name for name in given if name not in known]
@@ -164,12 +164,12 @@ class ArmidNode(Node):
 
     @property
     def finished(self) -> bool:
-        """Whether the node has done its work, so that its process may end."""
+        """Whether the node has completed its task, so that its process may end."""
         return False
 
     @property
     def failure(self) -> str:
-        """Reason why the node's task failed, which leads to exit code 2; empty otherwise."""
+        """Reason for a failed task of the node, which ends with exit code 2; otherwise ''."""
         return ''
 
     @property
@@ -185,7 +185,7 @@ class ArmidNode(Node):
     @abstractmethod
     def condition(self) -> tuple[str, Mapping[str, object]]:
         """
-        Return the node's present problem, and values for /diagnostics.
+        Return the present problem of the node, and values to publish on /diagnostics.
 
         Returns
         -------
@@ -197,7 +197,7 @@ class ArmidNode(Node):
         """
 
     def level(self, troubled: bool) -> bytes:
-        """Return the level on /diagnostics: by default, WARN if there is a problem."""
+        """Return the level for /diagnostics: WARN if `troubled`, otherwise OK."""
         return DiagnosticStatus.WARN if troubled else DiagnosticStatus.OK
 
     def further_statuses(self) -> Sequence[DiagnosticStatus]:
@@ -230,13 +230,13 @@ class ArmidNode(Node):
         """Save results and stop motions before the node ends."""
 
     def log(self, text: str) -> str:
-        """Log a text unless ROS is shut down; return the text."""
+        """Log a text if ROS is not shut down, and return the text."""
         if self.context.ok():
             self.get_logger().info(text)
         return text
 
     def value(self, parameter: str) -> Any:
-        """Return a parameter's value; empty texts in a list of texts are left out."""
+        """Return the value of a parameter; for a list of texts, without empty texts."""
         value = self.get_parameter(parameter).value
         is_list = isinstance(value, list) and all(isinstance(one, str) for one in value)
         return tuple(filter(None, value)) if is_list else value
@@ -285,7 +285,7 @@ class ArmidNode(Node):
 
     def set_parameters_atomically(self, parameter_list: list[Parameter]) -> SetParametersResult:
         """
-        Set parameters as rclpy does; log the rejected parameters.
+        Set parameters as rclpy does, and log rejected parameters.
 
         Parameters with unchanged values are accepted, so that dumped parameters can be loaded
         again. An integer is accepted for a float.

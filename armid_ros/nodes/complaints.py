@@ -16,7 +16,7 @@ FATAL = (OSError, MemoryError, RecordingEnded)
 
 class Complaints:
     """
-    Inputs that a node rejected: number of each kind, and logged messages.
+    Counts of the inputs that a node rejected, by kind, and the logged messages.
 
     Attributes
     ----------

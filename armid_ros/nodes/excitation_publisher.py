@@ -228,7 +228,7 @@ class ExcitationPublisherNode(ArmidNode):
         )
 
     def stop(self) -> str:
-        """Stop the arm on its path; if it still moves later, send the stop again."""
+        """Stop the arm on its path; at a second call, stop again an arm that still moves."""
         self._waiting = False
         if self._gate is not None:
             elapsed = self._arm.now() - self._begun
@@ -236,7 +236,7 @@ class ExcitationPublisherNode(ArmidNode):
             return self.log(f'stopped {elapsed:.2f} s after the start')
         ending = self._current_ending()
         if ending is None:
-            raise TrajectoryError('no excitation is running; ~/start starts one')
+            raise TrajectoryError('no excitation is running; call ~/start to start a run')
         if ending.last is None:
             raise TrajectoryError(f'{ending.reason}; stop the arm with the client that moves it')
         now, limits = self._arm.now(), map(self.value, ('tracking_tolerance', 'stopping'))
@@ -249,11 +249,11 @@ class ExcitationPublisherNode(ArmidNode):
 
     @property
     def activity(self) -> str:
-        """'running' during a run, otherwise the result of the last run."""
+        """Text 'running' during a run, otherwise the outcome of the last run."""
         return 'running' if self.elapsed is not None else self._outcome
 
     def condition(self) -> tuple[str, Mapping[str, object]]:
-        """Return problem and progress of the present run."""
+        """Return the present problem, and values on the progress of the run."""
         elapsed = self.elapsed
         values = {
             'running': int(elapsed is not None),
@@ -271,9 +271,9 @@ class ExcitationPublisherNode(ArmidNode):
         return self._trouble or waiting or self._rehearsed, values
 
     def check(self, values: Mapping[str, Any]) -> None:
-        """Raise a TrajectoryError if the new excitation file or clock cannot be used now."""
+        """Raise a TrajectoryError if a new `file` or `use_sim_time` cannot be set now."""
         if 'use_sim_time' in values:
-            raise TrajectoryError("the times of a run need one clock: set 'use_sim_time' at start")
+            raise TrajectoryError("'use_sim_time' can be set only when the node starts")
         if 'file' in values:
             with reading("parameter 'file'", TrajectoryError):
                 self._require_rest()
@@ -287,21 +287,21 @@ class ExcitationPublisherNode(ArmidNode):
     def _require_no_run(self) -> None:
         """Raise a TrajectoryError during a run."""
         if self.elapsed is not None:
-            raise TrajectoryError('an excitation is under way; ~/stop ends it')
+            raise TrajectoryError('an excitation is running; call ~/stop first')
 
     def _require_rest(self) -> None:
-        """Raise a TrajectoryError if the arm may move: checks of a path would block the node."""
+        """Raise a TrajectoryError if the arm may move, as path checks block the supervision."""
         self._require_no_run()
         if self._ending is not None and self._ending.reason:
-            raise TrajectoryError('the arm may not be at rest after its stop; try again soon')
+            raise TrajectoryError('the arm may still move after a stop; wait until it rests')
 
     def _loaded(self, path: str) -> Excitation:
         if not path:
-            raise TrajectoryError('a running node designs no excitation; set an excitation.yaml')
+            raise TrajectoryError("the parameter 'file' is empty; name an excitation.yaml")
         return checked(load_excitation(path), self._planner, path)
 
     def close(self) -> None:
-        """Stop the arm unless it is at rest; wait until the stop has arrived."""
+        """Stop a moving arm, and wait until the controller has received the stop."""
         ending = self._current_ending()
         sent = self._gate is not None or (ending is not None and ending.last is not None)
         if sent and self.context.ok():
@@ -315,7 +315,7 @@ class ExcitationPublisherNode(ArmidNode):
         super().destroy_node()
 
     def guarded(self, callback: Callable[..., Any], source: str) -> Callable[..., Any]:
-        """Wrap a callback so that unexpected exceptions are logged and stop the arm."""
+        """Return a callback whose unexpected exceptions are logged and stop the arm."""
 
         @wraps(callback)
         def stopping(*args: Any) -> Any:
@@ -331,7 +331,7 @@ class ExcitationPublisherNode(ArmidNode):
         return super().guarded(stopping, source)
 
     def _on_state(self, now: float) -> None:
-        """Compare measured and planned positions and efforts; stop the arm if they differ."""
+        """Stop the arm if measured positions or efforts deviate from the plan at time `now`."""
         if 0.0 <= now - self._tracked < 0.005:  # often enough
             return
         self._tracked = now
@@ -354,13 +354,13 @@ class ExcitationPublisherNode(ArmidNode):
             self._abort(unknown or fault, blocked=not unknown)
 
     def _abort(self, reason: str, *, blocked: bool = False) -> None:
-        """Stop the arm and log the reason; if it is blocked, hold it at its position."""
+        """Stop the arm and log the reason; hold a blocked arm at its position."""
         elapsed = self._arm.now() - self._begun
         self._stop_run(reason, blocked)
         self._report_trouble(f'stopped {elapsed:.2f} s after the start: {reason}')
 
     def _stop_run(self, reason: str, blocked: bool = False) -> None:
-        """Send the motion that stops the arm on its path, or holds an arm that is at rest."""
+        """Send a motion that stops the arm on its path, or that holds an arm at rest."""
         gate, monitor, now = self._gate, self._arm.monitor, self._arm.now()
         deviation = gate.deviation(monitor, self._begun)
         motion = gate.stop(now - self._begun, self.value('stopping'), *deviation)
@@ -374,14 +374,14 @@ class ExcitationPublisherNode(ArmidNode):
         self._controller.send_stop(write_trajectory(motion))
 
     def _current_ending(self) -> Ending | None:
-        """Return the ended run or None; forget the stop if another client moves the arm."""
+        """Return the ended run, if any, without its stop if another client moves the arm."""
         ending = self._ending
         if ending is not None and self._controller.taken:
             self._ending = replace(ending, last=None) if ending.reason else None
         return self._ending
 
     def _supervise_ending(self) -> None:
-        """Check that the arm comes to rest after a run; hold it if it is blocked."""
+        """Check that the arm comes to rest after a run; hold a blocked arm at its position."""
         ending = self._current_ending()
         if ending is None:
             return
@@ -435,7 +435,7 @@ class ExcitationPublisherNode(ArmidNode):
     def _on_experiment(self, message: String) -> None:
         """Load an excitation from the topic experiment; only ~/start runs it."""
         if self._waiting:
-            raise TrajectoryError('an excitation begins soon; send the new excitation later')
+            raise TrajectoryError('an excitation is about to start; send the new one after it')
         self._require_rest()
         excitation = read_excitation(message.data, self._experiments.topic_name)
         self._excitation = checked(excitation, self._planner, self._experiments.topic_name)

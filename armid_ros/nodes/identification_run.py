@@ -87,7 +87,7 @@ class IdentificationRunNode(ArmidNode):
 
     def __init__(self, start: Callable[[Program], Any] = start_program, **kwargs: Any) -> None:
         """
-        Create the node; ``start`` starts armid commands, by default in own processes.
+        Create the node; ``start`` starts an armid command, by default in a process of its own.
 
         Raises
         ------
@@ -135,7 +135,7 @@ class IdentificationRunNode(ArmidNode):
         return self._failure
 
     def poll(self) -> None:
-        """Start the next step once the present one is complete."""
+        """Start the next step once the present step is complete."""
         if self._done:
             return
         now = time.monotonic()
@@ -143,7 +143,7 @@ class IdentificationRunNode(ArmidNode):
             self._complete = now
         try:
             if now - self._complete > _GONE:
-                raise ArmidError(f'{" and ".join(self._missing())} ended in step: {self._step}')
+                raise ArmidError(f'{" and ".join(self._missing())} ended during: {self._step}')
             while self._wait[1]():
                 self._wait = next(self._script)
                 if self._wait[0] != self._step:
@@ -157,7 +157,7 @@ class IdentificationRunNode(ArmidNode):
             self._stop_all()
 
     def condition(self) -> tuple[str, Mapping[str, object]]:
-        """Return the last error, the present step, and the results so far."""
+        """Return the last error, and values: present step and results so far."""
         return self._failure or self._refused, {
             'step': self._step,
             'results': '; '.join(self._results),
@@ -177,14 +177,14 @@ class IdentificationRunNode(ArmidNode):
                 self._program.kill()
 
     def _stop_all(self) -> None:
-        """Stop the run, then the recording, unless another node has started them."""
+        """Stop the run, then the recording, that this node has started."""
         for node in sorted(self._begun):
             if self._callers[node, 'stop'].service_is_ready():
                 self._stops.append(self._call(node, 'stop'))
         self._begun = []
 
     def _steps(self) -> Iterator[Wait]:
-        """Yield for each step its name and a function that returns whether it is complete."""
+        """Yield the name of each step, and a function that returns whether it is complete."""
         deadline = time.monotonic() + self.value('patience')
         yield (
             'waits for the other nodes',
@@ -212,7 +212,7 @@ class IdentificationRunNode(ArmidNode):
             yield from self._run_command('diagnose', folder, bags, *model)
 
     def _run_excitation(self, service: str, name: str = 'rehearsal') -> Iterator[Wait]:
-        """Call a service of excitation_publisher until a run starts; wait for its end."""
+        """Call a service of excitation_publisher until a run starts; wait for the run to end."""
         before = int(self._state.get('runs', 0))
         deadline = time.monotonic() + self.value('patience')
         while True:
@@ -248,7 +248,7 @@ class IdentificationRunNode(ArmidNode):
                 raise TrajectoryError(report)
 
     def _call_service(self, node: str, service: str) -> Any:
-        """Call a service of another node; wait for its answer and return it."""
+        """Call a service of the node, wait for the answer, and return the text of the answer."""
         future = self._call(node, service)
         yield self._step, future.done
         answer = future.result()
@@ -259,7 +259,7 @@ class IdentificationRunNode(ArmidNode):
     def _run_command(
         self, command: str, folder: Path, bags: list[str], *more: str
     ) -> Iterator[Wait]:
-        """Run an armid command on the recordings; wait for its end."""
+        """Run an armid command on the recordings, and wait for the command to end."""
         fitted, held_out = (bags[:-1], bags[-1:]) if len(bags) > 1 else (bags, [])
         validate = [part for bag in held_out for part in ('--validate', bag)]
         options = {name: self.value(name) for name in ('robot', 'gravity')}
@@ -286,7 +286,7 @@ class IdentificationRunNode(ArmidNode):
         self._results.append(f'{command}: {result or "done"} ({out / "report.html"})')
 
     def _missing(self) -> list[str]:
-        """Return the names of nodes whose services are not available."""
+        """Return the names of the other nodes whose services are not available."""
         return [
             name
             for node, name in self._full.items()

@@ -103,7 +103,7 @@ class JointStateMergerNode(ArmidNode):
         self.create_steady_timer(LOOK_PERIOD, self.poll)
 
     def poll(self) -> None:
-        """Subscribe to all topics that have publishers by now."""
+        """Subscribe to those input topics that have publishers."""
         for subscription in self._positions:
             subscription.match()
         topic = self.value('effort_topic')
@@ -123,7 +123,7 @@ class JointStateMergerNode(ArmidNode):
                 )
 
     def condition(self) -> tuple[str, Mapping[str, object]]:
-        """Return joints without positions or torques, and the number of published messages."""
+        """Return a message on joints without data, and the number of published messages."""
         values: dict[str, object] = {'published': self._published}
         if not self.joints:
             return 'waiting for robot_description', values
@@ -190,7 +190,7 @@ class JointStateMergerNode(ArmidNode):
             if not known:
                 there = sorted({name for part in parts for name in part.interface_names})
                 raise RecordingError(
-                    f"no joint of effort_topic has '{interface}'; set the parameter "
+                    f"no joint of effort_topic has the interface '{interface}'; set "
                     f'effort_interface to {" or ".join(there)}'
                 )
         else:
@@ -208,7 +208,7 @@ class JointStateMergerNode(ArmidNode):
     def _merge_torques(
         self, stamp: int, known: Mapping[str, float], called: Sequence[str]
     ) -> None:
-        """Merge torques or currents of the joints `called`, measured at a time stamp."""
+        """Merge the torques or currents of the joints named `called`, measured at `stamp` [ns]."""
         n = len(self.joints)
         some = [k for k, name in enumerate(called) if math.isfinite(known.get(name, math.nan))]
         if not some:
@@ -219,12 +219,12 @@ class JointStateMergerNode(ArmidNode):
         torques = np.array([known[called[k]] for k in some]) * self._gains[some]
         self._merge(tuple(n + k for k in some), stamp, np.vstack([torques, torques]))
 
-    def _merge(self, some: tuple[int, ...], stamp: int, values: FloatArray) -> None:
-        """Merge new values of the joints `some`; publish samples with values of all joints."""
+    def _merge(self, signals: tuple[int, ...], stamp: int, values: FloatArray) -> None:
+        """Merge new values of signals (n positions, then n torques); publish complete samples."""
         n = len(self.joints)
         # a float has too few digits for seconds since 1970
         self._epoch_ns = self._epoch_ns or stamp
-        for t, merged in self._merger.take(some, (stamp - self._epoch_ns) * 1e-9, values):
+        for t, merged in self._merger.take(signals, (stamp - self._epoch_ns) * 1e-9, values):
             q, dq, tau = merged[0, :n], merged[1, :n], merged[0, n:]
             message = JointState(name=list(self.joints), position=q.tolist(), effort=tau.tolist())
             if np.isfinite(dq).all():
@@ -234,7 +234,7 @@ class JointStateMergerNode(ArmidNode):
             self._published += 1
 
     def _stamp_ns(self, stamp: Any) -> int:
-        """Return a message's time stamp [ns], or the time of reception if the stamp is zero."""
+        """Return the time stamp of a message [ns], or the present time if the stamp is zero."""
         return stamp.sec * 10**9 + stamp.nanosec or self.get_clock().now().nanoseconds
 
 

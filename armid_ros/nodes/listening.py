@@ -83,7 +83,7 @@ class ListeningNode(ArmidNode):
         """Process a joint state that contains all joints of the robot."""
 
     def adopt(self, robot: Robot) -> None:
-        """Process joint states of this robot from now on."""
+        """Set the robot whose joint states the node processes from now on."""
         self.robot = robot
         self.reader = JointStateReader(robot.joints, self.complaints, self.get_clock())
 
@@ -103,17 +103,17 @@ class ListeningNode(ArmidNode):
 
     @property
     def awaited(self) -> str:
-        """Return which input the node waits for, as text; empty if none."""
+        """Message on the input that the node waits for; '' if no input is missing."""
         if self.robot is None:
             return 'waiting for robot_description'
         return '' if self.received else 'no joint states so far'
 
     def level(self, troubled: bool) -> bytes:
-        """Return the level on /diagnostics: STALE if joint states have stopped."""
+        """Return the level for /diagnostics: STALE if no more joint states arrive."""
         return DiagnosticStatus.STALE if self.freshness.stopped else super().level(troubled)
 
     def stream_trouble(self) -> str:
-        """Return a text on missing joint states or wrong time stamps; empty if none."""
+        """Return a message on missing joint states or wrong time stamps; otherwise ''."""
         fresh = self.complaints.latest if self.complaints.fresh else ''
         if self.awaited:
             return self.awaited
@@ -123,7 +123,7 @@ class ListeningNode(ArmidNode):
 
     def report(self, reason: str, text: str = '') -> None:
         """
-        Count and log faulty joint states; name publishers that may be the cause.
+        Count and log a faulty joint state; name publishers that may be the cause.
 
         Parameters
         ----------
@@ -138,14 +138,14 @@ class ListeningNode(ArmidNode):
         self.complaints.add(reason, '; '.join(filter(None, parts)))
 
     def poll(self) -> None:
-        """Adopt the QoS of joint-state publishers; report when joint states stop or resume."""
+        """Adopt the QoS of publishers of joint states; publish whether joint states arrive."""
         self.joint_states.match()
         if self.freshness.stopped != self._stopped:
             self._stopped = self.freshness.stopped
             self.publish_diagnostics()
 
     def take_joint_states(self, data: bytes) -> None:
-        """Decode a serialised joint state; process valid joint states."""
+        """Decode a serialised joint state, and process it if it is valid."""
         self.received += 1
         self.freshness.mark_received()
         self.last_stamp_ns = header_stamp(data)
@@ -156,7 +156,7 @@ class ListeningNode(ArmidNode):
                 self.take_sample(sample)
 
     def described_robot(self, description: str | None) -> Robot:
-        """Return the robot of a URDF text, or of the parameter `robot` if there is no text."""
+        """Load the robot from a URDF text, or without text from the node parameter `robot`."""
         given = {'gravity': self.value('gravity'), 'joints': self.value('joints') or None}
         if description is None:
             return load_robot(self.value('robot'), **given)

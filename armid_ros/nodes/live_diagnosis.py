@@ -139,7 +139,7 @@ class LiveDiagnosisNode(ListeningNode):
 
     @property
     def busy(self) -> bool:
-        """Whether a diagnosis, result files or a motion are being computed."""
+        """Whether the diagnosis process is computing a diagnosis, files or a motion."""
         return self._helper.busy
 
     def accept(self) -> str:
@@ -147,7 +147,7 @@ class LiveDiagnosisNode(ListeningNode):
         return self._decide('accepted', self._require().accept)
 
     def reject(self) -> str:
-        """Discard the proposed effects for ever; return the answer of the service."""
+        """Discard the proposed effects permanently; return the answer of the service."""
         return self._decide('rejected', self._require().reject)
 
     def _decide(self, decision: str, action: Callable[[], None]) -> str:
@@ -166,7 +166,7 @@ class LiveDiagnosisNode(ListeningNode):
         return 'the diagnosis begins anew, with the original model'
 
     def save(self) -> str:
-        """Start writing the files of the last diagnosis; the log reports when it is done."""
+        """Start to write the files of the last diagnosis; the log reports the completion."""
         self._require(diagnosed=True)
         folder = self.folder('save_to')
         refuse_replacing(folder, FILES)
@@ -174,13 +174,13 @@ class LiveDiagnosisNode(ListeningNode):
         return f'writing {", ".join(FILES)} to {folder}'
 
     def next_run(self) -> str:
-        """Start planning a motion that separates the candidates, for the topic ~/experiment."""
+        """Start to plan a motion that separates rivals; it is published on ~/experiment."""
         self._require(diagnosed=True)
         self._helper.ask('plan', self.value('seed'))
         return f'planning a motion; it will be published on {self._runs.topic_name}'
 
     def poll(self) -> None:
-        """Adopt the QoS of joint-state publishers; process results of the diagnosis process."""
+        """Adopt the QoS of publishers of joint states; process finished diagnoses."""
         super().poll()
         self.take_answer()
 
@@ -198,7 +198,7 @@ class LiveDiagnosisNode(ListeningNode):
             self._helper.ask('diagnose', live.request())
 
     def take_answer(self) -> bool:
-        """Process one result of the diagnosis process; return whether there was one."""
+        """Process the next result of the diagnosis process; return whether a result existed."""
         result = self._helper.poll()
         if result is None:
             return False
@@ -214,7 +214,7 @@ class LiveDiagnosisNode(ListeningNode):
         return True
 
     def condition(self) -> tuple[str, Mapping[str, object]]:
-        """Return a fault if any, and numbers of samples and diagnoses."""
+        """Return a message on a fault or '', and numbers of samples and diagnoses."""
         live = self.live
         if live is None:
             return self.awaited, {'received': self.received}
@@ -278,16 +278,16 @@ class LiveDiagnosisNode(ListeningNode):
         self._helper.close()
 
     def take_description(self, urdf: str) -> None:
-        """Diagnose the robot of a new robot_description."""
+        """Diagnose from now on the robot of a new robot_description."""
         self._adopt(self._described(urdf))
 
     def _settings(self, values: Mapping[str, Any]) -> LiveSettings:
-        """Return the settings in the ROS parameters, updated by new parameter values."""
+        """Return the settings from the ROS parameters, with new values for some of them."""
         names = (*(entry.name for entry in LIVE_SETTINGS), 'learning')
         return LiveSettings(**{name: values.get(name, self.value(name)) for name in names})
 
     def _described(self, description: str | None = None) -> LiveDiagnosis:
-        """Return a new diagnosis schedule, for a URDF text or for the robot parameter."""
+        """Return a new diagnosis schedule for the robot of a URDF text or of the parameters."""
         robot = model = None
         if description is not None or self.value('robot'):
             robot = self.described_robot(description)
@@ -305,7 +305,7 @@ class LiveDiagnosisNode(ListeningNode):
         return LiveDiagnosis(arm, settings, baseline=bags, misfit=misfit, seed=seed)
 
     def _take(self, answer: Answer) -> None:
-        """Publish a diagnosis and, if it has changed, the proposed model."""
+        """Publish a diagnosis, and the proposed model if the model has changed."""
         live = self._require()
         latest = live.latest
         changed = live.take(answer)
@@ -356,16 +356,16 @@ class LiveDiagnosisNode(ListeningNode):
         self._publish_model()
 
     def _require(self, *, diagnosed: bool = False) -> LiveDiagnosis:
-        """Return the schedule; raise an error if there is no robot or no diagnosis yet."""
+        """Return the schedule; IdentificationError without a robot or a required diagnosis."""
         if self.live is None:
             raise IdentificationError('no robot_description was received; set the parameter robot')
         if diagnosed and self.live.latest is None:
-            raise IdentificationError('no diagnosis is complete so far')
+            raise IdentificationError('no diagnosis is complete so far; keep the arm moving')
         return self.live
 
 
 def _residuals(answer: Answer) -> list[tuple[str, float, float, float]]:
-    """Return for each joint the residuals before and after correction, and the usual one [N m]."""
+    """Return joint names, residuals without and with named effects, and floors [N m or N]."""
     gap = answer.gap
     if gap is None:
         return []

@@ -75,7 +75,7 @@ def run_lockstep(
     on_progress: OnProgress | None = None,
 ) -> Progress:
     """
-    Excite and record a simulated arm over ROS topics, with optional online identification.
+    Move and record a simulated arm over ROS topics, optionally with online identification.
 
     The nodes are excitation_publisher, simulated_arm, recorder and, with an identifier,
     online_identifier. They communicate on this machine only.
@@ -159,7 +159,7 @@ def run_lockstep(
 
 
 def _stepped(step: Callable[[], int], duration: float, on_progress: OnProgress | None) -> Progress:
-    """Simulate to the end of a run; report the progress every simulated second."""
+    """Call `step` for `duration` [s] of simulated time, and report progress every second."""
     begun, due, t = time.monotonic(), 1.0, 0.0
     while t < duration:
         t = (step() - EPOCH_NS) * 1e-9
@@ -201,7 +201,7 @@ class Stage(ExitStack):
         node.destroy_node()
 
     def spin_until(self, done: Callable[[], object], topic: str) -> None:
-        """Run callbacks until a condition is true; ArmidError after a timeout."""
+        """Run callbacks until `done` returns true; ArmidError if no message comes on `topic`."""
         deadline = time.monotonic() + MESSAGE_TIMEOUT
         while not done():
             if time.monotonic() > deadline:  # after the timeout, done() is checked once more
@@ -213,6 +213,6 @@ class Stage(ExitStack):
 
 
 def matched(learner: OnlineIdentifierNode) -> bool:
-    """Adopt the QoS of joint-state publishers; return whether there is a publisher."""
+    """Adopt the QoS of publishers of joint states; return whether a publisher exists."""
     learner.joint_states.match()
     return learner.joint_states.publishers > 0

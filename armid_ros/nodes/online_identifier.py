@@ -99,7 +99,7 @@ class OnlineIdentifierNode(ListeningNode):
     )
 
     def __init__(self, identifier: OnlineIdentifier | None = None, **kwargs: Any) -> None:
-        """Create the node; by default, ROS parameters define the identifier."""
+        """Create the node; by default, the ROS parameters define the identifier."""
         super().__init__('online_identifier', **kwargs)
         self.identifier: OnlineIdentifier | None = None
         self.update_times: deque[float] = deque(maxlen=2000)
@@ -173,7 +173,7 @@ class OnlineIdentifierNode(ListeningNode):
         self._publish(self._estimates, identifier.estimate(), self._last_sample)
 
     def condition(self) -> tuple[str, Mapping[str, object]]:
-        """Return a fault if any, and numbers of samples and rejected joint states."""
+        """Return a message on a fault or '', and numbers of samples and rejected messages."""
         identifier = self.identifier
         if identifier is None:
             return self.awaited, {'received': self.received}
@@ -214,7 +214,7 @@ class OnlineIdentifierNode(ListeningNode):
         return trouble, values
 
     def further_statuses(self) -> Sequence[DiagnosticStatus]:
-        """Return estimate with intervals, and the last change, for /diagnostics."""
+        """Return the estimate with 95 % intervals, and the last change, for /diagnostics."""
         identifier, prefix = self.identifier, self.get_fully_qualified_name()[1:]
         if identifier is None:
             return ()
@@ -251,14 +251,14 @@ class OnlineIdentifierNode(ListeningNode):
             self.identifier.use(self._settings({name: self.value(name) for name in names}))
 
     def _settings(self, values: Mapping[str, Any]) -> OnlineSettings:
-        """Return the identifier's settings, updated by new parameter values."""
+        """Return the settings from the ROS parameters, with new values for some of them."""
         new = {name: x for name, x in values.items() if name in OnlineIdentifier.CHANGEABLE}
         if 'false_alarm_time' in new:
             new['false_alarm_time'] = new['false_alarm_time'] or None
         return replace(self._require().settings, **new)
 
     def _described(self, description: str | None = None) -> OnlineIdentifier:
-        """Return an identifier for a URDF text, or for the robot parameter."""
+        """Return an identifier for the robot of a URDF text or of the ROS parameters."""
         arm = ArmModel.of(self.described_robot(description), effects=self.value('effects'))
         noise = tuple(self.value('torque_noise'))
         if len(noise) == 1:
@@ -274,13 +274,13 @@ class OnlineIdentifierNode(ListeningNode):
         return OnlineIdentifier(arm, settings, rng=np.random.default_rng(0))
 
     def level(self, troubled: bool) -> bytes:
-        """Return the level on /diagnostics: STALE without joint states, ERROR if unusable."""
+        """Return the level for /diagnostics: STALE without joint states, ERROR if unusable."""
         failed = self.identifier is not None and bool(self.identifier.error)
         stopped = self.freshness.stopped
         return DiagnosticStatus.ERROR if failed and not stopped else super().level(troubled)
 
     def take_description(self, urdf: str) -> None:
-        """Identify the robot of a new robot_description."""
+        """Identify from now on the robot of a new robot_description."""
         self._begin(self._described(urdf))
 
     def _on_model(self, message: String) -> None:
@@ -332,7 +332,7 @@ class OnlineIdentifierNode(ListeningNode):
             publisher.publish(message)
 
     def _begin(self, identifier: OnlineIdentifier) -> None:
-        """Start with an identifier whose effects stay if later models lack them."""
+        """Start with an identifier; later models on the topic `model` may only add effects."""
         self._own_effects = identifier.arm.effects
         self._adopt(identifier)
 
@@ -353,7 +353,7 @@ class OnlineIdentifierNode(ListeningNode):
         )
 
     def _require(self) -> OnlineIdentifier:
-        """Return the identifier; raise an error if the robot is not known yet."""
+        """Return the identifier; raise an error if no robot is known."""
         if self.identifier is None:
             raise IdentificationError('no robot_description was received; set the parameter robot')
         return self.identifier

@@ -52,7 +52,7 @@ def recorded(publishers: Sequence[TopicEndpointInfo]) -> tuple[Qos, ...]:
 
 
 def offered(profiles: Sequence[Qos]) -> QoSProfile:
-    """Return the QoS profile for playback of a topic: the weakest recorded one."""
+    """Return the QoS profile for the playback of a topic: the weakest recorded profile."""
     best_effort = any(p.reliability is QosReliability.BEST_EFFORT for p in profiles)
     latched = {p.durability for p in profiles} == {QosDurability.TRANSIENT_LOCAL}
     return _profile(DEPTH, not best_effort, latched)
@@ -67,14 +67,14 @@ def _profile(depth: int, reliable: bool, latched: bool) -> QoSProfile:
 
 
 def publisher_names(node: Node, topic: str) -> list[str]:
-    """Return the full name of the node of each publisher of a topic, sorted."""
+    """Return the sorted full names of the nodes that publish a topic."""
     found = node.get_publishers_info_by_topic(topic)
     return sorted(f'{p.node_namespace.rstrip("/")}/{p.node_name}' for p in found)
 
 
 class MatchedSubscription:
     """
-    Subscription that starts once its topic has publishers, with their QoS.
+    Subscription that starts once the topic has publishers, with the QoS of the publishers.
 
     A reliable subscription does not match a best-effort publisher. A best-effort subscription
     loses messages that a reliable publisher would send again. The QoS therefore depends on the
@@ -117,14 +117,14 @@ class MatchedSubscription:
 
     @property
     def several(self) -> str:
-        """Return a text on the publishers of the topic if there are at least two, else ''."""
+        """Message with the publishers of the topic if there are at least two; otherwise ''."""
         names = publisher_names(self._node, self.topic)
         if len(names) < 2:
             return ''
         return f'{len(names)} nodes publish {self.topic}: {", ".join(names)}; stop one'
 
     def match(self) -> None:
-        """Subscribe if the topic has publishers; subscribe again if their QoS changed."""
+        """Subscribe if the topic has publishers; subscribe again after a change of their QoS."""
         publishers = self._node.get_publishers_info_by_topic(self.topic)
         if not publishers:
             return

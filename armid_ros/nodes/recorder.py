@@ -97,9 +97,9 @@ class RecorderNode(ArmidNode):
         return tuple(sorted(self._wanted - heard))
 
     def start(self) -> str:
-        """Start a new bag; RecordingError if one is open or it cannot be created."""
+        """Start a new bag; RecordingError if a bag is open or cannot be created."""
         if self._writer is not None:
-            raise RecordingError(f'{self._writer.path} is being recorded; ~/stop ends it')
+            raise RecordingError(f'{self._writer.path} is being recorded; call ~/stop first')
         name = self.value('bag') or f'armid_{datetime.now():%Y_%m_%d-%H_%M_%S}'
         # The path of the first bag must not exist; bags of later ~/start calls get a number.
         path = Path(name).expanduser()
@@ -118,9 +118,9 @@ class RecorderNode(ArmidNode):
         return self.log(f'recording into {self._writer.path}')
 
     def stop(self) -> str:
-        """Close the bag; return a text with its path and number of messages."""
+        """Close the bag; return a message with the path and the number of messages."""
         if self._writer is None:
-            raise RecordingError('no recording is under way; ~/start begins one')
+            raise RecordingError('no recording is running; call ~/start to begin one')
         for subscription in self._subscriptions_by_topic.values():
             subscription.close()
         self._subscriptions_by_topic.clear()
@@ -134,7 +134,7 @@ class RecorderNode(ArmidNode):
         return self.log(f'{writer.path}: {self.message_count} messages')
 
     def poll(self) -> None:
-        """Subscribe to topics that have publishers by now, with their QoS."""
+        """Subscribe to topics that now have publishers, with the QoS of the publishers."""
         if self._writer is None:
             return
         for topic in list(self._subscriptions_by_topic):
@@ -184,7 +184,7 @@ class RecorderNode(ArmidNode):
             self._writer.chunk_age = self.value('chunk_age')
 
     def condition(self) -> tuple[str, Mapping[str, object]]:
-        """Return topics that are not recorded, path of the bag, and message count."""
+        """Return a message on topics that are not recorded, and values on the open bag."""
         refused = sorted(filter(self._is_wanted, self._refused))
         absent = sorted(set(self.missing) - set(refused))
         trouble = '; '.join(
@@ -201,7 +201,7 @@ class RecorderNode(ArmidNode):
         return (trouble if self.recording else ''), values
 
     def close(self) -> None:
-        """Close the bag that is open."""
+        """Close the open bag, if any."""
         if self._writer is not None:
             self.stop()
 
@@ -209,7 +209,7 @@ class RecorderNode(ArmidNode):
         return {self.resolve_topic_name(name) for name in self.value('topics')}
 
     def _is_wanted(self, topic: str) -> bool:
-        """Return whether a topic is recorded; hidden topics only if a parameter names them."""
+        """Return whether to record a topic; hidden topics have to be named in `topics`."""
         return topic in self._wanted if self._wanted else '/_' not in topic
 
     def _record(self, writer: BagWriter, topic: str, types: Sequence[str]) -> None:
@@ -218,7 +218,7 @@ class RecorderNode(ArmidNode):
             return
         try:
             if len(types) > 1:
-                raise RecordingError(f'{topic} has several types: {", ".join(types)}')
+                raise RecordingError(f'publishers use several types: {", ".join(types)}')
             message_type = message_class(types[0])
             writer.add_topic(topic, types[0], qos=recorded(publishers))
         except ArmidError as error:

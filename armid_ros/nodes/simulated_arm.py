@@ -45,7 +45,7 @@ _SENSORS = ('torque_noise', 'position_noise', 'velocity_noise', 'resolution')
 
 
 def _measurement_publisher(node: Node, kind: type, topic: str) -> Publisher:
-    """Create a publisher of measurements; users can override its QoS."""
+    """Create a publisher of measurements, whose QoS users can override."""
     options = QoSOverridingOptions.with_default_policies()
     return node.create_publisher(kind, topic.lstrip('/'), SAMPLES, qos_overriding_options=options)
 
@@ -70,7 +70,7 @@ class _ElasticTopics:
             self._imus.append((_measurement_publisher(node, Imu, imu_topic(link)), message))
 
     def publish(self, sample: LinkSample, stamp: TimeMessage) -> None:
-        """Publish measurements of all links and drives with one time stamp."""
+        """Publish the measurements of links and drives with the same time stamp."""
         for (publisher, message), q, dq in (
             (self._link, sample.q, sample.dq),
             (self._reference, sample.asked_q, sample.asked_dq),
@@ -203,7 +203,7 @@ class SimulatedArmNode(ArmidNode):
         self.offer('~/reset', self.reset)
 
     def _described(self) -> SimulatedArm:
-        """Return the simulated arm that the ROS parameters describe."""
+        """Return a new simulated arm with the properties in the ROS parameters."""
         gravity, drives = self.value('gravity'), None
         if self.value('model'):
             arm = load_model(self.value('model'))
@@ -215,7 +215,7 @@ class SimulatedArmNode(ArmidNode):
         with reading("parameter 'start'", RobotError):
             start = numbers(self.value('start'))
             if start and len(start) != n:
-                raise RobotError(f'the start pose has {len(start)} numbers, but needs {n}')
+                raise RobotError(f'the start pose has {len(start)} numbers for {n} joints')
         return make_simulated_arm(
             self._with_effects(self.value('effects')),
             rng=np.random.default_rng(self.value('seed')),
@@ -228,7 +228,7 @@ class SimulatedArmNode(ArmidNode):
         )
 
     def _steps_at(self, rate: float) -> int:
-        """Return the number of simulation steps per joint state, for a rate [Hz]."""
+        """Return the number of simulation steps per joint state at a publishing rate [Hz]."""
         return whole_steps(1.0 / rate, self._arm.plant.dt, f'a rate of {rate:g} Hz')
 
     def _set_rates(self) -> None:
@@ -260,7 +260,7 @@ class SimulatedArmNode(ArmidNode):
 
     @property
     def moving(self) -> bool:
-        """Whether the arm follows a trajectory, or is about to."""
+        """Whether the arm follows a trajectory, or a trajectory is about to start."""
         return self._pending is not None or self._arm.t < self._arm.ends_at
 
     @property
@@ -300,7 +300,7 @@ class SimulatedArmNode(ArmidNode):
         return stamp_ns
 
     def publish_clock(self) -> None:
-        """Publish simulated time on /clock, unless another node does."""
+        """Publish the simulated time on /clock, if the node has a publisher of /clock."""
         if self._clock_publisher is not None:
             stamp = Time(nanoseconds=self.stamp_ns).to_msg()
             self._clock_publisher.publish(ClockMessage(clock=stamp))
@@ -343,7 +343,7 @@ class SimulatedArmNode(ArmidNode):
         }
 
     def check(self, values: Mapping[str, Any]) -> None:
-        """Raise an ArmidError if the arm cannot have new effects, noise or rates."""
+        """Raise an ArmidError if new values of effects, noise or rates are not possible."""
         with reading(f'parameter {", ".join(map(repr, values))}', ArmidError):
             self._sensors(self._arm.joints, values)
             self._steps_at(values.get('rate', self.value('rate')))
@@ -371,7 +371,7 @@ class SimulatedArmNode(ArmidNode):
         return replace(arm, effects=arm.effects + more.effects, values=arm.values + more.values)
 
     def _sensors(self, joints: Sequence[str], values: Mapping[str, Any]) -> Sensors:
-        """Return the sensors of the ROS parameters, updated by new parameter values."""
+        """Return the sensors from the ROS parameters, with new values for some of them."""
         noise = {
             name: per_joint(values.get(name, self.value(name)), joints, f"parameter '{name}'")
             for name in _SENSORS

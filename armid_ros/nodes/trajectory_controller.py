@@ -54,7 +54,7 @@ def write_trajectory(motion: Motion) -> JointTrajectory:
 
 @dataclass
 class _Goal:
-    """Goal that was sent to the controller: time of sending [s], and whether to cancel it."""
+    """Goal for the controller: time of sending [s], handle, and whether to cancel the goal."""
 
     sent: float
     handle: ClientGoalHandle | None = None
@@ -125,14 +125,14 @@ class TrajectoryController:
 
     @property
     def _rivals(self) -> str:
-        """Return a remark on other nodes that can send trajectories to the topic, or ''."""
+        """Text that names other nodes that publish trajectories on the topic; otherwise ''."""
         names = {*publisher_names(self._node, self.topic)}
         others = ', '.join(sorted(names - {self._node.get_fully_qualified_name()}))
         return f'; {others} can also move the arm by {self.topic}' if others else ''
 
     @property
     def missing(self) -> str:
-        """Return why no controller can receive a trajectory; empty if a controller can."""
+        """Message if no controller, or more than one, can receive a trajectory; otherwise ''."""
         servers = self._servers if self.client is not None else 0
         if servers > 1:  # a goal would move the arms of all
             return f'{servers} controllers offer the action {self.action}: stop the others'
@@ -144,12 +144,12 @@ class TrajectoryController:
 
     @property
     def under_way(self) -> bool:
-        """Whether the controller still executes a goal of this node."""
+        """Whether the controller still executes an action goal of this node."""
         return self._by_action and self._goal is not None
 
     @property
     def error(self) -> float:
-        """Largest joint error that the controller reported [rad or m], or NaN."""
+        """Largest tracking error that the controller reported [rad or m]; NaN without report."""
         return self._error if self.under_way else math.nan
 
     def discover(self) -> None:
@@ -180,14 +180,14 @@ class TrajectoryController:
         return f'{self.readers} subscribers{self._rivals}'
 
     def send_stop(self, trajectory: JointTrajectory, again: bool = False) -> None:
-        """Send a stop trajectory like that of the run; a repeated one always as a message, too."""
+        """Send a stop trajectory as the run was sent; repeat a stop on the topic as well."""
         if self._by_action:
             self._send_goal(trajectory, NO_TOLERANCE, NO_TOLERANCE)
         if again or not self._by_action:
             self._publisher.publish(trajectory)
 
     def trouble(self, patience: float) -> str:
-        """Return a text if the controller is gone or has been silent for `patience` [s]."""
+        """Return a message if the controller is lost, or silent for `patience` [s]; else ''."""
         goal, now = self._goal, time.monotonic()
         if goal is None or not self._by_action:
             return ''
@@ -200,7 +200,7 @@ class TrajectoryController:
         return ''
 
     def settle(self, patience: float) -> None:
-        """Wait until messages have arrived and calls are answered, at most `patience` [s]."""
+        """Wait up to `patience` [s] until messages have arrived and calls are answered."""
         if not self._by_action:
             self._publisher.wait_for_all_acked(Duration(seconds=patience))
             return
@@ -247,7 +247,7 @@ class TrajectoryController:
         self, trajectory: JointTrajectory, path: float, end: float, late: float = 0.0
     ) -> None:
         """
-        Send a goal that replaces the present one.
+        Send an action goal that replaces the present goal.
 
         Controllers of ros2_control replace the old goal. It is also cancelled, because other
         controllers do not replace it.
@@ -313,7 +313,7 @@ class TrajectoryController:
             self._end(goal, f'{self.action} gave up the trajectory: {why}{detail}')
 
     def _on_status(self, message: GoalStatusArray) -> None:
-        """End the present goal if the controller has accepted another client's later goal."""
+        """End the present goal if the controller has accepted a later goal of another client."""
         active = (GoalStatus.STATUS_ACCEPTED, GoalStatus.STATUS_EXECUTING)
         goals = {
             bytes(s.goal_info.goal_id.uuid) for s in message.status_list if s.status in active
@@ -327,7 +327,7 @@ class TrajectoryController:
             self._end(goal, self._replacement_message())
 
     def _replacement_message(self) -> str:
-        """Return a text that names the clients that may have replaced the goal."""
+        """Return a message that names the clients that may have replaced the goal."""
         node, service = self._node, f'{self.action}/_action/send_goal'
         found = []
         for name, space in node.get_node_names_and_namespaces():
@@ -358,6 +358,6 @@ class TrajectoryController:
         future.add_done_callback(self._guarded(done))
 
     def _guarded(self, callback: Callable[[Any], None]) -> Callable[[Any], None]:
-        """Wrap a callback so that exceptions stop the arm and are logged."""
+        """Return a callback whose exceptions are logged and stop the arm."""
         guarded: Callable[[Any], None] = self._node.guarded(callback, self.action)
         return guarded

@@ -21,7 +21,7 @@ STARTS = {
         assistant = Assistant()
         assistant.ask('plan', 0)
         assert assistant._pipe.poll(60)
-        assert str(assistant.poll()) == 'no diagnosis is complete so far'
+        assert str(assistant.poll()) == 'no diagnosis is complete so far; keep the arm moving'
         assistant.close()
         """,
     'the workers of a fleet': """

@@ -37,14 +37,14 @@ Result = Answer | tuple[str, str] | IdentificationError
 
 
 class Worker:
-    """Executor of tasks in the diagnosis process; it stores the last diagnosis."""
+    """Execute tasks in the diagnosis process, and store the last diagnosis."""
 
     def __init__(self) -> None:
         self._last: tuple[DiagnosisRequest, Diagnosis] | None = None
 
     def run(self, task: str, argument: Any) -> Result:
         """
-        Run one task: diagnose, save the last diagnosis, or plan a motion for its candidates.
+        Diagnose, save the last diagnosis, or plan a motion that separates its candidates.
 
         Errors of the data or the disk are returned, not raised. `argument` is that of
         `Assistant.ask`.
@@ -57,7 +57,7 @@ class Worker:
                     self._last = argument, diagnosis
                 return found
             if self._last is None:
-                raise IdentificationError('no diagnosis is complete so far')
+                raise IdentificationError('no diagnosis is complete so far; keep the arm moving')
             request, diagnosis = self._last
             if task == 'save':
                 result = DiagnosisResult(diagnosis, request.arm, (request.window,), ())
@@ -65,7 +65,7 @@ class Worker:
             run = next_run(diagnosis, np.random.default_rng(argument))
             if run is None:
                 raise IdentificationError(
-                    'no candidates are ambiguous, so no further motion is needed'
+                    'the last diagnosis has no rivals, so no further motion is needed'
                 )
             return run.sentence, excitation_text(run.excitation)
         except ArmidError as error:
@@ -91,12 +91,12 @@ class Assistant:
 
     @property
     def busy(self) -> bool:
-        """Whether the process has not completed all tasks."""
+        """Whether the process still has tasks to complete."""
         return self._pending > 0
 
     def ask(self, task: str, argument: Any) -> None:
         """
-        Send a task to the process, which runs tasks in order.
+        Send a task to the process, which executes tasks in the order of arrival.
 
         A new process is started if the last process has ended. A diagnosis request is larger than
         the buffer of the socket; send it only without pending tasks, as it would wait for them.
@@ -126,7 +126,7 @@ class Assistant:
         self._pending += 1
 
     def poll(self) -> Result | None:
-        """Return the next result of the process; None if there is none yet."""
+        """Return the next result of the process; None if no result has arrived."""
         if self._pipe.closed or not self._pipe.poll():
             return None
         self._pending -= 1

@@ -59,15 +59,15 @@ class LiveSettings:
         """Raise an IdentificationError if the window is shorter than a diagnosed motion."""
         if not 0.0 < self.shortest <= self.window:
             raise IdentificationError(
-                f'the shortest motion to diagnose, {self.shortest:g} s, has to be positive and at '
-                f'most the window, {self.window:g} s'
+                f"the parameter 'shortest' is {self.shortest:g} s, but has to be positive and at "
+                f"most the parameter 'window', {self.window:g} s"
             )
 
 
 @dataclass(frozen=True)
 class DiagnosisRequest:
     """
-    Latest samples of an arm, and everything else that their diagnosis needs.
+    Input of a live diagnosis: latest samples of an arm, model, baseline and settings.
 
     Attributes
     ----------
@@ -146,7 +146,7 @@ class Answer:
 
     @property
     def named(self) -> tuple[Named, ...]:
-        """Names and joints of the effects found, the largest effect first."""
+        """Names and joints of the named effects, the largest effect first."""
         return tuple((finding.name, finding.joints) for finding in self.findings)
 
 

@@ -76,7 +76,7 @@ class LiveDiagnosis:
         self.reset()
 
     def reset(self) -> None:
-        """Start the diagnoses again, with the original model."""
+        """Restart the diagnoses with the original model."""
         arm, self._baseline, self._misfit = self._given
         self.accepted = arm
         self._rejected: set[Named] = set()
@@ -90,7 +90,7 @@ class LiveDiagnosis:
         self.learning = not known and self.settings.learning > 0.0
 
     def use(self, settings: LiveSettings) -> None:
-        """Change the settings; the window of samples is cleared."""
+        """Change the settings, and clear the window of samples."""
         self.settings = settings
         joints, period = self.accepted.robot.joints, 1.0 / settings.rate
         self.window = SampleWindow(joints, max(settings.window, settings.learning), period)
@@ -105,12 +105,12 @@ class LiveDiagnosis:
 
     @property
     def confirmed(self) -> bool:
-        """Whether enough successive diagnoses agree on an effect."""
+        """Whether `confirmations` successive diagnoses named the same effect first."""
         return bool(self._agreed) and len(self._agreed) >= self.settings.confirmations
 
     @property
     def due(self) -> bool:
-        """Whether the arm has moved long enough for the next diagnosis."""
+        """Whether the window has enough new motion for the next diagnosis."""
         if self.learning or not self._contains(self.settings.shortest):
             return False
         return self.window.moved - self._asked_at >= self._next
@@ -134,11 +134,11 @@ class LiveDiagnosis:
             self._asked_at = self.window.moved
 
     def _contains(self, seconds: float) -> bool:
-        """Return whether the arm moves for at least `seconds` in the window."""
+        """Return whether the window contains at least `seconds` of motion."""
         return self.window.moved >= seconds <= self.window.end - self.window.begin
 
     def request(self) -> DiagnosisRequest:
-        """Return the request to diagnose the present window."""
+        """Return the input of a diagnosis of the present window."""
         self._asked_at, self._next = self.window.moved, self.settings.every
         self.asked += 1
         self._under_way, self._outdated = True, False
@@ -157,7 +157,7 @@ class LiveDiagnosis:
 
     def take(self, answer: Answer) -> bool:
         """
-        Process a diagnosis, unless it belongs to an earlier model or motion.
+        Process the result of a diagnosis, unless the model or the motion has changed since.
 
         Returns
         -------
@@ -212,7 +212,7 @@ class LiveDiagnosis:
 
     def reject(self) -> None:
         """
-        Discard the proposed effects, which are then never proposed again.
+        Discard the proposed effects; the first of these effects is never proposed again.
 
         Raises
         ------

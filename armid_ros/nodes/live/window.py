@@ -87,7 +87,7 @@ class SampleWindow:
         self, t: float, q: npt.ArrayLike, dq: npt.ArrayLike | None, tau: npt.ArrayLike
     ) -> bool:
         """
-        Add a sample of the arm, unless it follows the last one too early.
+        Add a sample of the arm, unless the sample follows the previous sample too early.
 
         Parameters
         ----------
@@ -125,7 +125,7 @@ class SampleWindow:
 
     def recording(self, first: float = -np.inf, source: str = 'window') -> Recording:
         """
-        Return the samples from a given time on as a recording.
+        Return the samples since the time `first` as a recording.
 
         Parameters
         ----------

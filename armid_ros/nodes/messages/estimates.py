@@ -11,7 +11,7 @@ from armid_ros.estimate import Estimate
 def estimate_message(
     estimate: Estimate, samples: int, condition_number: float = 0.0
 ) -> ParameterEstimate:
-    """Convert an estimate to a ParameterEstimate message; the stamp is not set."""
+    """Convert an estimate to a ParameterEstimate message without a time stamp."""
     return ParameterEstimate(
         name=[p.name for p in estimate.parameters],
         joint=[p.joint for p in estimate.parameters],

@@ -87,7 +87,7 @@ class JointStateReader:
         self._epoch: int | None = None
 
     def read(self, data: bytes) -> JointSample | None:
-        """Decode a serialised message; None if it is unusable or lacks a joint."""
+        """Decode a serialised message; return None for an invalid or incomplete joint state."""
         try:
             message = self._messages.read(data)
             if message.names is not self._names and message.names != self._names:
@@ -118,7 +118,7 @@ class JointStateReader:
         self._names = names
 
     def stamp(self, t: float) -> Time:
-        """Convert the time of a decoded sample [s] to a ROS time stamp."""
+        """Convert the time `t` [s] of a decoded sample to a ROS time stamp."""
         return Time(nanoseconds=(self._epoch or 0) * 10**9 + round(t * 1e9))
 
     def _time(self, sec: int, nanosec: int) -> float:
@@ -145,7 +145,7 @@ class JointStateReader:
         return field[self._order]
 
     def _values(self, names: Sequence[str], field: FloatArray, name: str) -> FloatArray:
-        """Return a field's values in joint order; RecordingError if one is not a number."""
+        """Return the values of a field in joint order; RecordingError for a missing value."""
         values = self._ordered(names, field, name)
         # a sum is faster than isfinite; skipped joints may be NaN
         if not math.isfinite(sum(values.tolist())) and not np.all(np.isfinite(values)):

@@ -27,21 +27,21 @@ class Freshness:
         self._received: float | None = None
 
     def mark_received(self) -> None:
-        """Note that a message has arrived now."""
+        """Store the present time as the arrival time of the last message."""
         self._received = self.now()
 
     @property
     def silence(self) -> float:
-        """Return the time since the last message [s]; 0 if there was none."""
+        """Time since the last message [s]; 0 if no message has arrived."""
         return 0.0 if self._received is None else self.now() - self._received
 
     @property
     def stopped(self) -> bool:
-        """Whether messages have arrived and then stopped."""
+        """Whether messages had arrived, but no longer arrive."""
         return self.silence > 0.5  # joint states below 2 Hz are not usable for identification
 
     def trouble(self) -> str:
-        """Return a text on how long messages have been missing; empty if messages arrive."""
+        """Return a message on how long no message has arrived; '' if messages arrive."""
         return f'{self._kind} stopped {self.silence:.1f} s ago' if self.stopped else ''
 
 
@@ -63,7 +63,7 @@ class StampDifference:
 
     @property
     def late(self) -> float:
-        """Smallest recent delay of time stamps behind the clock [s]; negative if ahead."""
+        """Smallest recent delay of time stamps relative to the clock [s]; negative if early."""
         return min(self._recent, key=abs, default=0.0)
 
     def take(self, stamp_ns: int, now_ns: int | None = None) -> None:
@@ -73,12 +73,12 @@ class StampDifference:
         self._recent.append(self._late)
 
     def side(self, late: float) -> str:
-        """Return 'behind' or 'ahead of' and the clock's name, for a delay of stamps [s]."""
+        """Return 'behind' or 'ahead of', and the name of the clock, for a delay `late` [s]."""
         clock = '/clock' if self._clock.ros_time_is_active else "this computer's clock"
         return f'{"behind" if late > 0.0 else "ahead of"} {clock}'
 
     def of_results(self, topic: str) -> str:
-        """Return a warning if stamps of inputs and results are over 10 s off the clock."""
+        """Return a warning if time stamps differ from the clock by more than 10 s; else ''."""
         # tf2 keeps ten seconds, so RViz cannot draw older results; up to 1000 messages in the
         # queue of a busy node are younger
         if abs(self._late) <= 10.0:

@@ -187,7 +187,7 @@ PUBLISHER_PARAMETERS = (
 
 def make_planner(value: Values) -> tuple[TransferPlanner, tuple[str, ...]]:
     """
-    Return a path planner for the robot and obstacles that ROS parameters name, and notes.
+    Return a path planner for the robot and obstacles of the ROS parameters, and unmade checks.
 
     Parameters
     ----------

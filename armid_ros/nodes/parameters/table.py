@@ -68,7 +68,7 @@ class NodeParameter:
         return descriptor
 
     def text(self) -> str:
-        """Return the description of the parameter with unit and allowed texts."""
+        """Return the description of the parameter, with the unit and the allowed texts."""
         unit = f' [{self.unit}]' if self.unit else ''
         choices = f' One of: {", ".join(self.choices)}.' if self.choices else ''
         return f'{self.description}{unit}{choices}'
@@ -132,7 +132,7 @@ class ParameterError(ArmidError):
 
 def declare(node: Node, table: Iterable[NodeParameter]) -> dict[str, NodeParameter]:
     """
-    Declare the parameters of a table on a node; return them by name.
+    Declare the parameters of a table on a node, and return their entries by name.
 
     Raises
     ------
@@ -152,6 +152,6 @@ def declare(node: Node, table: Iterable[NodeParameter]) -> dict[str, NodeParamet
 
 
 def overrides(node: Node) -> Mapping[str, Parameter]:
-    """Return the parameter values given at the start of a node, by name."""
+    """Return the parameters that were set at the start of a node, by name."""
     given: Mapping[str, Parameter] = node._parameter_overrides
     return given

@@ -51,7 +51,7 @@ def private_context(domain: int | None = None) -> Iterator[Context]:
 @contextmanager
 def reserved_domain() -> Iterator[int]:
     """
-    Yield a ROS domain that no other process uses, until the block or process ends.
+    Yield the ID of a ROS domain that no other process of armid uses during the block.
 
     Raises
     ------
@@ -71,4 +71,4 @@ def reserved_domain() -> Iterator[int]:
                 continue
             yield domain
             return
-    raise ArmidError(f'all {len(domains)} ROS domain IDs of armid are in use; end a process')
+    raise ArmidError(f'all {len(domains)} ROS domain IDs of armid are in use; end a node')

@@ -42,7 +42,7 @@ class Argument(NamedTuple):
     default: str | None = ''
 
     def read(self, text: str) -> Any:
-        """Convert text to the type of the argument; RuntimeError if this is impossible."""
+        """Convert a text to the type of the argument; RuntimeError for an invalid text."""
         try:
             if self.kind is list:
                 return [part.strip() for part in listed(text) if part.strip()]

@@ -36,7 +36,7 @@ SHUTDOWN_TIMEOUT = 20.0
 @contextmanager
 def steady() -> Iterator[None]:
     """
-    Limit linear algebra to one thread, and spare existing objects from garbage collection.
+    Limit linear algebra to one thread, and exclude existing objects from garbage collection.
 
     For matrices of a hundred rows, the synchronisation of threads takes longer than the
     computation: 20 ms instead of 0.2 ms if the second core is busy. A garbage collection of the
@@ -53,7 +53,7 @@ def steady() -> Iterator[None]:
 
 
 class _Ending:
-    """Signal handler that ends a process between two callbacks."""
+    """Handler of signals, which end the process of a node between two callbacks."""
 
     # A node must publish the stop of an arm after a signal, but the handlers of rclpy shut down
     # its context. During the construction of a node, SIGINT and SIGTERM end the process at once.
@@ -69,13 +69,13 @@ class _Ending:
 
     @property
     def due(self) -> bool:
-        """Whether the process must end: a signal came, or the parent process ended."""
+        """Whether the process must end, after a signal or the end of the parent process."""
         ended = self.with_parent and os.getppid() != self._parent
         return self._requested or self.hung_up or ended
 
     @contextmanager
     def at_once(self) -> Iterator[None]:
-        """Allow signals to end the process immediately in a `with` block."""
+        """Let signals end the process immediately during a `with` block."""
         self._at_once = True
         try:
             yield
@@ -93,7 +93,7 @@ class _Ending:
 
 
 class _EndedAtOnce(BaseException):
-    """Exception that a signal raises while a node is constructed; `run` catches it."""
+    """Exception that a signal raises during the construction of a node, for `run`."""
 
 
 def run(make_node: Callable[[], ArmidNode], args: Sequence[str] | None = None) -> None:
@@ -147,7 +147,7 @@ def run(make_node: Callable[[], ArmidNode], args: Sequence[str] | None = None) -
 
 
 def _made(make_node: Callable[[], ArmidNode], args: Sequence[str] | None) -> ArmidNode:
-    """Initialise ROS and create a node; ParameterError for invalid arguments."""
+    """Initialise ROS, and create and return a node; ParameterError for invalid arguments."""
     own = sys.argv[1:] if args is None else args
     try:
         rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
@@ -155,7 +155,7 @@ def _made(make_node: Callable[[], ArmidNode], args: Sequence[str] | None) -> Arm
         raise ParameterError(unreadable(error)) from error
     others = remove_ros_args(['', *own])[1:]
     if others:
-        raise ParameterError(f'{" ".join(others)}: no ROS arguments; {_SYNTAX}')
+        raise ParameterError(f'{" ".join(others)}: unknown arguments; {_SYNTAX}')
     node = make_node()
     node.warn_of_unknown()
     return node

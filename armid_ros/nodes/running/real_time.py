@@ -32,12 +32,12 @@ class RealTime:
         self.begin()
 
     def begin(self) -> None:
-        """Restart the pacing now; the sum of skipped time is kept."""
+        """Restart the pacing at the present time, without reset of the skipped time."""
         self._anchor = self._clock(), self._elapsed()
 
     def catch_up(self, factor: float, period: float) -> float:
         """
-        Simulate up to the present real time; skip what cannot be caught up.
+        Simulate up to the present real time; skip the time that cannot be caught up.
 
         Parameters
         ----------
@@ -71,7 +71,7 @@ class RealTime:
         return behind
 
     def trouble(self, advice: str) -> str:
-        """Return a text on skipped time with a remedy; empty if none was skipped."""
+        """Return a message on skipped time, with the advice; '' if no time was skipped."""
         if self.given_up <= 0.5:  # delays during the start are normal
             return ''
         return f'{self.given_up:.1f} s of real time were skipped: {advice}'
