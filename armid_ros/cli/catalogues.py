@@ -30,7 +30,7 @@ def robots(as_json: bool) -> None:
 @click.argument('names', nargs=-1, metavar='[NAME]...', shell_complete=parameters.completed)
 @parameters.as_json
 def effects(names: tuple[str, ...], as_json: bool) -> None:
-    """List the effects that can be simulated and estimated: all, or those named, with laws."""
+    """List all effects that can be simulated and estimated, or describe the named effects."""
     from armid_ros.effects import CATALOGUE
     from armid_ros.files import json_text
 

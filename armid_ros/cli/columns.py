@@ -22,7 +22,7 @@ META = 'armid.columns'
 
 
 def _kept(ctx: click.Context, parameter: click.Parameter, value: Any) -> Any:
-    """Store the value of an option in click's context, where `settings` finds it."""
+    """Store the value of an option in click's context for `settings`; return the value."""
     ctx.meta.setdefault(META, {})[parameter.name] = value
     return value
 
@@ -32,7 +32,7 @@ _option = partial(click.option, callback=_kept, expose_value=False)
 
 
 def _rules(ctx: click.Context, parameter: click.Parameter, value: Any) -> Any:
-    """Store the pairs OLD:NEW of --rename; RecordingError for a malformed pair."""
+    """Store pairs (old, new) of --rename for `settings`; RecordingError if malformed."""
     rules = []
     for text in value:
         old, *new = listed(text, ':')
@@ -48,7 +48,7 @@ def _rules(ctx: click.Context, parameter: click.Parameter, value: Any) -> Any:
 
 
 def _couplings(ctx: click.Context, parameter: click.Parameter, value: Any) -> Any:
-    """Store motor, joint and ratio of each --coupling; RecordingError for a malformed text."""
+    """Store motor, joint, ratio of --coupling for `settings`; RecordingError if malformed."""
     couplings = []
     for text in value:
         pair, equals, ratio = text.rpartition('=')
@@ -62,7 +62,7 @@ def _couplings(ctx: click.Context, parameter: click.Parameter, value: Any) -> An
 
 
 def _numbers(ctx: click.Context, parameter: click.Parameter, value: str | None) -> Any:
-    """Store the number, or the numbers per joint, of an option in click's context."""
+    """Store the numbers of an option for `settings`: one for all joints, or one per joint."""
     if value is not None:
         from armid_ros.recording.columns import numbers
 
@@ -157,7 +157,7 @@ recordings = together(options, parameters.topic, parameters.setting, parameters.
 
 
 def settings() -> ColumnSettings:
-    """Return the column settings that the options of the running command give."""
+    """Return the settings of table columns from the options of the running command."""
     from armid_ros.recording.columns import ColumnSettings
 
     return ColumnSettings(**click.get_current_context().meta.get(META, {}))

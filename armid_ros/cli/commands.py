@@ -55,14 +55,14 @@ TYPED = 'armid.typed'
 
 
 class Commands(click.Group):
-    """Group of all commands: each is imported when used; bad input ends with exit code 2."""
+    """Group of all armid commands; it imports a command when the command is used."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
-        """List commands in the order of their use, then those of plug-ins by name."""
+        """Return the names of commands in the order of use, then names of plug-in commands."""
         return [*COMMANDS, *sorted(plug_ins('commands').keys() - COMMANDS)]
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
-        """Import and return the command with this name; None if there is none."""
+        """Import and return the command named `cmd_name`; None for an unknown name."""
         if cmd_name in COMMANDS or cmd_name in plug_ins('commands'):
             return _imported(cmd_name)
         return None
@@ -71,7 +71,7 @@ class Commands(click.Group):
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
         """
-        Find the command that the arguments name; set its defaults from armid.toml.
+        Return name, command and further arguments; set defaults of options from armid.toml.
 
         The error message for an unknown command suggests the most similar command.
 
@@ -91,7 +91,7 @@ class Commands(click.Group):
         return name, command, rest
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        """Write each command with the first sentence of its help, or its import error."""
+        """Write for each command the first sentence of its help, or an import error."""
         rows = []
         for name in self.list_commands(ctx):
             try:
@@ -102,14 +102,14 @@ class Commands(click.Group):
             formatter.write_dl(rows)
 
     def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem]:
-        """Return shell completions of a command or an option, without importing all commands."""
+        """Return shell completions: names of commands and options that begin with a text."""
         names = [
             CompletionItem(name) for name in self.list_commands(ctx) if name.startswith(incomplete)
         ]
         return [*names, *click.Command.shell_complete(self, ctx, incomplete)]
 
     def invoke(self, ctx: click.Context) -> Any:
-        """Run a command and print its notes; for bad input print an error message."""
+        """Run a command and print its notes; print a message and exit with 2 for bad input."""
         # SIGTERM interrupts as Ctrl-C does, so that excite keeps its best design
         if threading.current_thread() is threading.main_thread():
             signal.signal(signal.SIGTERM, signal.default_int_handler)
@@ -148,7 +148,7 @@ def _print_notes(context: click.Context) -> None:
 
 @cache
 def _imported(name: str) -> click.Command:
-    """Import the command with this name; its options will refuse infinite numbers."""
+    """Import and return the command named `name`; its options reject infinite numbers."""
     command: click.Command
     if name in COMMANDS:
         module = import_module(f'armid_ros.cli.{COMMANDS[name]}')
@@ -160,7 +160,7 @@ def _imported(name: str) -> click.Command:
 
 
 def _refuse_infinite(command: click.Command) -> None:
-    """Make the options of a command and its subcommands refuse infinite numbers."""
+    """Let the options of a command and of its subcommands reject infinite numbers."""
     for below in command.commands.values() if isinstance(command, click.Group) else ():
         _refuse_infinite(below)
     for parameter in command.params:
@@ -174,7 +174,7 @@ def _finite(
     parameter: click.Parameter,
     value: Any,
 ) -> Any:
-    """Raise BadParameter for a number that is not finite, else call the option's callback."""
+    """Return the value of an option after its callback; BadParameter if not finite."""
     for number in value if isinstance(value, tuple) else (value,):
         if number is not None and not math.isfinite(number):
             raise click.BadParameter(f'{number} is not a finite number', context, parameter)

@@ -69,7 +69,7 @@ def convert(
 def _convert_tables(
     files: tuple[Path, ...], robot: Robot | None, joints: str | None, out: Path | None
 ) -> None:
-    """Join tables into a bag; without an output path, only print how columns are read."""
+    """Convert tables to one bag; without an output path, only print recognised columns."""
     from armid_ros.files.cells import listed
     from armid_ros.recording import write_recording
     from armid_ros.recording.reader import read_tables

@@ -212,7 +212,7 @@ def diagnose(
 
 
 def _identified_from(model: Path, diagnosed: list[Path]) -> tuple[Path, ...]:
-    """Return the recordings that a model was identified from; empty if one is diagnosed."""
+    """Return the recordings of a model's identification; () if one of them is diagnosed."""
     from armid_ros.identification.output import identified_from, require_as_identified
 
     found = identified_from(model)
@@ -225,7 +225,7 @@ def _identified_from(model: Path, diagnosed: list[Path]) -> tuple[Path, ...]:
 
 
 def _model_of(path: Path, robot: Robot) -> ArmModel:
-    """Read a model.yaml; ArmidError if its robot has other kinematics than the given robot."""
+    """Read a model.yaml; ArmidError if the kinematics of its robot and of `robot` differ."""
     from armid_ros.arm import load_model
     from armid_ros.cli import options
     from armid_ros.identification.output import kinematics_digest
@@ -237,8 +237,8 @@ def _model_of(path: Path, robot: Robot) -> ArmModel:
         return arm
     if known.joints == robot.joints and kinematics_digest(known) != kinematics_digest(robot):
         raise ArmidError(
-            f'{path}: belongs to a description whose joints differ from those of '
-            f'{robot.name}; give that description as --robot, or identify this arm'
+            f'{path}: the robot of this model has other kinematics than '
+            f'{robot.name}; name the description of the model with --robot, or identify this arm'
         )
     return arm
 
@@ -247,7 +247,7 @@ def open_partner(
     source: str | None, ties: Sequence[str], robot: Robot, gravity: str
 ) -> Partner | None:
     """
-    Load the machine of --partner with possible ties to the arm; None without --partner.
+    Load the robot of --partner with its possible ties to the arm; None without --partner.
 
     Raises
     ------
@@ -290,7 +290,7 @@ def read_together(
     partner: Partner,
     topic: str | None,
 ) -> list[Recording]:
-    """Read the motion of the partner from the arm's bags; add it to the recordings."""
+    """Return the recordings of the arm, with the partner's motion from the same bags."""
     from armid_ros.cli import options
     from armid_ros.recording import read_recording, recorded_together
 

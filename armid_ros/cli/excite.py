@@ -68,7 +68,7 @@ def _speed(context: click.Context, parameter: click.Parameter, value: Any) -> st
     type=click.IntRange(min=2),
     default=2,
     show_default=True,
-    help='Number of identical periods; their difference is the noise floor.',
+    help='Number of equal periods, whose difference measures the noise.',
 )
 @click.option(
     '--harmonics', default=5, show_default=True, help='Number of Fourier harmonics per joint.'
@@ -283,7 +283,7 @@ def excite(
 
 
 def _refuse_other_options(context: click.Context, kind: str) -> None:
-    """Raise a UsageError for a given option that does not exist for this --kind."""
+    """Raise a UsageError for a typed option that is not available with the --kind."""
     for option in context.command.params:
         name = str(option.name)
         fits = name in _SHARED or (name == 'share') == (kind in COURSES)
@@ -293,7 +293,7 @@ def _refuse_other_options(context: click.Context, kind: str) -> None:
 
 
 def _driven(source: str, gravity: str, joints: str | None, bags: tuple[Path, ...]) -> Robot:
-    """Load the robot; joints outside its arms are driven only if --joints names them."""
+    """Load the robot; a joint that belongs to no arm is driven only if --joints names it."""
     from armid_ros.cli import options
     from armid_ros.files.cells import listed
     from armid_ros.robots import load_arms
@@ -324,7 +324,7 @@ def require_free(folder: Path) -> None:
 def write_course(
     kind: str, space: CollisionScene, duration: float, share: float, seed: int, out: Path
 ) -> None:
-    """Design a trajectory that identifies elastic joints, and write it as a bag."""
+    """Design a trajectory for the identification of elastic joints, and write it as a bag."""
     from armid_ros.api.excitation import BAG, ExcitationResult
     from armid_ros.cli import options
     from armid_ros.excitation import ClearanceModel

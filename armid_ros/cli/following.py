@@ -74,7 +74,7 @@ def next_command(then: str, result: Shown) -> str:
 def _subject(
     then: str, result: Shown, given: dict[str, Any]
 ) -> tuple[str | Path, list[Path], list[Any]]:
-    """Return robot, recordings and options of the command that the user is advised to run next."""
+    """Return the robot, recordings and further options for the next command, named `then`."""
     robot, out = given.get('robot_source'), Path(given.get('out') or '')
     bags = list(given.get('bags') or filter(None, [given.get('bag')]))
     more: list[Any] = []
@@ -104,7 +104,7 @@ def _subject(
 
 
 def _typed(context: click.Context, kept: Iterable[str]) -> Iterator[str]:
-    """Yield the values of the named options as the user typed them."""
+    """Yield the options named in `kept` with their values, as the user typed them."""
     known = {
         text: one for one in context.command.params for text in (*one.opts, *one.secondary_opts)
     }

@@ -29,7 +29,7 @@ import click
 )
 @parameters.cutoff
 @parameters.decimation
-@click.option('--quasi-static', is_flag=True, help='Weight and effects only, for slow motions.')
+@click.option('--quasi-static', is_flag=True, help='Gravity and effects only, for slow motions.')
 @click.option(
     '--physical/--no-physical',
     default=None,

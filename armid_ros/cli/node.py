@@ -17,7 +17,7 @@ _ROS = re.compile(r'rclpy|ros\w+_runtime_py|\w+_(msgs|interfaces|srvs)')
 
 
 def main(name: str | None = None) -> int | None:
-    """Run a node of this package or of a plug-in; by default, the program's name selects it."""
+    """Run a node of this package or of a plug-in, by default the node named as the program."""
     name = name or Path(sys.argv[0]).name
     try:
         if find_spec(f'armid_ros.nodes.{name}') is None and name in plug_ins('nodes'):
@@ -35,7 +35,7 @@ def main(name: str | None = None) -> int | None:
 
 
 def install_hint(error: ModuleNotFoundError) -> str | None:
-    """Return how to install a missing ROS 2 module; None for other modules."""
+    """Return a message on how to install a missing ROS 2 module; None for other modules."""
     module = (error.name or '').partition('.')[0]
     if module == 'armid_msgs':
         return (

@@ -55,7 +55,7 @@ _SHOWN = 'armid.columns.shown'
 
 def stage(out: Path, schema: str, robot: str = '', also: Collection[str] = ()) -> Staged:
     """
-    Create and lock the command's results folder; return its staging folder.
+    Create and lock the results folder of a command; return the staging folder.
 
     Files appear in the folder only when the command keeps the staging folder. Other files of an
     earlier result are then removed, except a description that --robot names. With --force, files
@@ -89,7 +89,7 @@ def deliver(
     summary: Summary | None = None,
 ) -> None:
     """
-    Print the summary or the document of a result; write its files if a folder is given.
+    Print the summary or the JSON document of a result; write its files to a given folder.
 
     Parameters
     ----------
@@ -128,7 +128,7 @@ def deliver_page(
     verdict: VerdictSection,
     table: tuple[Sequence[str], Sequence[Sequence[str]]] | None,
 ) -> None:
-    """Write report.html and NAME.json; print verdict and table, or JSON without a table."""
+    """Write report.html and NAME.json; print verdict and table, or else the document."""
     write_file(staged.folder / 'report.html', page)
     summary = None
     if table is not None:
@@ -141,7 +141,7 @@ def deliver_page(
 def deliver_document(
     staged: Staged, name: str, document: Mapping[str, Any], summary: Summary | None, *files: str
 ) -> None:
-    """Write NAME.json and keep the folder; print the summary if given, else the document."""
+    """Write NAME.json and keep the staging folder; print the summary, or else the document."""
     write_document(staged.folder / f'{name}.json', document)
     staged.keep()
     if summary is None:
@@ -186,12 +186,12 @@ def provenance(
 def origin(
     robot: str, paths: Iterable[Path], seed: int | None = None, source: str = ''
 ) -> ResultOrigin:
-    """Return the origin of a result: --robot, the robot's name for model.yaml, provenance."""
+    """Return the origin of a result: text of --robot, source of the robot, provenance."""
     return ResultOrigin(robot, source, provenance(paths, seed=seed))
 
 
 def read_settings() -> ReadSettings:
-    """Return the settings with which the running command reads bags."""
+    """Return the settings for reading bags from the options of the running command."""
     meta = click.get_current_context().meta
     limit = meta.get(MEMORY)
     size = default_memory_limit() if limit is None else int(limit * 1e6)
@@ -213,7 +213,7 @@ def open_robot(
     bags: Sequence[Path] = (),
     tell: bool = True,
 ) -> Robot:
-    """Load the robot that options name; keep notes on doubtful values for the end."""
+    """Load the robot that the options name; store notes, which are printed at the end."""
     named = listed(joints) if isinstance(joints, str) else joints
     if source != '-':
         robot = load_robot(source, gravity=gravity, joints=named or None)
@@ -264,7 +264,7 @@ def model_of(path: Path, robot: Robot | None) -> ArmModel:
 
 
 def box(text: str, robot: Robot) -> tuple[str, Corners]:
-    """Parse the option --box: a joint of the robot, and two corners of a box [m]."""
+    """Convert the text of --box to a joint name and the two corners of a box [m]."""
     *parts, corners = listed(text, '=')
     joint = '='.join(parts)
     robot.index(joint)
@@ -278,7 +278,7 @@ def box(text: str, robot: Robot) -> tuple[str, Corners]:
 
 
 def per_joint(text: str | None, robot: Robot, option: str) -> FloatArray | None:
-    """Parse one number for all joints or one per joint; None if no text is given."""
+    """Convert a text with one number, or one per joint, to an array (n,); None without text."""
     with reading(option, RobotError):
         return None if text is None else values_per_joint(numbers(text), robot.joints, repr(text))
 
@@ -287,7 +287,7 @@ def read(
     paths: Sequence[Path], robot: Robot | None, topic: str | None, **known: Any
 ) -> list[Recording]:
     """
-    Read joints from bags and tables; print guessed columns on stderr, each once.
+    Read recordings from bags and tables; print guessed columns on stderr, each once.
 
     Without a robot, further arguments of `read_recording` state what is known of the joints.
 
@@ -311,7 +311,7 @@ def read(
 
 
 def kept_source(source: str, robot: Robot, out: Path) -> str:
-    """Return how result files refer to a robot; save a URDF that comes from a bag."""
+    """Return the robot source for result files; write a URDF from a bag to the folder."""
     if source == '-':
         write_file(out / 'robot.urdf', robot.urdf)
         return 'robot.urdf'

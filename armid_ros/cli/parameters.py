@@ -45,7 +45,7 @@ class ModelPath(click.Path):
     """Option type for a model.yaml, or for a results folder that contains one."""
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        """Return the path; of a folder, the path of its model.yaml."""
+        """Return the path of a model.yaml: the given file, or the file in the given folder."""
         path = Path(str(super().convert(value, param, ctx)))
         return path / 'model.yaml' if path.is_dir() else path
 
@@ -142,8 +142,8 @@ validate = click.option(
 cutoff = click.option(
     '--cutoff', type=float, help='Cut-off of the position filter [Hz]; from the data by default.'
 )
-decimation = click.option('--decimation', type=int, help='Keep one of this many samples.')
-topic = click.option('--topic', help='JointState topic, where a bag has several.')
+decimation = click.option('--decimation', type=int, help='Decimation: fit every k-th sample.')
+topic = click.option('--topic', help='JointState topic to read, if a bag has several.')
 seed = click.option(
     '--seed',
     type=click.IntRange(min=0),
@@ -180,7 +180,7 @@ def robot_described(**values: Any) -> Callable[[_Command], _Command]:
 
 
 def with_packages(context: click.Context, source: str | None) -> str | None:
-    """Append the folders of --package to the text of --robot."""
+    """Return the text of --robot with the folders of --package appended."""
     written = []
     for text in context.meta.get(PACKAGES, []):
         name, _, folder = text.partition('=')

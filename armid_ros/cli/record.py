@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     help='A model.yaml of armid identify.',
 )
 @click.option(
-    '--trajectory', type=click.Path(path_type=Path), help='A YAML, CSV or bag of armid excite.'
+    '--trajectory', type=click.Path(path_type=Path), help='YAML, CSV or bag of armid excite.'
 )
 @click.option('--rate', default=1000.0, show_default=True, help='Sample rate to record at [Hz].')
 @click.option(
@@ -126,7 +126,7 @@ def simulate(
 
 
 def _parse_effect(text: str, robot: Robot) -> tuple[Effect, FloatArray]:
-    """Parse --effect; ModelError for an effect of size zero, warning for an impossible payload."""
+    """Convert the text of --effect; ModelError for size zero, warn of an impossible payload."""
     from armid_ros.effects import parse_effect
     from armid_ros.simulation.plant import possible_loads
     import numpy as np

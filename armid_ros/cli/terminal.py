@@ -15,7 +15,7 @@ Tick = Callable[..., None]
 
 
 def say(text: str, colour: str | None = None) -> None:
-    """Print a line on stdout, coloured on a terminal."""
+    """Print a line on stdout, in colour on a terminal."""
     shown = visible(text)
     click.echo(shown if colour is None else click.style(shown, fg=colour))
 
@@ -58,7 +58,7 @@ def progress(what: str) -> Iterator[Tick]:
 
 
 def progress_line(what: str, share: float, spent: float) -> str:
-    """Return progress and remaining time as a line of text; `spent` is in seconds."""
+    """Return a line with the done share, the time `spent` [s] and the remaining time."""
     known = 0.0 < share < 1.0
     rest = f', about {spent * (1.0 / share - 1.0):.0f} s to go' if known else ''
     return f'{what}: {100.0 * share:.0f} %, {spent:.0f} s{rest}'

@@ -38,7 +38,7 @@ def _facts() -> dict[str, Any]:
 
 
 def true_arm(robot: Robot) -> ArmModel:
-    """Return the arm to be identified: it has friction, and other masses than described."""
+    """Return the simulated arm, with friction and with masses other than described."""
     true = _facts()
     factors = np.array(true['mass_factors'])[:, np.newaxis]
     parameters = robot.rigid_parameters.reshape(-1, 10) * factors
@@ -50,7 +50,7 @@ def true_arm(robot: Robot) -> ArmModel:
 
 def hidden_change(arm: ArmModel, rng: np.random.Generator, hide: str = '') -> ArmModel:
     """
-    Add to an arm, as its last effect, a hidden effect that a diagnosis has to find.
+    Return an arm with an additional last effect, which a diagnosis has to find.
 
     Parameters
     ----------
@@ -91,7 +91,7 @@ def diagnose_hidden(
     origin: ResultOrigin,
 ) -> DiagnosisResult:
     """
-    Record an arm with a hidden effect over ROS topics; diagnose it with its earlier model.
+    Record the changed arm over ROS topics, and diagnose the recordings with the known model.
 
     Parameters
     ----------
@@ -174,6 +174,6 @@ def story(changed: ArmModel, diagnosed: DiagnosisResult) -> dict[str, Any]:
 
 
 def _found(effect: Effect, diagnosed: DiagnosisResult) -> bool:
-    """Return whether the diagnosis names this effect first, on the same joints."""
+    """Return whether the first named effect of the diagnosis is `effect`, on its joints."""
     first = diagnosed.core.findings[:1]
     return any((one.name, one.joints) == (effect.name, effect.joints) for one in first)

@@ -66,7 +66,7 @@ def torque_tables(arm: ArmModel) -> tuple[dict[str, npt.NDArray[Any]], tuple[str
 
 def torque_code(arm: ArmModel, language: str, source: str) -> tuple[str, tuple[str, ...]]:
     """
-    Return code for an arm's joint torques, and lines on parameters that it omits.
+    Return source code of an arm's joint torques, and the parameters that the code omits.
 
     The language is 'cpp', a C++17 header with torque(q, dq, ddq, tau), or 'python', a module with
     torque(q, dq, ddq) that returns tau; neither needs more than the standard library. A

@@ -36,7 +36,7 @@ class CarriedLoad:
     body: pin.Inertia
 
     def principal(self) -> tuple[FloatArray, FloatArray]:
-        """Return principal moments (3,) [kg m^2] and axes, each near an axis of the frame."""
+        """Return principal moments of inertia (3,) [kg m^2], and the principal axes (3, 3)."""
         moments, axes = np.linalg.eigh(self.body.inertia)
         order = max(
             map(list, permutations(range(3))),

@@ -24,7 +24,7 @@ _HEAD = """\
 
 def ranges_text(arm: ArmModel, known: ParameterFile, spread: float, source: str) -> str:
     """
-    Return YAML text with the range of each parameter: mean, std, low, high and others.
+    Return YAML text with the range of each parameter: mean, std, 95 % limits and origin.
 
     Rows are masses and centres of mass of links, in the frames of their joints, and the parameters
     of effects. The information comes from the recordings: combinations with a covariance, or
@@ -70,7 +70,7 @@ def ranges_text(arm: ArmModel, known: ParameterFile, spread: float, source: str)
 def _masses_and_centres(
     arm: ArmModel,
 ) -> tuple[tuple[ParameterName, ...], FloatArray, FloatArray, FloatArray]:
-    """Return D exported quantities: names, values, gradients by parameters, lower bounds."""
+    """Return names, values (D,), gradients (D, P) and lower bounds (D,) of exported values."""
     names, found = list(arm.parameters), arm.theta.copy()
     slopes, kept = np.eye(len(found)), np.ones(len(found), dtype=bool)
     rigid = np.tile(np.where(np.arange(PER_LINK) == 0, 0.0, -np.inf), len(arm.robot.links))

@@ -14,7 +14,7 @@ import pinocchio as pin
 
 
 def urdf_or_mjcf(arm: ArmModel, kind: str, source: str) -> tuple[str, tuple[str, ...]]:
-    """Return an arm as URDF or MJCF text, and lines on parameters that the text omits."""
+    """Return the URDF or MJCF text of an arm, and the parameters that the text omits."""
     exported, root = (arm_urdf(arm), '<robot') if kind == 'urdf' else (arm_mjcf(arm), '<mujoco')
     comment = f'<!-- written by armid export, from {source.replace("--", "- -")} -->'
     return exported.text.replace(root, f'{comment}\n{root}', 1), exported.without_place
@@ -22,7 +22,7 @@ def urdf_or_mjcf(arm: ArmModel, kind: str, source: str) -> tuple[str, tuple[str,
 
 def arm_sdf(arm: ArmModel, source: str) -> tuple[str, tuple[str, ...]]:
     """
-    Return an arm, fixed to the world, as SDF 1.8 text, and lines on what it omits.
+    Return the SDF 1.8 text of an arm that is fixed to the world, and what the text omits.
 
     Links have the inertial parameters of the arm; joints have limits, and damping and friction as
     in identified.urdf. The source of the arm is for the comment.
