@@ -99,3 +99,9 @@ def humanoid():
     from armid_ros.robots import load_robot
 
     return load_robot('humanoid_arm')
+
+
+@pytest.fixture(scope='session')
+def robot(humanoid):
+    """Return the arm of rooms that have no other one."""
+    return humanoid

@@ -8,16 +8,9 @@ from functools import partial
 from armid_ros.arm import ArmModel, testing
 from armid_ros.effects import make_effect
 from armid_ros.motion import Motion
-from armid_ros.robots import load_robot, Robot
 import numpy as np
 import numpy.typing as npt
 import pytest
-
-
-@pytest.fixture(scope='session')
-def robot() -> Robot:
-    """Return the shipped arm on Earth."""
-    return load_robot('humanoid_arm')
 
 
 @pytest.fixture(scope='session')

@@ -6,10 +6,11 @@ from armid_ros.arm import ArmModel
 from armid_ros.effects import make_effect
 from armid_ros.identification import identify
 from armid_ros.identification.online.background import at_once, Background
-from armid_ros.motion import Motion
 from armid_ros.recording import Recording
 import numpy as np
 import pytest
+
+from benchmarks.multisine import multisine as sum_of_sines
 
 FRICTION = {'viscous_friction': 0.08, 'coulomb_friction': 0.05, 'torque_offset': 0.02}
 
@@ -20,12 +21,6 @@ class Foreground(Background):
     def begin(self, job, *, urgent=False):
         """Do a job at once."""
         at_once(job)
-
-
-@pytest.fixture(scope='session')
-def robot(humanoid):
-    """Return the humanoid arm as described."""
-    return humanoid
 
 
 @pytest.fixture(scope='session')
@@ -45,19 +40,9 @@ def structure(arm):
 
 def multisine(joints, duration, rate, seed, amplitude=0.5, base_hz=0.1):
     """Return three harmonics per joint with random phases, exact to the second derivative."""
-    rng = np.random.default_rng(seed)
     t = np.arange(round(duration * rate)) / rate
-    w = 2 * np.pi * base_hz * np.array([1.0, 2.0, 5.0])[:, None]
-    size = amplitude * np.array([1.0, 0.6, 0.2])[:, None]
-    phase = rng.uniform(0, 2 * np.pi, (3, len(joints)))
-    angle = w[None] * t[:, None, None] + phase
-    return Motion(
-        tuple(joints),
-        t,
-        np.sum(size * np.sin(angle), axis=1),
-        np.sum(size * w * np.cos(angle), axis=1),
-        np.sum(-size * w**2 * np.sin(angle), axis=1),
-    )
+    tones = [(k * base_hz, share * amplitude) for k, share in ((1, 1.0), (2, 0.6), (5, 0.2))]
+    return sum_of_sines(joints, t, np.random.default_rng(seed), tones)
 
 
 def recorded(arm, motion, seed=0, torque_noise=0.0, position_noise=0.0, source='bag'):

@@ -22,11 +22,6 @@ PERIOD = 10.0
 
 
 @pytest.fixture(scope='module')
-def robot(humanoid):
-    return humanoid
-
-
-@pytest.fixture(scope='module')
 def clean(robot):
     """Record two periods of a motion of the arm with friction, at 100 Hz."""
     motion = multisine(robot.joints, 2 * PERIOD, 100.0, seed=0, base_hz=1.0 / PERIOD)

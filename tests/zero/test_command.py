@@ -26,11 +26,6 @@ run = partial(run_command, zero)
 
 
 @pytest.fixture(scope='module')
-def robot(humanoid):
-    return humanoid
-
-
-@pytest.fixture(scope='module')
 def planned(tmp_path_factory):
     """Return the folder of a plan."""
     folder = tmp_path_factory.mktemp('zero') / 'plan'

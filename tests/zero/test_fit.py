@@ -4,7 +4,7 @@
 
 from dataclasses import replace
 
-from armid_ros.robots import load_robot, robot_from_urdf
+from armid_ros.robots import robot_from_urdf
 from armid_ros.zero.fit import fit_rests
 import numpy as np
 import pytest
@@ -19,11 +19,6 @@ SCARA = serial_arm(
     'j2 prismatic 0,0,1 0.3,0,0',
     centre='0.2 0 0',
 )
-
-
-@pytest.fixture(scope='module')
-def robot():
-    return load_robot('humanoid_arm')
 
 
 @pytest.fixture(scope='module')
