@@ -3,7 +3,6 @@
 """Recordings of real machines: errors and parameters next to the published ones."""
 
 from armid_ros.arm import ArmModel
-from armid_ros.effects import make_effect
 from armid_ros.identification import IdentificationSettings, identify, Score, SignalSettings
 from armid_ros.recording import read_recording
 from armid_ros.robots import load_robot
@@ -18,9 +17,7 @@ FRICTION = ('viscous_friction', 'coulomb_friction', 'torque_offset')
 
 
 def fit(robot, bag, effects, method='wls', **signals):
-    arm = ArmModel(robot)
-    for name in effects:
-        arm = arm.with_effect(make_effect(name, robot))
+    arm = ArmModel.of(robot, effects=effects)
     settings = IdentificationSettings(method, SignalSettings(**signals))
     recording = read_recording(bag, joints=robot.joints)
     return identify(arm, [recording], settings, rng=np.random.default_rng(0))

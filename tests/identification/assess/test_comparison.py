@@ -25,14 +25,6 @@ def parameters(values, std, source='a'):
     return given(source, dict(zip(names, zip(values, std, strict=True), strict=True)))
 
 
-def test_a_real_change_is_found_and_sized():
-    before = parameters([1.0, 2.0, 3.0], [0.01, 0.01, 0.01])
-    after = parameters([1.0, 2.2, 3.01], [0.01, 0.02, 0.01])
-    (change,) = compare(before, after).changed
-    assert change.parameter.joint == 'joint_2'
-    assert change.deviations == pytest.approx(0.2 / np.hypot(0.01, 0.02))
-
-
 def correlated(rng, size):
     """Return a covariance whose parameters are hard to tell apart."""
     factors = rng.normal(size=(size, size)) * np.logspace(0, -2, size)

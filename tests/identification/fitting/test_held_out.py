@@ -5,7 +5,7 @@
 from dataclasses import replace
 
 from armid_ros.identification.fitting import held_out
-from armid_ros.identification.fitting.held_out import cutoff_of_torques, halves_error
+from armid_ros.identification.fitting.held_out import cutoff_of_torques, halves_error, jackknife
 from armid_ros.identification.rows.regression import Regression
 from armid_ros.identification.rows.signals import conditioning, SignalSettings
 from armid_ros.motion import Motion
@@ -104,3 +104,58 @@ def test_the_error_of_a_joint_is_a_share_of_its_own_torque():
     assert error.relative_error_percent < 1.0
     expected = 100.0 * np.std(noise, axis=0) / np.std(tau, axis=0)
     assert error.joint_relative_error_percent == pytest.approx(expected, rel=0.05)
+
+
+#: Of a recording, of which the scatter is asked.
+LONG, NOISE = 80, 0.1
+
+
+def recording(rng, values, source, columns=None):
+    """Return rows of two joints that have values in one recording, with noise."""
+    own = rng.normal(size=(LONG, 2, len(values))) if columns is None else columns
+    tau = own @ np.asarray(values) + NOISE * rng.normal(size=(LONG, 2))
+    still = np.zeros((LONG, 2))
+    motion = Motion(('a', 'b'), np.arange(LONG), still, still, still, tau)
+    return Regression(source, motion, np.ones(tau.shape, np.bool_), own)
+
+
+def fitted(problem):
+    """Return the scatter of a least-squares fit, and its standard deviations for noise."""
+    rows = np.concatenate([part.columns.reshape(2 * LONG, -1) for part in problem])
+    aim = np.concatenate([part.tau.ravel() for part in problem])
+    values = np.linalg.lstsq(rows, aim, rcond=None)[0]
+    weights = np.full((len(problem) * LONG, 2), 1.0 / NOISE)
+    std = NOISE * np.sqrt(np.diag(np.linalg.inv(rows.T @ rows)))
+    return jackknife(problem, weights, values), std
+
+
+def test_noise_alone_makes_the_variance_that_least_squares_have():
+    rng = np.random.default_rng(0)
+    ratios = []
+    for _ in range(40):
+        problem = [recording(rng, [1.0, -2.0, 0.5], f'{k}') for k in range(4)]
+        found, std = fitted(problem)
+        ratios.append(np.sum(found**2, axis=0) / std**2)
+    assert np.mean(ratios) == pytest.approx(1.0, abs=0.15)
+
+
+def test_values_that_differ_from_recording_to_recording_have_the_variance_of_their_mean():
+    rng = np.random.default_rng(1)
+    squares = []
+    for _ in range(40):
+        drawn = rng.normal(size=(4, 3))
+        problem = [recording(rng, own, f'{k}') for k, own in enumerate(drawn)]
+        squares.append(np.sum(fitted(problem)[0] ** 2, axis=0))
+    assert np.mean(squares) == pytest.approx(0.25, rel=0.15)
+
+
+def test_stretches_of_a_recording_are_one_and_what_one_recording_alone_shows_has_no_scatter():
+    rng = np.random.default_rng(2)
+    problem = [recording(rng, [1.0, 2.0], name) for name in ('one', 'two', 'one')]
+    assert len(fitted(problem)[0]) == 2
+    assert jackknife(problem[:1], np.ones((LONG, 2)), np.zeros(2)).shape == (0, 2)
+    still = rng.normal(size=(LONG, 2, 2)) * [1.0, 0.0]
+    others = [recording(rng, [3.0, 2.0], f'{k}', still) for k in range(2)]
+    found, _ = fitted([problem[0], *others])
+    assert np.all(found[1:, 0] != 0.0)
+    np.testing.assert_array_equal(found[0, 1], 0.0)

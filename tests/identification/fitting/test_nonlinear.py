@@ -12,11 +12,11 @@ from armid_ros.motion import Temperatures
 import numpy as np
 import pytest
 
+from tests.effects.test_contract import SIZES
+
 from ..conftest import multisine, recorded
 
 NOISE = 0.002
-#: Sizes that are far from zero where the typical ones would not do.
-SIZES = {'link_inertia': 0.02, 'payload': 0.05, 'interface_slack': 300.0, 'soft_limit': 20.0}
 #: Effects that change the columns of others.
 NONLINEAR = (
     'load_dependent_friction torque_gain torque_crosstalk torque_lag time_delay encoder_offset '

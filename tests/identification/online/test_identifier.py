@@ -6,6 +6,7 @@ from armid_ros.arm import ArmModel
 from armid_ros.effects import make_effect
 from armid_ros.errors import IdentificationError
 from armid_ros.identification import identify, Score
+from armid_ros.identification.online.checks import MissingSamples
 from armid_ros.identification.online.identifier import OnlineIdentifier, OnlineSettings
 from armid_ros.identification.rows.causal import MOTION_FILTER_RATIO
 from armid_ros.identification.rows.regression import Fit, regressions
@@ -123,9 +124,7 @@ def test_a_real_arm_is_identified_online_as_well_as_offline(real_data):
     """UR10, one pass at 125 Hz: within a tenth of the offline fit of the same bag."""
     data = real_recordings.ur10(real_data)
     robot = load_robot(str(data.robot))
-    arm = ArmModel(robot)
-    for name in ('viscous_friction', 'coulomb_friction', 'torque_offset'):
-        arm = arm.with_effect(make_effect(name, robot))
+    arm = ArmModel.of(robot, effects='viscous_friction,coulomb_friction,torque_offset')
     recording = read_recording(data.bags[0], joints=robot.joints)
     offline = identify(arm, [recording], rng=np.random.default_rng(0))
     online = OnlineIdentifier(arm, rng=np.random.default_rng(0))
@@ -172,3 +171,38 @@ def test_effects_that_remember_are_refused(arm):
     remembering = arm.with_effect(make_effect('presliding_hysteresis', arm.robot))
     with pytest.raises(IdentificationError, match='presliding_hysteresis'):
         OnlineIdentifier(remembering, rng=np.random.default_rng(0))
+
+
+PERIOD = 0.001
+
+
+def missing(stamps):
+    samples = MissingSamples()
+    for t in stamps:
+        samples.take(t, PERIOD)
+    return samples.count
+
+
+@pytest.mark.parametrize('lost', [(), (7,), (7, 8, 9), (5, 50, 51, 90)])
+def test_every_sample_that_did_not_come_is_counted(lost):
+    rng = np.random.default_rng(0)
+    stamps = PERIOD * (np.arange(100) + 0.2 * rng.uniform(-1.0, 1.0, 100))
+    assert missing(np.delete(stamps, lost)) == len(lost)
+
+
+@pytest.mark.parametrize('late', [0.7, 3.8])
+def test_a_sender_that_pauses_and_catches_up_has_lost_nothing(late):
+    index = np.arange(40.0)
+    stamps = PERIOD * np.where(index < 20, index, np.maximum(index, 20.0 + late))
+    stamps = stamps + 1e-6 * index  # no two are alike
+    assert missing(stamps) == 0
+
+
+def test_a_pause_and_a_clock_that_is_set_are_no_loss():
+    assert missing([0.0, 0.001, 3600.0, 3600.001, 1.0, 1.001]) == 0
+
+
+def test_what_comes_out_of_order_does_not_count_twice():
+    stamps = list(PERIOD * np.arange(20.0))
+    assert missing([*stamps[:10], stamps[6], *stamps[10:]]) == 0
+    assert missing([*stamps[:6], stamps[7], stamps[6], *stamps[8:]]) == 0

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 from armid_ros.errors import IdentificationError
 from armid_ros.identification import IdentificationSettings, identify
+from armid_ros.identification.rows.period import find_period
 from armid_ros.identification.rows.signals import (
     Conditioning,
     conditioning,
@@ -48,18 +49,6 @@ def test_decimation_passes_the_band_and_stops_what_would_alias():
     assert np.abs(decimate(fast, used)).max() < 5e-3  # would alias to 3 Hz
 
 
-def test_decimation_in_chunks_is_seamless():
-    used = Conditioning(1000.0, 50.0, 7)
-    x = np.random.default_rng(0).normal(size=(5003, 3, 2))
-    whole = decimate(x, used)
-    kept = decimated_samples(len(x), used)
-    assert len(whole) == len(kept)
-    taps = used.taps
-    for row in (0, 17, len(kept) - 1):
-        window = x[kept[row] - len(taps) // 2 : kept[row] + len(taps) // 2 + 1]
-        np.testing.assert_allclose(whole[row], np.tensordot(taps, window, axes=1), atol=1e-12)
-
-
 def test_what_is_across_a_gap_is_no_motion(arm):
     motion = multisine(arm.robot.joints, 40.0, 1000.0, seed=2)
     whole = recorded(arm, motion, position_noise=1e-6)
@@ -78,14 +67,6 @@ def test_cutoff_is_where_positions_meet_their_noise(arm):
     assert noisy.cutoff_hz < quiet.cutoff_hz <= 200.0
     assert noisy.cutoff_hz >= 0.5  # the fastest harmonic
     assert noisy.decimation == quiet.decimation
-
-
-@pytest.mark.parametrize('rate', [50.0, 200.0, 1000.0, 2000.0])
-def test_a_row_takes_less_than_twenty_smooth_samples_at_any_rate(arm, rate):
-    motion = multisine(arm.robot.joints, 20.0, rate, seed=2)
-    used = conditioning([recorded(arm, motion, position_noise=1e-9)], SignalSettings())
-    assert used.decimation % used.smooth_stride == 0
-    assert used.decimation < 20 * used.smooth_stride
 
 
 @pytest.mark.parametrize('cutoff', [10.0, 40.0])
@@ -126,3 +107,11 @@ def test_a_cutoff_or_stamps_that_cannot_be_are_refused(arm, structure, time, cut
     settings = IdentificationSettings(signals=SignalSettings(cutoff_hz=cutoff_hz))
     with pytest.raises(IdentificationError, match=fact):
         identify(structure, [replace(run, t=time * run.t)], settings, rng=np.random.default_rng(0))
+
+
+def test_slow_motion_is_like_itself_a_while_later_and_repeats_nothing():
+    """In the shortest period a crawl goes less than two positions may differ by."""
+    crawl = np.linspace(0.0, 0.1, 1200)
+    there = 0.1 + 0.9 * 0.5 * (1.0 - np.cos(np.pi * np.linspace(0.0, 1.0, 300)))
+    q = np.concatenate([crawl, there])
+    assert find_period(np.arange(len(q)) / 100.0, np.column_stack([q, -0.5 * q])) is None
