@@ -3,7 +3,7 @@
 """Friction beyond Coulomb and viscous: humps, load, memory, warmth."""
 
 from armid_ros.arm import ArmModel
-from armid_ros.effects import Hysteresis, make_effect
+from armid_ros.effects import make_effect
 from armid_ros.model import inverse_dynamics
 from armid_ros.motion import Motion
 import numpy as np
@@ -70,16 +70,3 @@ def test_presliding_becomes_coulomb_friction_after_a_long_way(robot, added):
     np.testing.assert_allclose(presliding[far], coulomb[far], atol=1e-5)
     reversal = np.abs(q - 1.0) < 0.003
     assert np.abs(presliding - coulomb)[reversal].max() > 0.5
-
-
-def test_a_path_gives_the_same_states_at_once_and_step_by_step():
-    rng = np.random.default_rng(0)
-    q = np.cumsum(rng.normal(scale=0.004, size=(200, 2)), axis=0)
-    q[50:60] = q[50]
-    friction = Hysteresis(np.array([[1.0, 0.0], [1.0, 1.0]]), np.ones(2), np.array([0.01, 0.003]))
-    states = friction.along(q, np.array([[1.0, -2.0]] * 200))
-    state = friction.start(np.array([1.0, -2.0]))
-    for k in range(200):
-        np.testing.assert_allclose(states[k], state, atol=1e-12)
-        if k < 199:
-            state = friction.advance(state, q[k + 1] - q[k])

@@ -52,21 +52,6 @@ def test_a_soft_joint_lets_the_motor_run_ahead_as_the_closed_form_says(frequency
     assert rigid > 0.9 * ratio * np.abs(true).max()
 
 
-def test_the_plant_is_told_springs_dampers_and_gaps(robot):
-    arm = (
-        ArmModel(robot)
-        .with_effect(
-            make_effect('joint_elasticity@elbow_pitch', robot).with_shape([0.004]), [1 / 500.0]
-        )
-        .with_effect(make_effect('backlash@elbow_pitch+wrist_pitch', robot), [0.01, 0.02])
-    )
-    transmission = arm.action().transmission
-    rigid = [np.inf] * 3
-    np.testing.assert_allclose(transmission.stiffness, [*rigid, 500.0, np.inf, np.inf])
-    np.testing.assert_allclose(transmission.damping, [0, 0, 0, 2.0, 0, 0])
-    np.testing.assert_allclose(transmission.gap, [0, 0, 0, 0.005, 0, 0.01])
-
-
 def test_rotors_turn_with_the_motors_and_links_with_the_links():
     robot = load_robot(TURNTABLE)
     t, scale, phase = link_sine(2.0 * np.pi * 3.0)
