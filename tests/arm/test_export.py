@@ -12,25 +12,18 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-VALUES = {
-    'viscous_friction': 0.3,
-    'coulomb_friction': 0.2,
-    'rotor_inertia': 0.01,
-    'torque_offset': 0.05,
-}
-
-
-def arm_of(robot):
-    """Return an arm with friction, rotors and offsets."""
-    arm = ArmModel(robot)
-    for name, value in VALUES.items():
-        arm = arm.with_effect(make_effect(name, robot), np.full(robot.n_joints, value))
-    return arm
+EFFECTS = (
+    'viscous_friction:viscous_coefficient=0.3',
+    'coulomb_friction:coulomb_torque=0.2',
+    'rotor_inertia:rotor_inertia=0.01',
+    'torque_offset:torque_offset=0.05',
+)
 
 
 @pytest.fixture
 def arm(robot):
-    return arm_of(robot)
+    """Return an arm with friction, rotors and offsets."""
+    return ArmModel.of(robot, effects=EFFECTS)
 
 
 def test_what_has_no_place_is_listed_and_said_in_the_file(arm):
@@ -70,7 +63,7 @@ CONTROL = (
 @pytest.mark.parametrize('export', [arm_urdf, arm_mjcf])
 @pytest.mark.parametrize('joints', [None, ('shoulder_pitch', 'elbow_pitch')])
 def test_the_torque_in_mujoco_is_that_of_the_arm(export, joints):
-    arm = arm_of(load_robot('humanoid_arm', joints=joints))
+    arm = ArmModel.of('humanoid_arm', effects=EFFECTS, joints=joints)
     exported = export(arm)
     check = torque_check(exported, arm)
     assert check['states'] == 50

@@ -5,7 +5,6 @@ from xml.etree import ElementTree
 
 from armid_ros.arm import ArmModel
 from armid_ros.arm.export import arm_mjcf, arm_urdf, torque_check
-from armid_ros.effects import make_effect
 from armid_ros.errors import ModelError
 from armid_ros.model import inverse_dynamics, random_motion
 from armid_ros.model.mjcf_export import export_mjcf
@@ -90,9 +89,8 @@ def test_description_read_again_has_the_parameters(robot):
 
 
 def test_pinocchio_and_mujoco_agree_with_the_model_friction_and_rotors_included(robot):
-    arm = ArmModel(robot)
-    for name, value in (('viscous_friction', 0.3), ('rotor_inertia', 0.02)):
-        arm = arm.with_effect(make_effect(name, robot), np.full(robot.n_joints, value))
+    effects = ('viscous_friction:viscous_coefficient=0.3', 'rotor_inertia:rotor_inertia=0.02')
+    arm = ArmModel.of(robot, effects=effects)
     motion = random_motion(robot, np.random.default_rng(1), 30)
     without_rotors = arm.torque(motion) - 0.02 * motion.ddq
     assert torque_check(arm_mjcf(arm), arm)['share'] < 1e-9
