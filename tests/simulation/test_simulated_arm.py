@@ -79,27 +79,6 @@ def test_steps_ahead_of_the_present_change_neither_samples_nor_commands(model) -
     np.testing.assert_array_equal(*samples)
 
 
-def test_it_follows_and_then_holds_the_last_point(arm) -> None:
-    reference = there_and_back(arm.joints)
-    arm.advance(200)
-    arm.set_trajectory(reference)
-    assert arm.ends_at == pytest.approx(1.7)
-    arm.advance(750)
-    np.testing.assert_allclose(arm.state.q, reference.sample(np.array([0.75])).q[0], atol=2e-3)
-    arm.advance(2000)
-    np.testing.assert_allclose(arm.state.q, MIDDLE, atol=2e-3)
-    np.testing.assert_array_equal(arm.state.dq, 0.0)
-
-
-def test_it_goes_to_a_first_point_that_is_later(arm) -> None:
-    shifted = Reference(arm.joints, np.array([2.0]), MIDDLE[np.newaxis] + 0.3, np.zeros((1, 6)))
-    arm.set_trajectory(shifted)
-    arm.advance(1000)
-    np.testing.assert_allclose(arm.state.q, MIDDLE + 0.15, atol=5e-3)
-    arm.advance(2000)
-    np.testing.assert_allclose(arm.state.q, MIDDLE + 0.3, atol=5e-3)
-
-
 def bad_trajectories(joints):
     """Return trajectories that must be refused, with what the message has to say."""
     still = np.zeros((2, 6))
