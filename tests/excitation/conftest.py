@@ -3,7 +3,6 @@
 """Small arms and problems for the excitation tests."""
 
 from armid_ros.arm import ArmModel
-from armid_ros.effects import make_effect
 from armid_ros.excitation import DesignSettings
 from armid_ros.robots import collision_model, robot_from_urdf
 import pytest
@@ -33,10 +32,7 @@ def urdf(*joints, name='small'):
 
 def with_effects(robot, *names):
     """Return an arm with effects, without their values."""
-    arm = ArmModel(robot)
-    for name in names:
-        arm = arm.with_effect(make_effect(name, robot))
-    return arm
+    return ArmModel.of(robot, effects=names)
 
 
 @pytest.fixture(scope='session')
