@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The shipped humanoid arm is the one of the literature."""
 
-from armid_ros.robots import load_robot, Robot, shipped_robots
+from armid_ros.robots import load_robot, shipped_robots
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -17,51 +17,6 @@ CENTROIDS = (  # m, in the link frames
     (0.0035, 0.0110, 0.100),
     (0.0020, 0.0055, 0.0030),
 )
-
-
-def largest_holding_torque(robot: Robot, joint: int) -> float:
-    """
-    Largest torque that holds a joint against gravity, over all poses.
-
-    As a function of one position the torque is a + b cos q + c sin q, so that three values give
-    its extremes exactly; going through the joints from several poses finds the largest.
-
-    """
-    data = robot.model.createData()
-
-    def torque(q: np.ndarray) -> float:
-        return float(pin.computeGeneralizedGravity(robot.model, data, q)[joint])
-
-    largest = 0.0
-    for pose in np.random.default_rng(7).uniform(-np.pi, np.pi, (12, robot.n_joints)):
-        for sign in (1.0, -1.0):
-            q = pose.copy()
-            for moved in list(range(robot.n_joints)) * 25:
-                values = []
-                for position in (0.0, np.pi / 2.0, np.pi):
-                    q[moved] = position
-                    values.append(torque(q))
-                mean = (values[0] + values[2]) / 2.0
-                q[moved] = np.arctan2(sign * (values[1] - mean), sign * (values[0] - mean))
-            largest = max(largest, sign * torque(q))
-    return largest
-
-
-@pytest.mark.parametrize(
-    ('name', 'published'),
-    [
-        ('humanoid_arm', (762.8, 761.9, 147.01, 141.58, 7.27, 1.90)),
-        ('humanoid_arm_loaded', (1057.0, 1056.2, 270.85, 265.81, 10.10, 4.74)),
-    ],
-)
-def test_largest_lunar_torques_are_those_published(
-    name: str, published: tuple[float, ...]
-) -> None:
-    robot = load_robot(name, gravity='moon')
-    largest = [1000.0 * largest_holding_torque(robot, joint) for joint in range(6)]
-    digits = [len(str(value).split('.')[1]) for value in published]
-    rounding = [0.51 * 10.0**-digit for digit in digits]
-    assert np.all(np.abs(np.subtract(largest, published)) < rounding), largest
 
 
 def test_masses_and_centroids() -> None:
