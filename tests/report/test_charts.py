@@ -7,6 +7,9 @@ from io import BytesIO
 import json
 import re
 
+from armid_ros.inspection import inspect
+from armid_ros.recording import Recording
+from armid_ros.report.arm_drawing import draw_arm
 from armid_ros.report.blocks import Bar, BarChart
 from armid_ros.report.charts import (
     Chart,
@@ -15,8 +18,13 @@ from armid_ros.report.charts import (
     Series,
     thinned,
 )
+from armid_ros.report.inspection_report import inspection_report
+from armid_ros.robots import robot_from_urdf
 from matplotlib.image import imread
 import numpy as np
+import pytest
+
+from tests.serial_arm import serial_arm
 
 
 def data_of(html):
@@ -72,3 +80,44 @@ def test_an_image_is_a_png_of_its_pixels():
     assert kind == 'data:image/png;base64'
     pixels = imread(BytesIO(b64decode(content)), format='png')
     np.testing.assert_allclose(pixels, [[[1, 0, 0, 1], [0, 0, 1, 0.5]]], atol=1 / 255)
+
+
+ENDLESS = serial_arm(
+    'turn continuous 0,0,1 0,0,0.2', 'lift revolute 0,1,0 0.3,0,0', centre='0 0 0'
+)
+ENDLESS = ENDLESS.replace('lower="-2"', 'lower="-1"')
+
+
+def test_a_joint_without_end_is_drawn_at_zero_and_others_in_the_middle_of_their_range():
+    robot = robot_from_urdf(ENDLESS)
+    drawn = draw_arm(robot, ['turn'])
+    assert drawn == draw_arm(robot, ['turn'], np.array([[0.0, 0.5]]))
+    assert {name for *_, name in drawn.dots} == {'turn', 'lift'}
+
+
+def test_an_arm_on_a_ceiling_hangs():
+    """What the base carries is at the bottom; without gravity it is drawn as described."""
+    below = {}
+    for up in (-9.81, 9.81, 0.0):
+        drawn = draw_arm(robot_from_urdf(ENDLESS, gravity=(0.0, 0.0, up)), [])
+        corners = [float(p.split(',')[1]) for body, _ in drawn.bodies for p in body.split()]
+        below[up] = max(corners) - next(y for _, y, _, name in drawn.dots if name == 'lift')
+        assert drawn.gravity == bool(up)
+    assert 0.0 < below[9.81] < 0.2 * below[-9.81]
+    assert below[0.0] == below[-9.81]
+
+
+JOINTS = ('shoulder', '<b>elbow</b>')
+
+
+@pytest.fixture(scope='module')
+def html():
+    """Return the page of a recording of two joints with a gap, without velocities."""
+    t = np.delete(np.arange(0.0, 20.0, 0.01), slice(500, 600))
+    q = np.column_stack([np.sin(t), np.cos(1.3 * t)])
+    recording = Recording(joints=JOINTS, t=t, q=q, tau=3 * q, source='<i>run</i>.mcap')
+    return inspection_report(inspect(recording))
+
+
+def test_a_browser_draws_every_curve_within_the_window(charts_drawn, html):
+    assert charts_drawn(html, 400, dark=False) == 2 * 2 + 1

@@ -3,6 +3,10 @@
 """Parameters that share an axis have one unit, which a heading says once."""
 
 from armid_ros.estimate import Estimate, ParameterName
+from armid_ros.report.blocks import DataTable, Paragraph
+from armid_ros.report.identification_report import convergence_section
+from armid_ros.report.notation import common_prefix
+from armid_ros.report.page import Page, Section
 from armid_ros.report.parameter_tables import (
     full_label,
     grouping,
@@ -55,3 +59,56 @@ def test_a_group_is_a_sum_over_named_links():
     estimate = Estimate((name,), np.ones(1), 0.01 * np.eye(1))
     page = parameter_section(estimate, np.ones(1), links=links).html()
     assert f'<small>{words}' in page
+
+
+PANDA = tuple(f'panda_joint{number}' for number in range(1, 8))
+
+
+@pytest.mark.parametrize(
+    ('names', 'prefix'),
+    [
+        (PANDA, 'panda_'),
+        (('lbr_iiwa_joint_1', 'lbr_iiwa_joint_2'), 'lbr_iiwa_'),
+        (('joint_1', 'joint_2'), ''),
+        (('ur_pan', 'ur_lift'), ''),
+        (('panda_joint1',), ''),
+    ],
+)
+def test_a_long_prefix_before_a_letter_is_common(names, prefix):
+    assert common_prefix(names) == prefix
+
+
+def test_labels_of_a_page_have_short_names_and_sentences_whole_ones():
+    others = 'bags/panda_joint2', 'panda_joint2.mcap', 'panda_joint21'
+    blocks = (
+        Paragraph('See panda_joint3.'),
+        DataTable(('Joint',), [(one,) for one in ('panda_joint2', *others)]),
+    )
+    page = Page('', '', Paragraph(''), [Section('A', blocks)], names=PANDA).html()
+    for text in ('See panda_joint3', '>joint2<', *(f'>{one}<' for one in others)):
+        assert text in page
+
+
+def test_parameters_are_drawn_with_interval_and_truth(case):
+    estimate = case.result.estimate
+    t = np.linspace(0.5, 10.0, 50)
+    std = estimate.std * np.sqrt(10.0 / t)[:, np.newaxis]
+    values = estimate.values + std
+    history = [
+        (at, Estimate(estimate.parameters, v, np.diag(s**2)))
+        for at, v, s in zip(t, values, std, strict=True)
+    ]
+    section = convergence_section(history, estimate.values)
+    _, panels = section.blocks
+    shown = {full_label(name): k for k, name in enumerate(estimate.parameters)}
+    assert len(panels.panels) == 6
+    units = {estimate.parameters[shown[label]].unit for label, *_ in panels.panels}
+    assert {'kg m^2', 'N m'} <= units
+    for label, _, (chart,) in panels.panels:
+        k = shown[label]
+        band, curve = chart.series
+        drawn = np.isfinite(curve.y)
+        assert drawn[-1]
+        np.testing.assert_allclose(curve.y[drawn], values[drawn, k])
+        np.testing.assert_allclose((band.upper - band.y)[drawn], 3.92 * std[drawn, k], rtol=1e-3)
+        assert chart.levels[0][0] == estimate.values[k]
