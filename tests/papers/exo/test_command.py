@@ -8,7 +8,6 @@ from armid_ros.papers.exo import command
 from armid_ros.papers.exo.plant.leg_pair import EXERCISES
 import pytest
 
-from docsite.schemas import faults
 from tests.cli.conftest import armid
 
 pytestmark = pytest.mark.slow
@@ -18,11 +17,6 @@ pytestmark = pytest.mark.slow
 def result(tmp_path_factory):
     out = tmp_path_factory.mktemp('exo') / 'result'
     return out, json.loads(armid('exo', '--out', out, '--duration', 2, '--json').stdout)
-
-
-@pytest.mark.long
-def test_the_document_is_as_its_schema_says(result) -> None:
-    assert faults('exo', result[1]) == []
 
 
 @pytest.mark.long

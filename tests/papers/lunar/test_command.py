@@ -6,7 +6,6 @@ import json
 
 import pytest
 
-from docsite.schemas import faults
 from tests.cli.conftest import armid
 
 pytestmark = pytest.mark.slow
@@ -18,10 +17,6 @@ def repeated(tmp_path_factory):
     out = tmp_path_factory.mktemp('lunar') / 'out'
     text = armid('lunar', '--out', out).stdout
     return text, json.loads((out / 'lunar.json').read_text()), (out / 'report.html').read_text()
-
-
-def test_the_document_is_as_its_schema_says(repeated):
-    assert faults('lunar', repeated[1]) == []
 
 
 def test_errors_on_the_moon_are_a_fifth_of_the_papers(repeated):
