@@ -4,11 +4,12 @@
 
 from armid_ros.arm import ArmModel
 from armid_ros.cli import main
-from armid_ros.motion import Motion
 from armid_ros.recording import write_recording
 from click.testing import CliRunner
 import numpy as np
 import pytest
+
+from benchmarks.multisine import multisine
 
 ROBOT = 'humanoid_arm'
 DURATION, RATE = 14, 100  # s, Hz
@@ -21,22 +22,12 @@ def armid(*arguments, code=0):
     return result
 
 
-def bag_of(path, arm, seed, moving=slice(None)):
-    """Write a noisy recording of a motion in closed form, of all joints or of some."""
+def bag_of(path, arm, seed):
+    """Write a noisy recording of a motion in closed form."""
     rng = np.random.default_rng(seed)
     t = np.arange(DURATION * RATE) / RATE
-    q, dq, ddq = np.zeros((3, len(t), 6))
-    for hz, size in ((0.15, 0.5), (0.4, 0.25), (0.9, 0.08)):
-        w = 2 * np.pi * hz
-        angle = w * t[:, None] + rng.uniform(0, 2 * np.pi, 6)
-        q += size * np.sin(angle)
-        dq += size * w * np.cos(angle)
-        ddq -= size * w * w * np.sin(angle)
-    still = np.ones(6, dtype=bool)
-    still[moving] = False
-    q[:, still], dq[:, still], ddq[:, still] = 0.2, 0.0, 0.0
-    motion = Motion(arm.robot.joints, t, q, dq, ddq)
-    noise = 0.01 * rng.normal(size=q.shape)
+    motion = multisine(arm.robot.joints, t, rng, ((0.15, 0.5), (0.4, 0.25), (0.9, 0.08)))
+    noise = 0.01 * rng.normal(size=motion.q.shape)
     measured = motion.with_torque(arm.torque(motion) + noise)
     write_recording(path, measured, robot_description=arm.robot.urdf)
     return path

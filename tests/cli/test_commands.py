@@ -4,7 +4,6 @@
 
 import inspect
 import json
-from pathlib import Path
 import re
 import shlex
 import subprocess
@@ -179,15 +178,6 @@ def test_bad_input_is_one_line_with_the_answer(arguments, message, bags, tmp_pat
     assert not (tmp_path / 'o').exists()
 
 
-def test_a_joint_of_a_bag_with_another_name_is_read_as_the_error_says(bags, tmp_path):
-    text = Path(load_robot(ROBOT).path).read_text(encoding='utf-8')
-    other = tmp_path / 'other.urdf'
-    other.write_text(text.replace('"elbow_pitch"', '"ellbow_pitch"'), encoding='utf-8')
-    asked = ('inspect', bags[0], '--robot', other)
-    (rule,) = re.findall(r'--rename ([a-z_]+:[a-z_]+)', armid(*asked, code=2).stderr)
-    armid(*asked, '--rename', rule)
-
-
 FILLING = {
     'identify': ('identify', '{bag}', '--robot', ROBOT),
     'diagnose': ('diagnose', '{bag}', '--robot', ROBOT),
@@ -216,15 +206,6 @@ def test_an_empty_out_does_not_fill_the_current_folder(command, bags, tmp_path, 
     arguments = [one.format(bag=bags[0]) for one in FILLING[command]]
     armid(*arguments, '--out', '', code=2)
     assert not list(tmp_path.iterdir())
-
-
-def test_an_effect_that_makes_a_link_no_body_is_named(tmp_path):
-    """The mass is as far from the joint as its first moment says, and has no inertia there."""
-    effect = 'payload@wrist_pitch:payload_m=0.4,payload_mz=0.4'
-    said = armid('simulate', '--robot', ROBOT, '--effect', effect, '--out', tmp_path / 'x', code=2)
-    (line,) = (line for line in said.stderr.splitlines() if not PROGRESS.fullmatch(line))
-    assert 'hand' in line
-    assert not (tmp_path / 'x').exists()
 
 
 def test_passwords_are_in_no_page(tmp_path, monkeypatch):

@@ -15,20 +15,14 @@ from armid_ros.robots import collision_model, load_robot
 import numpy as np
 import pytest
 
+from tests.serial_arm import serial_arm
+
 from .conftest import armid, DURATION, RATE, ROBOT
 
 pytestmark = pytest.mark.slow
 
 QUICK = ('--duration', 8, '--starts', 1, '--iterations', 3)
 Z = np.array([0.0, 0.0, 1.0])
-HINGE = (
-    '<robot name="hinge"><link name="base"/><link name="rod"><inertial><origin xyz="0.1 0 0.4"/>'
-    '<mass value="1"/><inertia ixx="0.1" ixy="0" ixz="0" iyy="0.1" iyz="0" izz="0.1"/></inertial>'
-    '<collision><origin xyz="0 0 0.2"/><geometry><cylinder radius="0.03" length="0.4"/></geometry>'
-    '</collision></link><joint name="hinge" type="{kind}"><origin xyz="0 0 0.5"/>'
-    '<parent link="base"/><child link="rod"/><axis xyz="0 1 0"/>'
-    '<limit lower="-1.5" upper="1.5" velocity="2" effort="20"/></joint></robot>'
-)
 
 
 def excite(robot, out, *options, code=0):
@@ -79,7 +73,7 @@ def test_a_recording_where_the_trajectory_goes_is_not_replaced(tmp_path, bags):
 @pytest.mark.filterwarnings('error')
 def test_an_arm_of_one_joint_is_excited(tmp_path, kind, criterion):
     urdf = tmp_path / 'hinge.urdf'
-    urdf.write_text(HINGE.format(kind=kind))
+    urdf.write_text(serial_arm(f'hinge {kind} 0,1,0 0,0,0.5', centre='0.1 0 0.4'))
     options = ('--criterion', criterion)
     if criterion == 'T':
         size = ('--effect', 'quadratic_friction:quadratic_coefficient=0.05')

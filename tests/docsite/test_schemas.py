@@ -5,13 +5,12 @@
 import json
 
 import armid_ros as ar
-from armid_ros.cli import main
 from armid_ros.identification import PhysicalSettings
-from click.testing import CliRunner
 from jsonschema import Draft202012Validator
 import pytest
 
 from docsite.schemas import faults, FOLDER, SUFFIX
+from tests.cli.conftest import armid
 
 NAMES = sorted(path.name.removesuffix(SUFFIX) for path in FOLDER.glob(f'*{SUFFIX}'))
 
@@ -29,22 +28,15 @@ def test_a_schema_is_one_and_describes_what_it_names(name):
     assert schema['properties']['schema']['const'].startswith('armid/')
 
 
-def armid(*arguments):
-    result = CliRunner().invoke(main, [str(argument) for argument in arguments])
-    assert result.exit_code == 0, result.output
-    return result.stdout
-
-
 def test_an_identification_among_boxes(at_desk):
     box = PhysicalSettings(boxes={'elbow': ((-0.1, -0.1, -0.1), (0.1, 0.1, 0.1))})
     check('identification', ar.identify('my_arm.urdf', 'monday', physical=box).document())
 
 
 def test_a_check_of_a_description(at_desk):
-    words = ['check', 'my_arm.urdf', 'friday', '--strict', '--out', 'checked']
-    assert CliRunner().invoke(main, words).exit_code == 3
+    armid('check', 'my_arm.urdf', 'friday', '--strict', '--out', 'checked', code=3)
     check('check', json.loads((at_desk / 'checked' / 'check.json').read_text()))
-    check('check', json.loads(armid('check', 'my_arm.urdf', '--json')))
+    check('check', json.loads(armid('check', 'my_arm.urdf', '--json').stdout))
 
 
 def test_a_diagnosis_with_everything(at_desk):
@@ -56,8 +48,8 @@ def test_a_diagnosis_with_everything(at_desk):
 
 
 def test_an_inspection(at_desk):
-    check('inspection', json.loads(armid('inspect', 'monday', '--robot', 'my_arm.urdf', '--json')))
-    check('inspection', json.loads(armid('inspect', 'monday', '--json')))
+    for robot in (('--robot', 'my_arm.urdf'), ()):
+        check('inspection', json.loads(armid('inspect', 'monday', *robot, '--json').stdout))
 
 
 def test_a_key_that_no_schema_has_and_a_value_of_another_kind_are_faults(at_desk):

@@ -7,11 +7,11 @@ import subprocess
 
 import armid_ros as ar
 from armid_ros.cli.export.dynamics import DEAD_BAND, torque_code, torque_tables
-from armid_ros.effects import joint_columns
 from armid_ros.effects.traits import Traits
 import numpy as np
 import pytest
 
+from tests.effects.test_registry import Hose
 from tests.simulation.test_compiled import TREE
 
 STATES = 100
@@ -88,21 +88,15 @@ def test_cpp_computes_the_torque_of_the_model(arm, states, tmp_path):
     require_equal(np.array(done.stdout.split(), float).reshape(STATES, -1), arm, states)
 
 
-class Hose(ar.Effect):
+class UsualHose(Hose):
     """A law of a user that is fitted by default."""
 
-    name = 'hose'
-    summary = 'hose that stiffens as it bends'
-    quantities = (ar.Quantity('hose_stiffness', 'N m/rad^3'),)
     traits = Traits(usual=True)
-
-    def columns(self, motion, arm):
-        return joint_columns(self, motion, motion.q**3)
 
 
 def test_an_effect_of_a_user_is_named_and_is_no_offset():
     arm = ar.ArmModel.of('humanoid_arm')
-    arm = arm.with_effect(Hose.on(arm.robot, ('elbow_pitch',)), [2.0])
+    arm = arm.with_effect(UsualHose.on(arm.robot, ('elbow_pitch',)), [2.0])
     tables, left_out = torque_tables(arm)
     assert not tables['OFFSET'].any()
     assert any('hose' in line and 'elbow_pitch' in line for line in left_out)
