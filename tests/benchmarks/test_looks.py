@@ -7,8 +7,9 @@ import subprocess
 
 import pytest
 
-from benchmarks.looks import clean_commit, look, results_of
+from benchmarks.looks import clean_commit, LOG, look, results_of
 from benchmarks.metrics import Metric
+from benchmarks.rates import PAGE, page, PUBLIC, PUBLIC_PAGE, public_page, RATES
 
 
 @pytest.fixture
@@ -55,3 +56,14 @@ def test_code_that_is_in_no_commit_does_not_look(log):
     with pytest.raises(SystemExit, match=r'code\.py'), look('lived, locked', log):
         raise AssertionError
     assert not log.exists()
+
+
+def test_the_page_is_up_to_date_and_short():
+    made = page(LOG.read_text(encoding='utf-8'), RATES.read_text(encoding='utf-8'))
+    assert PAGE.read_text(encoding='utf-8') == made  # `python -m benchmarks.rates` writes it
+    assert len(made.splitlines()) <= 80
+
+
+def test_the_page_of_the_public_benchmark_is_up_to_date():
+    made = public_page(PUBLIC.read_text(encoding='utf-8'))
+    assert PUBLIC_PAGE.read_text(encoding='utf-8') == made

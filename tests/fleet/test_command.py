@@ -79,8 +79,3 @@ def test_watch_takes_options_of_a_project(tmp_path, monkeypatch):
     (tmp_path / 'armid.toml').write_text('alpha = 0.1\n[fleet.watch]\nout = "results"\n')
     said = armid('fleet', 'watch', code=2).stderr
     assert '--alpha 0.1' in said and '--out results' in said
-
-
-def test_a_cutoff_that_is_not_finite_is_refused():
-    said = armid('fleet', 'identify', 'bags', '--out', 'o', '--cutoff', 'nan', code=2).output
-    assert "'--cutoff'" in said and 'nan' in said
