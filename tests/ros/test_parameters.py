@@ -2,11 +2,18 @@
 # SPDX-License-Identifier: Apache-2.0
 """Every parameter of every node is described, checked, and refused with what to do instead."""
 
+import gc
+
 from armid_ros.nodes.base import ArmidNode
 from armid_ros.nodes.parameters.table import NodeParameter, ParameterError
 from armid_ros.nodes.recorder import RecorderNode
+from armid_ros.nodes.running.process import _made, steady, unreadable
 import pytest
+import rclpy
+from rclpy._rclpy_pybind11 import RCLError, UnknownROSArgsError
+from rclpy.context import Context
 from rclpy.parameter import Parameter
+from threadpoolctl import threadpool_info, threadpool_limits
 
 TABLE = (
     NodeParameter('rate', 100.0, 'How often.', 'Hz', limits=(1.0, 1000.0), read_only=False),
@@ -107,3 +114,46 @@ def test_a_refused_parameter_is_said_on_rosout_and_counted_on_diagnostics(bench,
     values = {v.key: v.value for v in status.values}
     assert values['rejected parameter'] == '3'
     assert sum('chunk_age' in m.msg for m in rosout) == 1
+
+
+@pytest.mark.parametrize(
+    'arguments',
+    [
+        ['-p', 'bag'],
+        ['-r', '__node:=not-a-name'],
+        ['--params-file', 'nope.yaml'],
+        ['--log-level', 'x'],
+        ['--nonsense'],
+    ],
+)
+def test_what_ros_cannot_read_is_named(arguments):
+    with pytest.raises((RCLError, UnknownROSArgsError)) as error:
+        Context().init(['--ros-args', *arguments])
+    said = unreadable(error.value)
+    assert ' '.join(arguments) in said and 'NAME:=VALUE' in said and ' at /' not in said
+
+
+def test_a_file_that_is_none_of_parameters_is_named_with_the_line(tmp_path):
+    path = tmp_path / 'run.yaml'
+    path.write_text('recorder:\n  rate: 3\n')
+    with pytest.raises(RCLError) as error:
+        Context().init(['--ros-args', '--params-file', str(path)])
+    assert str(path) in unreadable(error.value) and 'line 2' in unreadable(error.value)
+
+
+def test_arguments_that_are_none_of_ros_are_named():
+    try:
+        with pytest.raises(ParameterError, match=r'robot:=my_arm\.urdf: .*NAME:=VALUE'):
+            _made(RecorderNode, ['robot:=my_arm.urdf', '--ros-args', '-p', 'record:=false'])
+    finally:
+        rclpy.try_shutdown()
+
+
+def test_linear_algebra_has_one_thread_and_old_objects_are_not_looked_through():
+    def threads():
+        return {library['num_threads'] for library in threadpool_info()}
+
+    with threadpool_limits(limits=2):
+        with steady():
+            assert threads() == {1} and gc.get_freeze_count() > 0
+        assert 2 in threads() and gc.get_freeze_count() == 0
