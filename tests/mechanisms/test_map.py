@@ -200,7 +200,7 @@ def test_couplings_that_cannot_be(inside, more, message):
 
 def test_a_passive_joint_cannot_be_driven_and_a_faulty_file_of_coupled_joints_is_named(tmp_path):
     text = load('palletiser', tmp_path).urdf
-    with pytest.raises(RobotError, match="'elbow' is passive"):
+    with pytest.raises(RobotError, match="'elbow' is a passive joint"):
         load_robot(text, joints=['j1', 'elbow'])
     path = tmp_path / 'arm.urdf'
     path.write_text(ARM.format(inside='', more='', shape=''))
