@@ -43,7 +43,7 @@ _PRIOR_STD = {'torque_offset': 1.0, 'coulomb_torque': 1.0, 'gain_error': 0.5, 'p
 _PRIOR_STD |= {'tilt_x': 0.3, 'tilt_y': 0.3, 'gravity_difference': 2.0}
 _PRIOR_STD |= dict.fromkeys(('payload_mx', 'payload_my', 'payload_mz'), 0.1)
 #: Remedy for most quantities that are not determined.
-_REMEDY = 'record a run of armid zero plan'
+_REMEDY = 'record a trajectory of armid zero plan'
 
 
 @dataclass(frozen=True)
@@ -288,7 +288,7 @@ def _quantities(
         if name == 'mass':
             tool = abs(value) > half
         elif reason and name.startswith('center') and not tool:
-            reason = 'no mass of a tool is found; give --known tool'
+            reason = 'no tool mass was found; give --known tool'
         found.append(FittedQuantity(name, joint, unit, value, half, reason))
     return tuple(found)
 
@@ -306,7 +306,7 @@ def _reason(arm: ArmModel, solved: _Solution, slope: FloatArray, limit: float) -
     if 'payload' in names:
         remedy = 'record a known payload as well (--payload), or give --known tool'
     elif 'gain_error' in names:
-        remedy = 'gravity hardly turns the joint: give --known gain, or record it with a tool'
+        remedy = 'the weight torque is too small: give --known gain, or record with a tool'
     elif own.name == 'coulomb_torque':
         remedy = _REMEDY
     mixed = f'not separable from {other.words} of {other.joint or "the base"}'
