@@ -242,7 +242,7 @@ class _Problem:
 def _errors(
     information: FloatArray, scores: FloatArray, chosen: npt.NDArray[np.intp]
 ) -> tuple[FloatArray, FloatArray]:
-    """Return covariance and standard errors of the `chosen` parameters, over their sizes."""
+    """Return covariance and standard errors of `chosen` parameters, divided by typical sizes."""
     inside = information[np.ix_(chosen, chosen)] + np.eye(len(chosen)) / _PRIOR_STD**2
     covariance = np.linalg.inv(inside)
     blocks = len(scores)

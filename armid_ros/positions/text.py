@@ -128,8 +128,8 @@ def fit_summary(found: PositionFit, document: dict[str, Any], step: str) -> Summ
         text = f'agree with the data within {100.0 * 1.96 * error.max():.2g} %'
         if differs.any():
             places = np.flatnonzero(differs)
-            text = 'differ from the data: ' + ', '.join(
-                f'{ratio[k]:.3g} ± {1.96 * error[k]:.1g} times at {joints[k]}' for k in places
+            text = 'differ from the data, which fit ' + ', '.join(
+                f'{ratio[k]:.3g} ± {1.96 * error[k]:.1g} times that of {joints[k]}' for k in places
             )
         lines.append(f'given position gains {text}')
     for reason, names in _reasons(found).items():
