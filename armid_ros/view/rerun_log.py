@@ -142,18 +142,18 @@ def log_recording(
     for j, joint in enumerate(robot.moving):
         turns = Rotation.from_matrix(frames[j].rotation.transpose(2, 0, 1)).as_quat()
         moved = rr.Transform3D.columns(translation=frames[j].origin.T, quaternion=turns)
-        stream.send_columns(f'arm/{_part(joint)}', [_times(poses.t)], moved)
+        stream.send_columns(f'arm/{_escaped(joint)}', [_times(poses.t)], moved)
     for j, joint in enumerate(robot.joints):
         for entity, at, values in curves:
             column = rr.Scalars.columns(scalars=values[:, j])
-            stream.send_columns(entity.format(_part(joint)), [_times(at)], column)
+            stream.send_columns(entity.format(_escaped(joint)), [_times(at)], column)
         for entity, name, colour in (
             ('torque/{}/measured', 'measured', (140, 145, 150)),
             ('torque/{}/predicted', 'predicted', (213, 94, 0)),
             ('residual/{}', f'residual {joint}', (0, 114, 178)),
         ):
             style = rr.SeriesLines(colors=colour, names=name)
-            stream.log(entity.format(_part(joint)), style, static=True)
+            stream.log(entity.format(_escaped(joint)), style, static=True)
     stream.send_blueprint(_layout(robot.joints, marked))
     stream.flush()
     return notes
@@ -171,7 +171,7 @@ def _log_bodies(stream: Any, robot: Robot, marked: Sequence[str]) -> list[str]:
         if joint == 0:
             return 'arm/base', grey
         name = robot.moving[joint - 1]
-        return f'arm/{_part(name)}', red if name in marked else grey
+        return f'arm/{_escaped(name)}', red if name in marked else grey
 
     for shape in shapes_of(robot, 'visual', 'collision'):
         where, colour = place(int(robot.model.frames[shape.frame].parentJoint))
@@ -183,7 +183,7 @@ def _log_bodies(stream: Any, robot: Robot, marked: Sequence[str]) -> list[str]:
         except RobotError as error:
             notes.append(f"link '{shape.link}': {error}; not drawn")
             continue
-        entity = f'{where}/{_part(shape.link)}_{shape.number}'
+        entity = f'{where}/{_escaped(shape.link)}_{shape.number}'
         turn = Rotation.from_matrix(np.array(shape.placement.rotation)).as_quat()
         pose = rr.Transform3D(
             translation=np.array(shape.placement.translation),
@@ -225,7 +225,7 @@ def _layout(joints: Sequence[str], marked: Sequence[str]) -> Any:
     def plots(kind: str, names: Sequence[str]) -> list[Any]:
         return [
             layout.TimeSeriesView(
-                origin=f'{kind}/{_part(joint)}',
+                origin=f'{kind}/{_escaped(joint)}',
                 name=joint,
                 plot_legend=layout.PlotLegend(visible=number == 0),  # the same in all views
             )
@@ -244,7 +244,7 @@ def _layout(joints: Sequence[str], marked: Sequence[str]) -> Any:
     return layout.Blueprint(layout.Horizontal(arm, tabs), collapse_panels=True)
 
 
-def _part(name: str) -> str:
+def _escaped(name: str) -> str:
     """Escape the name of a joint or link for use in the path of a rerun entity."""
     return str(rerun().escape_entity_path_part(name))
 
