@@ -104,7 +104,7 @@ class Residual:
             if one.held_out is not None:
                 alone = f' ({percent(one.held_out)} of held-out recordings)'
                 if one.held_out < 0.0:
-                    alone = ' (held-out recordings get worse: they leave the range of its data)'
+                    alone = ' (held-out recordings get worse: they leave the training data)'
             like = 'no formula of few terms'
             if one.law is not None:
                 like = f'{one.law.text} ({percent(one.law.share)})'
@@ -117,7 +117,7 @@ class Residual:
     def steps(self) -> list[str]:
         """Return the next step of the user, as a sentence for each joint with a learned map."""
         return [
-            f'Inspect gear, cables and stops of {one.joint} where its map is strong.'
+            f'Inspect gear, cables and stops of {one.joint} where the learned torque is large.'
             if one.law is None
             else f'If {one.law.text} is plausible for {one.joint}, write it as an effect of your '
             'own and diagnose again.'
@@ -160,9 +160,9 @@ class Residual:
             [
                 Paragraph(
                     'No effect of the catalogue explains the residual of these joints. A Gaussian '
-                    'process over position, velocity and load has learned it. model.yaml has it '
-                    f'as an effect, {self.table_file} as a table. It is zero where there were no '
-                    'data. Shares are of the squared residual in cross-validation, and in '
+                    'process over position, velocity and load predicts it. model.yaml has this '
+                    f'map as an effect, {self.table_file} as a table. The map is zero where there '
+                    'were no data. Shares are of the squared residual in cross-validation, and in '
                     'held-out recordings close to the data.'
                 ),
                 DataTable(heads, rows, (0, 5)),
