@@ -179,7 +179,9 @@ def _limit_remarks(robot: Robot) -> Iterator[Remark]:
         elif max(speed, usual) < np.inf and not usual / apart < speed < usual * apart:
             doubt = f'velocity limit {speed:g} rad/s, but the median joint has {usual:g}'
         if doubt:
-            yield Remark('doubt', f"joint '{robot.joints[k]}': {doubt}; is it off by ten?")
+            yield Remark(
+                'doubt', f"joint '{robot.joints[k]}': {doubt}; is it wrong by a factor of ten?"
+            )
     parents = list(robot.model.parents)
     if turns and parents == [0, *range(len(parents) - 1)] and np.isfinite(speeds[turns]).all():
         steps = np.array([np.linalg.norm(p.translation) for p in robot.model.jointPlacements])
@@ -187,7 +189,8 @@ def _limit_remarks(robot: Robot) -> Iterator[Remark]:
         if tip > 24.0 or 0.0 < tip < 0.24:  # [m/s]; arms have 1 to 6
             yield Remark(
                 'doubt',
-                f'velocity limits move the last joint at {tip:.3g} m/s; are they off by ten?',
+                f'velocity limits move the last joint at {tip:.3g} m/s; are they wrong by a '
+                'factor of ten?',
             )
 
 

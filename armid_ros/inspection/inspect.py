@@ -11,12 +11,7 @@ from typing import Any, get_args, Literal
 from armid_ros.identification.assess.sensor_faults import encoder_faults, velocity_faults
 from armid_ros.identification.rows.checks import beyond_limits, short_recording_note, SILENT
 from armid_ros.identification.rows.stamps import rounded_stamps, two_senders
-from armid_ros.inspection.facts import (
-    joint_facts,
-    JointFacts,
-    Sampling,
-    TrialFit,
-)
+from armid_ros.inspection.facts import joint_facts, JointFacts, Sampling, TrialFit
 from armid_ros.recording import Recording, Topic
 from armid_ros.robots import driven_in_words, held_joints, Robot
 import numpy as np
@@ -93,7 +88,7 @@ class Inspection:
             return f'Graded {self.trial.grade} by `armid identify`{why}'
         return (
             f'Ready for `armid identify`: {self.trial.rank} of {self.trial.theory} parameters are '
-            f'distinguishable (quick fit: {self.trial.relative_error_percent:.1f} % error).'
+            f'identifiable (trial fit: {self.trial.relative_error_percent:.1f} % error).'
         )
 
     @property
@@ -270,7 +265,7 @@ def _unit_remarks(
         yield Remark('doubt' if fault.word == 'good' else 'bad', fault.what)
     empty = [j.name for j in joints if j.velocity_ratio == 0.0]  # noqa: RUF069 - zeros as recorded
     if empty:
-        yield Remark('doubt', f'velocities of {", ".join(empty)} are zero while they move')
+        yield Remark('doubt', f'velocities of {", ".join(empty)} are zero, but positions change')
 
 
 def _motion_remarks(joints: tuple[JointFacts, ...], sampling: Sampling) -> Iterator[Remark]:
