@@ -13,7 +13,7 @@ _GUARDED = ('=', '+', '-', '@', '#', '\t', '\r', "'")
 
 def csv_text(rows: Iterable[Sequence[str]]) -> str:
     """
-    Format table rows as CSV text; the first cell of each row is a name, which is escaped.
+    Format rows as CSV text; the first cell of each row is a name, which is quoted if needed.
 
     A name that begins like a formula of a spreadsheet gets an apostrophe as prefix. Quotes are
     added if needed.
