@@ -377,7 +377,7 @@ class ArmModel:
         return tau
 
     def neighbours(self, period: float) -> int:
-        """Return the number of samples on each side of a sample that influence its reading."""
+        """Return the number of neighbouring samples on each side that affect a torque reading."""
         action = self._acting
         if action.displacement is None and action.reading_memory == 0.0:  # noqa: RUF069 - of laws, never computed
             return 0

@@ -138,7 +138,7 @@ def misfit_of_block(block: Any) -> Misfit:
     if data not in _DATA:
         raise ModelError(f"misfit: 'data' is '{data}', but has to be {' or '.join(_DATA)}")
     if loud is not None and not loud.keys() >= rms.keys():
-        raise ModelError(f"misfit: 'torque_rms' has no joint '{min(rms.keys() - loud.keys())}'")
+        raise ModelError(f"misfit: joint '{min(rms.keys() - loud.keys())}' has no 'torque_rms'")
     relative = finite(error, 'relative_error_percent of the misfit')
     return Misfit(data, rms, relative, loud, filters=filters)
 

@@ -105,7 +105,7 @@ class EffectCase:
 
 
 def sines(robot: Robot, duration: float = 0.5, rate: float = 200.0) -> Motion:
-    """Return a motion in which joints follow sines of different frequency, inside limits."""
+    """Return a motion in which joints follow sines of different frequencies in their limits."""
     t = np.arange(0.0, duration, 1.0 / rate)
     frequency = 2.0 * np.pi * np.linspace(0.4, 2.1, robot.n_joints)
     phase = frequency * t[:, np.newaxis] + np.arange(robot.n_joints)
@@ -161,7 +161,7 @@ def check_effect(kind: type[Effect], robot: Robot | None = None) -> None:
 
 
 def docstring_bounds_and_names_are_valid(trial: EffectCase) -> None:
-    """Fail if the effect class lacks a docstring, or its bounds and names are invalid."""
+    """Fail if the effect class lacks a docstring, valid bounds or distinct parameter names."""
     kind = type(trial.effect)
     assert kind.__doc__ and not kind.__doc__.startswith(f'{kind.__name__}('), 'it has no docstring'
     for quantity in kind.quantities:
