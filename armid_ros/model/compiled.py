@@ -106,7 +106,7 @@ def kernel_body(
     robot: Robot, added_inertia: FloatArray | None = None, weighs: bool = True
 ) -> BodyOfKernel | None:
     """
-    Convert the rigid body of a robot to the format of the compiled kernel, or return None.
+    Convert a robot to the format of the compiled kernel; None if the kernel is not usable.
 
     Parameters
     ----------

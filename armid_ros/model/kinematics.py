@@ -151,7 +151,7 @@ class LinkFrames:
 
 
 def _cross(a: FloatArray, b: FloatArray) -> FloatArray:
-    """Return the cross products of the columns of two arrays (3, N), shape (3, N)."""
+    """Return the cross products (3, N) of the columns of two arrays (3, N)."""
     result = np.empty(b.shape)
     for x, y, z in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
         result[x] = a[y] * b[z] - a[z] * b[y]

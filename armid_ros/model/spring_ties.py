@@ -81,7 +81,7 @@ class TieGeometry(NamedTuple):
 
 
 def extension(way: FloatArray, slack: float | FloatArray) -> FloatArray:
-    """Shorten spring vectors (..., 3) by a slack [m]; vectors shorter than the slack become 0."""
+    """Return the stretch of springs (..., 3): vectors `way` minus the slack [m], or 0 if slack."""
     # the direction of a vector shorter than this [m] is undefined
     length = np.maximum(np.linalg.norm(way, axis=-1), 1e-12)
     return np.asarray(np.maximum(1.0 - slack / length, 0.0)[..., np.newaxis] * way)

@@ -168,7 +168,7 @@ def _set_inertial(link: minidom.Element, parameters: FloatArray) -> None:
 
 
 def _check(robot: Robot, urdf: str) -> None:
-    """Raise ModelError if the inertial parameters of a written URDF differ from the robot's."""
+    """Raise ModelError if a written URDF does not have the inertial parameters of the robot."""
     read = robot_from_urdf(urdf, joints=robot.joints, source=robot.name)
     wanted = robot.rigid_parameters
     worst = np.max(np.abs(read.rigid_parameters - wanted).reshape(-1, PER_LINK), axis=1)
