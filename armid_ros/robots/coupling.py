@@ -20,7 +20,7 @@ import pinocchio as pin
 
 def moving_joints(description: Description, driven: Sequence[str]) -> tuple[str, ...]:
     """
-    Return the joints that move a link if the joints `driven` are driven, in file order.
+    Return the names of joints that move a link when `driven` joints move, in file order.
 
     A driven joint that others follow is a motor without a body if neither its link nor the links
     that it carries have inertia.
@@ -46,7 +46,7 @@ def moving_joints(description: Description, driven: Sequence[str]) -> tuple[str,
 
 def couple(tree: Robot, driven: Sequence[Joint], known: Mapping[str, float]) -> Robot:
     """
-    Return the robot with only the joints `driven` driven; other moving joints follow them.
+    Return the robot in which only `driven` joints are driven, and coupled joints follow.
 
     Parameters
     ----------
@@ -164,7 +164,7 @@ def _narrowed_limits(
             upper[acts] = np.minimum(upper, middle + room)[acts]
     if np.any(lower >= upper):
         raise RobotError(
-            'the position limits of coupled joints leave no range for the joints that drive them; '
+            'the position limits of coupled joints leave no range of motion for driven joints; '
             'widen these limits in the description'
         )
     return lower, upper
@@ -200,8 +200,8 @@ def _closing_range(
             break
     else:
         raise RobotError(
-            'a closed loop of the description does not close with its driven joints near zero, or '
-            'only with passive joints beyond their limits; correct the points or these limits'
+            'a closed loop of the description does not close near zero positions of driven joints '
+            'within the limits of passive joints; correct the points of the loop or these limits'
         )
     ends[:, own] = (start + share / 1.1 * (ends - start))[:, own]
     within = [np.maximum(lower, ends[0]), np.minimum(upper, ends[1])]

@@ -40,7 +40,7 @@ def inertia_attributes(tensor: FloatArray) -> dict[str, str]:
 
 @dataclass(frozen=True)
 class Inertial:
-    """Mass [kg] of a link, pose of its centre of mass [m, rad], and its inertia [kg m^2]."""
+    """Mass [kg], pose of the centre of mass [m, rad] and inertia [kg m^2] of a link."""
 
     mass: float
     xyz: Vector
@@ -79,7 +79,7 @@ class Mimic:
 
     @property
     def joint(self) -> str:
-        """Name of the leader, or of the first of several leaders."""
+        """Name of the leader joint, or of the first of several leader joints."""
         return next(iter(self.multipliers))
 
 
@@ -312,8 +312,8 @@ def _inertial(link: ElementTree.Element, name: str) -> Inertial | None:
     )
     if inertial.mass < 0.0:
         raise RobotError(
-            f'{link_name} has a negative mass, {inertial.mass:g} kg: correct it, or export the '
-            'URDF of an identification with --physical'
+            f'{link_name} has a negative mass, {inertial.mass:g} kg: correct the mass, or export '
+            'the URDF of an identification with --physical'
         )
     return inertial
 
@@ -429,7 +429,7 @@ def _number(
     *,
     endless: bool = False,
 ) -> float:
-    """Read a number from an XML attribute; infinite numbers need `endless`."""
+    """Read a number from an XML attribute; infinity is allowed only if `endless` is True."""
     text = element.get(name, '' if default is None else repr(default))
     attribute = f"{where}: {name}='{text}' of <{element.tag}>"
     try:

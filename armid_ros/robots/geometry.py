@@ -312,7 +312,7 @@ def collision_model(
 
 
 def _leave_out_touching(robot: Robot, geometry: pin.GeometryModel) -> tuple[tuple[str, str], ...]:
-    """Remove collision pairs of links that touch in the zero pose; return these links sorted."""
+    """Remove collision pairs of links that touch in the zero pose; return these pairs, sorted."""
     data, placed = robot.model.createData(), geometry.createData()
     pin.computeDistances(robot.model, data, geometry, placed, robot.positions(robot.zero_pose))
     touching = {
@@ -327,7 +327,7 @@ def _leave_out_touching(robot: Robot, geometry: pin.GeometryModel) -> tuple[tupl
 
 
 def _leave_out_separate(robot: Robot, geometry: pin.GeometryModel) -> None:
-    """Remove pairs of bodies next to a joint that cannot touch in the range of this joint."""
+    """Remove collision pairs across one joint that never touch within the range of the joint."""
     robot = robot.tree
     data, placed = robot.model.createData(), geometry.createData()
     by_joint: dict[int, list[int]] = {}

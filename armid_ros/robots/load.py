@@ -224,7 +224,7 @@ def robot_from_urdf(
         moved = np.maximum(moved, np.abs(np.diag(pin.crba(model, model.createData(), q))))
     light = (
         f"link '{link}', moved by joint '{joint}', has no <inertial>, nor has any link after it. "
-        'Its inertia can be identified, but a simulation needs a rough one'
+        'The inertia can be identified, but a simulation needs a rough value'
         for joint, link, inertia in zip(robot.joints, robot.links, moved, strict=True)
         if inertia < 1e-12  # kg m^2 or kg; the smallest motor rotor has 1e5 times as much
     )

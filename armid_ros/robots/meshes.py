@@ -50,7 +50,7 @@ def find_mesh(name: str, urdf: Path | None) -> Path | None:
 
 
 def load_mesh(path: Path, scale: FloatArray) -> Any:
-    """Load a mesh file as a scaled mesh of coal; RobotError if the file is not a mesh."""
+    """Load a mesh file as a scaled mesh of the library coal; RobotError if it is no mesh."""
     try:
         return coal.MeshLoader().load(str(path), scale)
     except (RuntimeError, ValueError) as error:
@@ -120,7 +120,7 @@ def _slabs(
 
 
 def _join(slabs: Sequence[coal.ConvexBase]) -> tuple[coal.ConvexBase, ...]:
-    """Merge neighbouring hulls, first those whose common hull adds the least volume."""
+    """Merge neighbouring hulls, first the pair whose common hull adds the least volume."""
     bodies = list(slabs)
     apart = [body.computeVolume() for body in bodies]
     common = [_common_hull(*pair) for pair in pairwise(bodies)]

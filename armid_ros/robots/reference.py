@@ -149,8 +149,8 @@ class Reference:
         for joint in self.joints:
             if joint not in robot.joints:
                 raise TrajectoryError(
-                    f"trajectory: joint '{joint}' is not one of {robot.name}; its driven joints "
-                    f'are {listed}'
+                    f"trajectory: joint '{joint}' is not a driven joint of {robot.name}; driven "
+                    f'joints: {listed}'
                 )
         for joint in robot.joints:
             if joint not in self.joints:
@@ -161,7 +161,7 @@ class Reference:
         return self if self.joints == robot.joints else self.of_joints(robot.joints)
 
     def of_joints(self, joints: tuple[str, ...]) -> Reference:
-        """Return the reference of only the joints `joints`, in this order."""
+        """Return the reference of the named joints only, in the order of `joints`."""
         order = [self.joints.index(joint) for joint in joints]
         return self._waypoints(joints, self.t, (slice(None), order))
 

@@ -277,7 +277,7 @@ class Robot:
         return np.asarray((lower + upper) / 2)
 
     def position_range(self) -> tuple[FloatArray, FloatArray]:
-        """Return lower and upper positions (n,), +-`UNLIMITED_HALF_RANGE` if unlimited."""
+        """Return lower and upper position limits (n,), +-`UNLIMITED_HALF_RANGE` if unlimited."""
         return position_range(self.lower, self.upper)
 
     def index(self, joint: str) -> int:

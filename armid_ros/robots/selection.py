@@ -88,7 +88,7 @@ def several_arms(description: Description, driven: Sequence[str]) -> tuple[str, 
     if len(arms) < 2:
         return ()
     begins = ', '.join(f"'{arm[0]}' ({len(arm)} joints)" for arm in arms)
-    return (f'{len(arms)} arms are driven, beginning with {begins}; --joints A,B,... takes one',)
+    return (f'{len(arms)} arms are driven, beginning with {begins}; --joints A,B,... selects one',)
 
 
 def _arms(description: Description, joints: Sequence[str]) -> list[list[str]]:
@@ -120,7 +120,7 @@ def driven_in_words(robot: Robot) -> tuple[str, ...]:
     most = 8  # joints are named
     more = f' and {len(locked) - most} more' if len(locked) > most else ''
     named = ', '.join(locked[:most])
-    return (f'not driven, and locked: {named}{more}; --joints A,B,... chooses others', *arms)
+    return (f'not driven, and locked: {named}{more}; --joints A,B,... selects others', *arms)
 
 
 def joints_beside_arms(robot: Robot) -> tuple[str, ...]:
@@ -247,7 +247,7 @@ def _by_name(description: Description, names: Sequence[str]) -> tuple[Joint, ...
 
 
 def _carriers(description: Description, joints: Iterable[str]) -> set[str]:
-    """Return the names of all joints between the base and the joints `joints`."""
+    """Return the names of all joints between the base and any joint of `joints`."""
     by_child = {joint.child: joint for joint in description.joints}
     found: set[str] = set()
     for joint in joints:
