@@ -153,8 +153,8 @@ def read_metadata(bag: Path) -> BagMetadata:
                     counts[name] = counts.get(name, 0) + count
     except RecordingError as error:
         raise RecordingError(
-            f'{path}: the file is not a valid metadata.yaml ({str(error).lstrip(": ")}); move it '
-            'elsewhere to read the bag without it'
+            f'{path}: the file is not a valid metadata.yaml ({str(error).lstrip(": ")}); to read '
+            'the bag without this file, move the file elsewhere'
         ) from error
     # Up to version 3 the paths began with the name of the directory.
     files = tuple(bag / Path(name).name for name in names)

@@ -212,7 +212,7 @@ def assembled(
             hint = f"; if '{found}' is '{missing[0]}', use --rename {found}:{missing[0]}{hint}"
         question = ''
         if not present and not rule:
-            question = '; is it another robot? If only the names differ, use --rename OLD:NEW'
+            question = '; is this another robot? If only the names differ, use --rename OLD:NEW'
         raise RecordingError(
             f'{where}: the messages lack {"joint" if len(missing) == 1 else "joints"} {listed}; '
             f'their joints are {", ".join(decoder.names_seen)}{question}{hint}'

@@ -280,7 +280,7 @@ def _finite(
 
 def unwrapped(q: FloatArray) -> tuple[FloatArray, list[int]]:
     """
-    Remove jumps by full turns from joint positions; also return the joints with jumps.
+    Remove jumps by full turns from joint positions; also return the indices of these joints.
 
     A joint is wrapped if its positions stay within one turn, and if each step above half a turn
     is about a full turn. The tolerance depends on the other steps of the joint.

@@ -65,8 +65,8 @@ def temperatures(
         if len(strange):
             raise RecordingError(
                 f'{name}: the temperature at {t[strange[0]]:.3f} s is {value[strange[0]]:g}, but '
-                f'has to be from {lowest:g} to {highest:g} degC; convert it to degC, or ignore '
-                'temperatures with --temperature none'
+                f'has to be from {lowest:g} to {highest:g} degC; convert temperatures to degC, or '
+                'ignore temperatures with --temperature none'
             )
         _, first = np.unique(np.floor(t / _MIN_INTERVAL), return_index=True)
         kept.append((t[first], value[first]))

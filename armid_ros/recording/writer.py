@@ -170,7 +170,7 @@ class BagWriter:
 
     @property
     def in_place(self) -> bool:
-        """Whether the storage file was neither deleted nor moved since its creation."""
+        """Whether the storage file is still at the path where it was created."""
         return self._mcap.in_place
 
     @property

@@ -223,7 +223,7 @@ def walk(
     content: bytes | mmap.mmap, begin: int = 0, end: int | None = None
 ) -> tuple[IntArray, list[tuple[int, int, int]], int]:
     """
-    Find messages and definitions in a chunk, by the length that each record states.
+    Find messages and definitions in an MCAP chunk; also return the end of the last record.
 
     Parameters
     ----------

@@ -116,7 +116,7 @@ class McapWriter:
 
     @property
     def in_place(self) -> bool:
-        """Whether the file was neither deleted nor moved since its creation."""
+        """Whether the file is still at the path where it was created."""
         try:
             there, here = os.stat(self._path), os.fstat(self._stream.fileno())
         except (OSError, ValueError):
@@ -124,7 +124,7 @@ class McapWriter:
         return os.path.samestat(there, here)
 
     def add_schema(self, name: str, encoding: str, data: bytes) -> tuple[int, bytes]:
-        """Add a message schema; return its number, and its record for the next chunk."""
+        """Add a message schema; return the schema number, and the record for the next chunk."""
         schema = Schema(id=len(self._schemas) + 1, name=name, encoding=encoding, data=data)
         self._schemas.append(schema)
         return schema.id, _record(schema)
@@ -132,7 +132,7 @@ class McapWriter:
     def add_channel(
         self, topic: str, schema_id: int, metadata: dict[str, str]
     ) -> tuple[int, bytes]:
-        """Add a channel; return its number, and its record for the next chunk."""
+        """Add a channel; return the channel number, and the record for the next chunk."""
         channel = Channel(
             id=len(self._channels) + 1,
             topic=topic,

@@ -311,7 +311,7 @@ def _time_unit(table: Table, column: TableColumn, given: str | None) -> str:
     count = step == 1.0 and np.all(steps == np.rint(steps))  # noqa: RUF069 - 1, 2, 3
     if count or not fitting:
         raise RecordingError(
-            f'{where}: the unit of a time with steps of {step:g} is not known; give it with '
+            f'{where}: the unit of a time with steps of {step:g} is not known; give the unit with '
             '--time-unit s or ms, or give the samples per second with --rate'
         )
     return fitting[0]
@@ -388,7 +388,7 @@ def _temperatures(
 
 
 def _times(plan: TablePlan) -> tuple[FloatArray, int]:
-    """Return the times of rows [s] after a start stamp, and this stamp [ns], by default 10^9."""
+    """Return the times of rows [s], relative to a start stamp, and the start stamp [ns]."""
     if plan.time is None:
         assert plan.rate_hz is not None
         return np.arange(len(plan.table)) / plan.rate_hz, 10**9
