@@ -28,7 +28,7 @@ class RotorInertia(Effect):
     """
 
     name = 'rotor_inertia'
-    summary = 'inertia of rotor and gear, seen by its own joint only'
+    summary = 'inertia of rotor and gear, reflected to the joint'
     quantities = (Quantity('rotor_inertia', 'kg m^2', lower=0.0, typical=(0.001, 1.1)),)
 
     def columns(self, motion: Motion, arm: Arm) -> FloatArray:
@@ -36,7 +36,7 @@ class RotorInertia(Effect):
         return joint_columns(self, motion, motion.ddq)
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
-        """Return the rotor inertias as a constant inertia matrix of the plant."""
+        """Return an action that adds the rotor inertias to the inertia matrix of the plant."""
         (inertia,) = scatter(self, values, arm.robot)
         return Action(inertia=np.diag(inertia))
 
@@ -59,7 +59,7 @@ class TorqueRipple(JointLaw):
     """
 
     name = 'torque_ripple'
-    summary = 'torque that repeats at a fixed angle of the joint: cogging, gear error'
+    summary = 'torque that is periodic in the joint position: cogging, gear error'
     quantities = (
         Quantity('ripple_sine', 'N m', typical=(0.002, 2.0)),
         Quantity('ripple_cosine', 'N m', typical=(0.002, 2.0)),
@@ -154,7 +154,7 @@ class ActuatorSaturation(TorqueReading):
     """
 
     name = 'actuator_saturation'
-    summary = 'torque beyond a level that the drive does not supply, or does not report'
+    summary = 'torque beyond a level that the drive does not fully supply or report'
     quantities = (
         Quantity('lost_share', '', lower=0.0, upper=1.0, typical=(0.05, 1.0)),
         Quantity('clipped_share', '', lower=0.0, upper=1.0, typical=(0.05, 1.0)),
@@ -177,7 +177,7 @@ class ActuatorSaturation(TorqueReading):
         return (np.outer(highest, [0.3, 0.4, *np.linspace(0.5, 0.95, 10)]),)
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
-        """Return the functions that saturate the supplied torque and the reported torque."""
+        """Return an action that saturates the supplied torque and the reported torque."""
         lost = scatter(self, values, arm.robot)[0]
         (level,) = scatter(self, self.shape_values, arm.robot)
 
@@ -204,7 +204,7 @@ class ActuatorSaturation(TorqueReading):
         return np.asarray((1.0 + slope * (np.abs(tau) > level))[:, :, np.newaxis] * columns)
 
     def sensitivity(self, values: FloatArray, motion: Motion, tau: FloatArray) -> FloatArray:
-        """Return the derivatives of the reported torque by lost_share and clipped_share [N m]."""
+        """Return derivatives of the reported torque by lost and clipped share, (N, n, P) [N m]."""
         lost, _, level = self._spread(values, motion)
         beyond = _excess(tau, level)
         asked = beyond / (1.0 - lost) ** 2 if motion.tau is None else _excess(motion.tau, level)

@@ -39,7 +39,7 @@ class ViscousFriction(Effect):
         return joint_columns(self, motion, motion.dq)
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
-        """Return viscous friction as a damping matrix of the plant."""
+        """Return an action with the friction as a damping matrix."""
         (viscous,) = scatter(self, values, arm.robot)
         return Action(damping=np.diag(viscous))
 
@@ -65,7 +65,7 @@ class CoulombFriction(Effect):
         return joint_columns(self, motion, direction(motion))
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
-        """Return Coulomb friction as dry friction of the plant, with the levels -Fc and Fc."""
+        """Return an action with dry friction between the levels -Fc and Fc."""
         (coulomb,) = scatter(self, values, arm.robot)
         return Action(dry_friction=DryFriction(np.eye(len(coulomb)), -coulomb, coulomb))
 
@@ -128,7 +128,7 @@ class QuadraticFriction(JointLaw):
 @dataclass(frozen=True)
 class StribeckFriction(JointLaw):
     """
-    Breakaway friction beyond Coulomb friction, which decreases as velocity increases.
+    Stribeck friction, which adds to Coulomb friction at low velocity and then vanishes.
 
     tau = dFs exp(-|dq / vs|^d) sign(dq), where dFs = Fs - Fc is the breakaway torque beyond the
     Coulomb torque. The additional friction is below 3 vs. Confounded with presliding_hysteresis,
@@ -186,7 +186,7 @@ class ThermalFriction(JointLaw):
 @dataclass(frozen=True)
 class ThermalChange(ThermalFriction):
     """
-    Change of viscous friction since the baseline, of the cold joint and during its warm-up.
+    Change of viscous friction since the baseline: in the cold joint, and during warm-up.
 
     tau = (c + dFv (1 - exp(-t / T))) dq. A joint that starts colder has more friction at first,
     and the same friction when warm. Reported as thermal_friction and viscous_friction.
@@ -241,7 +241,7 @@ class TemperatureDependentFriction(Effect):
     lasting = True
 
     def __post_init__(self) -> None:
-        """Set the reference temperature of all joints without a given one to 25 degC."""
+        """Set missing reference temperatures of joints to 25 degC."""
         super().__post_init__()
         known = dict.fromkeys(self.joints, _REFERENCE_TEMPERATURE) | dict(self.reference)
         object.__setattr__(self, 'reference', tuple(known.items()))
@@ -289,7 +289,7 @@ class TemperatureDependentFriction(Effect):
         return joint_columns(self, motion, warmer * motion.dq, warmer * direction(motion))
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
-        """Return the friction as dry friction of the plant and a function of time and velocity."""
+        """Return an action with dry friction, and with a torque function of time and velocity."""
         viscous, coulomb = scatter(self, values, arm.robot)
         if self.course is None:
             return Action()

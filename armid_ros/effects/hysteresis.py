@@ -38,7 +38,7 @@ class LoadDependentFriction(Effect):
         return joint_columns(self, motion, np.abs(load) * direction(motion))
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
-        """Return load-dependent friction as dry friction whose levels rise with the load."""
+        """Return an action with dry friction whose levels rise with the load."""
         (share,) = scatter(self, values, arm.robot)
         zero = np.zeros_like(share)
         return Action(dry_friction=DryFriction(np.eye(len(share)), zero, zero, share))
@@ -47,14 +47,14 @@ class LoadDependentFriction(Effect):
 @dataclass(frozen=True)
 class PreslidingHysteresis(Effect):
     """
-    Friction that increases over a short distance after each reversal, tau = F h.
+    Friction that builds up over a short distance after each reversal of the joint.
 
-    dh = (1 - h sign(dq)) |dq| / s: asperities of the surfaces bend before they slip. The torque
-    depends on the travel since the last reversal, not on velocity. The hysteresis loops are the
-    same at any rate, and even slow motion dissipates energy. Far from reversals it equals
-    coulomb_friction. If a model contains both, F is the part that builds up gradually. Confounded
-    with stribeck_friction, backlash and a velocity that was filtered too much; triangles of less
-    than 0.02 rad at two rates distinguish them.
+    tau = F h, dh = (1 - h sign(dq)) |dq| / s: asperities of the surfaces bend before they slip.
+    The torque depends on the travel since the last reversal, not on velocity. The hysteresis
+    loops are the same at any rate, and even slow motion dissipates energy. Far from reversals it
+    equals coulomb_friction. If a model contains both, F is the part that builds up gradually.
+    Confounded with stribeck_friction, backlash and a velocity that was filtered too much;
+    triangles of less than 0.02 rad at two rates distinguish them.
     Source: Dahl 1968.
 
     """
@@ -78,7 +78,7 @@ class PreslidingHysteresis(Effect):
         return columns
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
-        """Return the friction as slipping springs of the plant."""
+        """Return an action with slipping springs, which are the friction of the plant."""
         if not np.any(values):
             return Action()
         return Action(hysteresis=self._elements(values, arm.robot.joints))

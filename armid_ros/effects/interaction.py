@@ -54,7 +54,7 @@ class Attached(Effect):
         return values
 
     def shape_starts(self, unexplained: Unexplained, arm: Arm) -> tuple[FloatArray, ...]:
-        """Return start values of the shapes: present values of points, grids of all others."""
+        """Return start values of the shapes: present values for points, grids for all others."""
         return tuple(
             self.shape_values[:, [index]]
             if shape.unit == 'm' and shape.lower < 0.0
@@ -72,7 +72,7 @@ class Attached(Effect):
         """Return a function from times to positions and velocities of the springs' anchors."""
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
-        """Return the joint torques of the springs as a torque function of the plant's links."""
+        """Return an action with the joint torques of the springs as a function of link motion."""
         robot, anchor = arm.robot, self._anchor(arm)
 
         def torque(t: FloatArray, q: FloatArray, dq: FloatArray) -> FloatArray:
@@ -111,14 +111,14 @@ class Attached(Effect):
 @dataclass(frozen=True)
 class HumanInteraction(Attached):
     """
-    Spring and damper between a link and an anchor, tau = J^T (k (p - r) + d (v - w) - f).
+    Spring and damper between a point of a link and an anchor outside the arm.
 
-    p and v are position and velocity of the attachment, r and w those of the anchor. By default,
-    the anchor is at rest at the position of the attachment in the middle of the range of motion. A
-    spring fixed at another point r' has the force f = k (r' - r), so that an unknown anchor is
-    three linear parameters. Confounded with joint_spring on a single moving joint and with the
-    weight of the limb. The sum of the torques of a pair does not contain the spring, their
-    difference does.
+    tau = J^T (k (p - r) + d (v - w) - f). p and v are position and velocity of the attachment, r
+    and w those of the anchor. By default, the anchor rests where the attachment is in the middle
+    of the range of motion. A spring fixed at another point r' has the force f = k (r' - r), so
+    that an unknown anchor is three linear parameters. Confounded with joint_spring on a single
+    moving joint and with the weight of the limb. The sum of the torques of a pair does not contain
+    the spring, their difference does.
     Source: the human-exoskeleton leg pair, springs between corresponding segments.
 
     """
@@ -159,7 +159,7 @@ class InterfaceSlack(Attached):
     """
 
     name = 'interface_slack'
-    summary = 'spring from a link to an anchor that pulls beyond a slack only'
+    summary = 'strap from a link to an anchor: a spring that pulls only beyond its slack'
     smooth = True
     quantities = (Quantity('slack_stiffness', 'N/m', lower=0.0, typical=(50.0, 50000.0)),)
     shapes = (

@@ -39,7 +39,7 @@ class JointStates(NamedTuple):
 
 @dataclass(frozen=True)
 class JointLaw(Effect):
-    """Base class of effects whose torque on a joint depends only on time and its own motion."""
+    """Base class of effects whose joint torque depends only on time and that joint's motion."""
 
     #: Whether the torque acts on the link side of an elastic transmission.
     on_links: ClassVar[bool] = False
@@ -62,7 +62,7 @@ class JointLaw(Effect):
         return _placed(own, motion, self.law(JointStates(motion.t[:, np.newaxis], *states)))
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
-        """Return the torque as plant terms; a jump at zero velocity becomes dry friction."""
+        """Return an action with the torque; a jump at zero velocity becomes dry friction."""
         places, n = self.indices(arm.robot.joints), arm.robot.n_joints
         first, *others = values.reshape(len(places), -1).T
         # a slice takes less time than indices, and the plant calls the law in every step
@@ -122,7 +122,7 @@ def joint_columns(effect: Effect, motion: Motion, *quantities: FloatArray) -> Fl
 
 def scatter(effect: Effect, values: FloatArray, robot: Robot) -> FloatArray:
     """
-    Arrange an effect's values in an array with one column per robot joint; the rest is zero.
+    Arrange an effect's values as an array with one column per robot joint, zero by default.
 
     Parameters
     ----------

@@ -225,7 +225,7 @@ class LearnedTorque(Effect):
 
 
 def scaled_inputs(inputs: FloatArray, knee: float) -> FloatArray:
-    """Return inputs (..., 3) with their velocities scaled by the law of `TorqueMap`."""
+    """Return inputs (..., 3) with velocities scaled: linear below the knee, then logarithmic."""
     velocity = knee * np.arcsinh(inputs[..., 1] / knee)
     return np.stack([inputs[..., 0], velocity, inputs[..., 2]], axis=-1)
 

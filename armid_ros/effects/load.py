@@ -166,7 +166,7 @@ class LinkInertia(_LinkBody):
     """
 
     name = 'link_inertia'
-    summary = 'mass, centre or inertia of a link other than described, in the frame of its joint'
+    summary = 'error of mass, centre or inertia of a link in the description, in its joint frame'
     quantities = tuple(
         Quantity(f'{name}_difference', unit)
         for name, unit in zip(LINK_PARAMETERS, LINK_UNITS, strict=True)

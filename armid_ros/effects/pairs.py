@@ -57,7 +57,7 @@ class _Pairs(Effect):
 
     @property
     def owners(self) -> tuple[str, ...]:
-        """First joint of each pair, under which the pair's parameters are listed."""
+        """Names of the first joint of each pair, which stand for the pair in parameter names."""
         return self.joints[::2]
 
     def parameters(self, robot: Robot) -> tuple[ParameterName, ...]:
@@ -115,7 +115,7 @@ class CoupledJointFriction(_Pairs):
         return columns
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
-        """Return inertia, damping and dry friction of the shared shafts as terms of the plant."""
+        """Return an action with inertia, damping and dry friction of the shared shafts."""
         n = arm.robot.n_joints
         inertia, damping = np.zeros((n, n)), np.zeros((n, n))
         pairs = self.pairs(arm.robot.joints)
@@ -145,7 +145,7 @@ class JointCoupling(_Pairs):
     """
 
     name = 'joint_coupling'
-    summary = 'cable or tendon along two joints: torque by the position of the other joint'
+    summary = 'cable or tendon along two joints: each position causes torque at the other joint'
     quantities = (Quantity('coupling_stiffness', 'N m/rad', typical=(0.1, 50.0)),)
 
     def __post_init__(self) -> None:

@@ -35,7 +35,7 @@ class TorqueOffset(Effect):
         return joint_columns(self, motion, np.ones_like(motion.q))
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
-        """Return the offset as a constant torque of the plant."""
+        """Return an action with the offset as a constant torque."""
         (offset,) = scatter(self, values, arm.robot)
 
         def torque(t: FloatArray, q: FloatArray, dq: FloatArray) -> FloatArray:
@@ -56,7 +56,7 @@ class TorqueGain(TorqueReading):
     """
 
     name = 'torque_gain'
-    summary = 'torque readings too large or too small by a share'
+    summary = 'relative error of the torque readings'
     quantities = (Quantity('gain_error', '', lower=-0.95, typical=(0.005, 0.3)),)
 
     def read(self, values: FloatArray, motion: Motion, tau: FloatArray) -> FloatArray:
@@ -82,7 +82,7 @@ class TorqueDrift(TorqueReading):
     """
 
     name = 'torque_drift'
-    summary = 'torque reading that drifts with time, whatever the motion'
+    summary = 'torque readings that drift with time, independent of the motion'
     quantities = (Quantity('drift', 'N m', typical=(0.01, 5.0)),)
     shapes = (Shape('drift_time', 's', 0.1, 1e5, 600.0, (10.0, 60.0, 300.0, 1000.0, 3000.0)),)
 
@@ -129,6 +129,6 @@ class EncoderOffset(Displacing):
     linear = False
 
     def displacements(self, motion: Motion, arm: Arm) -> Displacement:
-        """Return the displacement per unit of offset: 1 in position, 0 in velocity and ddq."""
+        """Return the displacement per unit of offset: 1 in q, 0 in dq and in ddq."""
         shift = joint_columns(self, motion, np.ones_like(motion.q))
         return Displacement(shift, np.zeros_like(shift), np.zeros_like(shift))

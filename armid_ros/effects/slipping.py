@@ -38,9 +38,9 @@ class Hysteresis:
         """Return the spring states (m,) after a long motion with constant velocity."""
         return np.asarray(np.sign(self.directions @ dq))
 
-    def advance(self, state: FloatArray, dq: FloatArray) -> FloatArray:
-        """Return the spring states (m,) after the joints moved by dq [rad or m], all one way."""
-        travel = self.directions @ dq
+    def advance(self, state: FloatArray, moved: FloatArray) -> FloatArray:
+        """Return the spring states (m,) after joint displacements [rad or m] without reversal."""
+        travel = self.directions @ moved
         end = np.sign(travel)
         return np.asarray(end - (end - state) * np.exp(-np.abs(travel) / self.distance))
 

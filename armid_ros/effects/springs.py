@@ -55,7 +55,7 @@ class SoftLimit(JointLaw):
     """
 
     name = 'soft_limit'
-    summary = 'bumper or end stop that gives way'
+    summary = 'bumper or elastic end stop'
     quantities = (
         Quantity('lower_stiffness', 'N m/rad', lower=0.0, typical=(2.0, 2000.0)),
         Quantity('upper_stiffness', 'N m/rad', lower=0.0, typical=(2.0, 2000.0)),

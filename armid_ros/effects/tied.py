@@ -144,7 +144,7 @@ class Tied(Attached):
 
 @dataclass(frozen=True)
 class TiedInteraction(Tied, HumanInteraction):
-    """Spring and damper from a link to a recorded point, tau = J^T (k (p - r) + d (v - w))."""
+    """Spring and damper between a link and a point of another machine with recorded motion."""
 
     quantities = HumanInteraction.quantities[:2]
     shapes = ()
@@ -152,7 +152,7 @@ class TiedInteraction(Tied, HumanInteraction):
 
 @dataclass(frozen=True)
 class TiedSlack(Tied, InterfaceSlack):
-    """Strap from a link to a point of recorded motion; it pulls only when its slack is used up."""
+    """Strap between a link and a point of another machine with recorded motion."""
 
     # start values [m]; straps stretch by millimetres
     shapes = (

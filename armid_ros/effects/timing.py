@@ -59,7 +59,7 @@ class TimeDelay(LateReading):
     """
 
     name = 'time_delay'
-    summary = 'torque readings older than the positions they are recorded with'
+    summary = 'delay of the torque readings relative to the positions'
     quantities = (Quantity('delay', 's', lower=-0.1, upper=0.1, typical=(0.0005, 0.02)),)
     linear = False
     instantaneous = False
@@ -104,7 +104,7 @@ class TorqueLag(LateReading):
     """
 
     name = 'torque_lag'
-    summary = 'torque readings behind a low-pass: sensor filter, current loop'
+    summary = 'low-pass of the torque readings: sensor filter, current loop'
     quantities = (Quantity('lag', 's', lower=0.0, upper=0.2, typical=(0.0005, 0.02)),)
     linear = False
     instantaneous = False

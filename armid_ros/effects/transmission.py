@@ -110,7 +110,7 @@ class Backlash(Displacing):
 
 
 def place_in_gap(t: FloatArray, pull: FloatArray, width: float) -> FloatArray:
-    """Return the positions (N,) of a body between two stops, given its free acceleration."""
+    """Return the positions (N,) of a body that the acceleration `pull` moves between two stops."""
     speed = cumulative_trapezoid(pull, t, initial=0.0)
     way = cumulative_trapezoid(speed, t, initial=0.0)
     times, speeds, ways = t.tolist(), speed.tolist(), way.tolist()
@@ -134,7 +134,7 @@ def place_in_gap(t: FloatArray, pull: FloatArray, width: float) -> FloatArray:
 
 
 def _twist(effect: Displacing, motion: Motion, twist: FloatArray) -> Displacement:
-    """Return the link displacements by the twists of transmissions, per unit of parameter."""
+    """Return the link displacements that given twists cause, per unit of each parameter."""
     speed = rate_of_change(motion.t, twist)
     parts = (-twist, -speed, -rate_of_change(motion.t, speed))
     return Displacement(*(joint_columns(effect, motion, part) for part in parts))
