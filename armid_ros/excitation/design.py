@@ -108,7 +108,7 @@ def design(
     progress: Progress = lambda done, cost: None,
 ) -> Design:
     """
-    Find the feasible trajectory with the most information on the parameters of an arm.
+    Find the feasible excitation with the most information on the parameters of an arm.
 
     Parameters
     ----------

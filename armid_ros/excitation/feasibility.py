@@ -230,7 +230,7 @@ def _shrunk(
     clearance: ClearanceModel | None,
     shrinks: int,
 ) -> FourierTrajectory | None:
-    """Reduce all amplitudes up to `shrinks` times, until feasible; return None if this fails."""
+    """Return the trajectory with amplitudes reduced to be feasible; None after `shrinks` steps."""
 
     def clear(q: FloatArray) -> bool:
         if clearance is None:

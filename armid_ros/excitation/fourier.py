@@ -139,7 +139,7 @@ class FourierTrajectory:
         return self.motion(np.arange(-MARGIN, n_samples + MARGIN) * step)
 
     def shifted(self, time: float) -> FourierTrajectory:
-        """Return the same periodic motion, which starts at a given time [s] within the period."""
+        """Return the same periodic motion, started `time` [s] later within its period."""
         angle = self.angular_frequency * time * np.arange(1, self.harmonics + 1)
         cosine, sine = np.cos(angle), np.sin(angle)
         a = self.a * cosine + self.b * sine

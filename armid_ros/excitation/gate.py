@@ -165,8 +165,8 @@ class MotionGate:
             j = int(np.argmax(step - largest))
             joint, unit = self.limits.joints[j], self.limits.unit('position', j)
             raise TrajectoryError(
-                f"joint '{joint}' is {step[j]:.3g} {unit} from its set point, more than "
-                f'{largest[j]:.3g} {unit}'
+                f"joint '{joint}' is {step[j]:.3g} {unit} from its set point, more than the "
+                f'allowed {largest[j]:.3g} {unit}'
             )
         inside = np.clip(measured, self.limits.lower, self.limits.upper)
         near = clear_line(self.clearance, set_point, inside)

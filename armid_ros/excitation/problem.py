@@ -103,7 +103,7 @@ class DesignSettings:
             if name not in known:
                 raise TrajectoryError(f"there is no {kind} '{name}'; choose {', '.join(known)}")
         if self.focus and self.criterion == 'T':
-            raise TrajectoryError("focus is not available with criterion 'T'; leave out one")
+            raise TrajectoryError("focus is not available with criterion 'T'; choose one of them")
         self._require_numbers()
 
     def _require_numbers(self) -> None:
@@ -221,7 +221,7 @@ class DesignProblem:
         columns = _target_columns(model, settings.target, motion)
         if not columns.any():
             raise TrajectoryError(
-                f"{arm.robot.name} has no parameters for target '{settings.target}'"
+                f"{arm.robot.name} has no parameters for target '{settings.target}'; use another"
             )
         level = replace(model, robot=levelled(model.robot))
         flat = _target_columns(level, settings.target, motion).reshape(-1, columns.shape[-1])
@@ -267,7 +267,7 @@ class DesignProblem:
         return (columns / self.noise[:, np.newaxis]).reshape(-1, columns.shape[-1])
 
     def recorded(self, trajectory: FourierTrajectory, n_periods: int) -> Information:
-        """Return the Fisher information on the base parameters after n_periods periods."""
+        """Return the Fisher information on the base parameters from n_periods recorded periods."""
         # six times as many samples as in the search
         count, margin = 6 * self.settings.samples, MARGIN * trajectory.n_joints
         columns = self.columns(trajectory.with_margins(count))[margin:-margin]

@@ -43,7 +43,7 @@ class Run:
     rate: float
 
     def __post_init__(self) -> None:
-        """Check that approach and return meet the excitation; round durations up to samples."""
+        """Check that both transfers meet the excitation; round durations up to whole samples."""
         ends = self.excitation.at([0.0, self.excitation.duration]).q
         for transfer, own, end in ((self.approach, -1, 0), (self.back, 0, 1)):
             # tolerance for rounding [rad or m]

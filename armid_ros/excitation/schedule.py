@@ -253,7 +253,8 @@ def read_excitation(text: str, source: str) -> Excitation:
             raise TrajectoryError(f"not an excitation: the key 'schema' has to be {SCHEMA}")
         if content.get('start') is not None:  # it changes the motion
             raise TrajectoryError(
-                "an excitation cannot contain a start pose; remove the key 'start', use --start"
+                "an excitation cannot contain a start pose; remove the key 'start', and give the "
+                'pose with --start'
             )
         joints = content['joints']
         trajectory = FourierTrajectory(

@@ -209,7 +209,7 @@ class ClearanceModel:
         times: FloatArray,
     ) -> Approach | None:
         """
-        Return an approach of bodies below the margin along a path; None proves there is none.
+        Return an approach closer than the margin on a path; None proves that bodies keep it.
 
         On an interval, the joints between two bodies move them by a limited travel. Their distance
         is at least the mean of the distances at both ends, minus half this travel. An interval
@@ -270,7 +270,7 @@ class ClearanceModel:
         return None
 
     def _bound(self, frames: LinkFrames) -> FloatArray:
-        """Return a lower bound on the distance of each pair of bodies, (N, number of pairs)."""
+        """Return lower bounds on the distances of pairs of bodies, (N, number of pairs) [m]."""
         centre = np.empty((frames.lines.shape[2], len(self.joints), 3))
         for body, joint in enumerate(self.joints):
             place = self.spheres[body, :3]

@@ -230,7 +230,7 @@ def load_environment(path: str | Path, robot: Robot | None = None) -> tuple[Obst
         for number, entry in enumerate(document, 1):
             if not isinstance(entry, dict) or not {'name', 'kind'} <= entry.keys() <= set(known):
                 raise TrajectoryError(
-                    f'obstacle {number} needs name and kind; allowed too: {", ".join(known[2:])}'
+                    f'obstacle {number} needs name and kind; other keys are {", ".join(known[2:])}'
                 )
             values: dict[str, Any] = {
                 key: tuple(v) if isinstance(v, list) else v for key, v in entry.items()

@@ -286,7 +286,7 @@ def floor_obstacles(
 
 
 def _why_not_standing(collision: CollisionModel, up: FloatArray) -> str:
-    """Return the reason why an arm cannot stand on its base plane; empty if the arm can."""
+    """Return the reason why an arm cannot stand on its base plane; empty if there is none."""
     normal = np.array([0.0, 0.0, 1.0])
     if up[2] < np.cos(np.pi / 4.0):
         return 'gravity does not press the arm onto its base plane'

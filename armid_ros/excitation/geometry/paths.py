@@ -97,7 +97,7 @@ def find_path(
 def clear_line(
     clearance: ClearanceModel | None, start: FloatArray, goal: FloatArray
 ) -> Approach | None:
-    """Return an approach of bodies below the margin between two poses; None if there is none."""
+    """Return an approach closer than the margin on the line between two poses, or None."""
     if clearance is None:
         return None
     difference = goal - start

@@ -96,7 +96,7 @@ class Search:
 
     def run(self) -> str:
         """
-        Run the search; return '' or why it ended early: 'time budget' or 'interrupted'.
+        Run the search; return '', or the reason of an early end: 'time budget', 'interrupted'.
 
         Raises
         ------
