@@ -177,7 +177,7 @@ class CompiledLoop:
         return advance
 
     def _smooth_effects(self) -> int:
-        """Compute the torque of smooth effects for the kernel; return 1 if this raised, else 0."""
+        """Compute the torque of smooth effects for the kernel; return 1 after an exception."""
         n = len(self._law_torque)
         t, q, dq = self._law_input[0], self._law_input[1 : n + 1], self._law_input[n + 1 :]
         assert self._torque is not None
@@ -215,7 +215,7 @@ class Trace(NamedTuple):
 def command(
     plant: Plant, controller: Controller, state: State, targets: Motion, row: int
 ) -> FloatArray:
-    """Return the controller's torque at one row of the targets, within limits, (n,) [N m]."""
+    """Return the controller's torque at one row of the targets, clipped to limits, (n,) [N m]."""
     assert targets.tau is not None
     desired = targets.q[row], targets.dq[row], targets.ddq[row]
     q, dq = (state.q, state.dq) if state.rotors is None else plant.motors(state)[:2]

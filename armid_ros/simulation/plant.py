@@ -34,7 +34,7 @@ def require_masses(robot: Robot) -> None:
     ]
     if negative:
         links = ', '.join(negative)
-        raise ModelError(f'{robot.name}: negative mass of {links}; correct the description')
+        raise ModelError(f'{robot.name}: negative mass of links {links}; correct the description')
 
 
 def possible_loads(robot: Robot, values: FloatArray) -> bool:
@@ -247,7 +247,7 @@ class Plant:
         steps: int = 0,
     ) -> State:
         """
-        Return the plant state of given positions and velocities, by default at rest.
+        Return the plant state for given positions and velocities, by default at rest.
 
         The weight of the links twists the springs, and motors have the velocity of their links.
 

@@ -183,8 +183,7 @@ def _required_springs(robot: Robot, action: Action) -> Transmission:
     springs = action.transmission
     if springs is None or not np.any(np.isfinite(springs.stiffness)):
         raise ModelError(
-            f'{robot.name}: no joint is elastic; add joint_elasticity, or simulate it '
-            'as a rigid arm'
+            f'{robot.name}: no joint is elastic; add joint_elasticity, or simulate a rigid arm'
         )
     soft = np.isfinite(springs.stiffness)
     rotor = np.zeros(len(soft)) if action.inertia is None else np.diag(action.inertia)
