@@ -333,7 +333,7 @@ def _of_recording(gap: Gap, shown: Overlay, joint: int) -> tuple[FloatArray, ...
 
 def whole_overlays(diagnosis: Diagnosis, recordings: Sequence[Recording]) -> Gap | None:
     """
-    Return the gap with its torque curves, of whole recordings if a cause acts temporarily.
+    Return the gap with torque curves, which show whole recordings if a cause acts temporarily.
 
     Parameters
     ----------

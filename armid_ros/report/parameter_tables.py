@@ -260,7 +260,7 @@ def joint_columns(
 
 def not_as_described(result: Identification, description: ArmModel) -> dict[str, tuple[int, int]]:
     """
-    Return the number of inertial parameters of each joint that differ from the description.
+    Return two numbers of inertial parameters for each joint: not as described, and all.
 
     Parameters
     ----------
