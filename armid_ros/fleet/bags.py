@@ -31,7 +31,7 @@ _VERSIONS = ('ETag', 'etag', 'md5Hash', 'mtime', 'LastModified', 'updated', 'cre
 @dataclass(frozen=True, order=True)
 class BagFile:
     """
-    Bag of a fleet: URL, name of the arm, date in the path, size and version of the content.
+    Bag of a fleet: name of the arm, URL, date in the path, size and version of the content.
 
     Attributes
     ----------
@@ -56,7 +56,7 @@ class BagFile:
 
     @property
     def name(self) -> str:
-        """Return the file name for the results of the bag: bag name and hash of its URL."""
+        """File name for the results of the bag: name of the bag and hash of the URL."""
         last = self.url.rstrip('/').rsplit('/', 1)[-1]
         return f'{re.sub(r"[^A-Za-z0-9_.-]", "_", last)}-{digest(self.url, size=10)}'
 
@@ -72,7 +72,7 @@ def folder_of(arm: str) -> str:
 
 
 def file_name(arm: str) -> str:
-    """Convert the name of an arm to a valid file name: escape all but letters and digits."""
+    """Convert the name of an arm to a file name: escape all but letters and digits by %."""
     return ''.join(char if char.isalnum() else quote(char, safe='') for char in arm)
 
 
@@ -102,7 +102,7 @@ def find_bags(patterns: Sequence[str], arm_pattern: str | None = None) -> list[B
         raise FleetError(f'--arm {arm_pattern}: {error}') from error
     if regular is not None and regular.groups < 1:
         raise FleetError(
-            f"--arm {arm_pattern}: no (group) for the name of the arm, as in 'robots/([^/]+)/'"
+            f"--arm {arm_pattern}: add a (group) for the name of the arm, as in 'robots/([^/]+)/'"
         )
     found: dict[str, BagFile] = {}
     for pattern in patterns:
@@ -140,7 +140,7 @@ def find_bags(patterns: Sequence[str], arm_pattern: str | None = None) -> list[B
 def _bags(
     filesystem: Any, listed: Mapping[str, Mapping[str, Any]]
 ) -> Iterator[tuple[str, int, str]]:
-    """Yield path, size [bytes] and version of each bag in a listing of files and directories."""
+    """Yield path, size [bytes] and version of each bag among listed files and directories."""
 
     def version(info: Mapping[str, Any]) -> str:
         found = [str(info[name]) for name in _VERSIONS if info.get(name)][:1]
@@ -165,7 +165,7 @@ def _bags(
 
 
 def _arm(pattern: str, path: str) -> str:
-    """Return the arm's name: the path component at the first wildcard, or the bag's folder."""
+    """Return the name of the arm: part of the path at the first wildcard, or bag's folder."""
     wild = [k for k, part in enumerate(pattern.split('/')) if _WILDCARD.search(part)]
     parts = path.rstrip('/').split('/')
     last = len(parts) - 1

@@ -34,7 +34,7 @@ _DASK_SETTINGS = {
 @contextmanager
 def connected(scheduler: str | None, workers: int | None = None) -> Iterator[Client]:
     """
-    Connect to a Dask cluster, or start worker processes on this machine; yield the client.
+    Connect to a Dask cluster, or start worker processes on this machine; yield a Dask client.
 
     Parameters
     ----------
@@ -57,7 +57,7 @@ def connected(scheduler: str | None, workers: int | None = None) -> Iterator[Cli
     try:
         client = Client(scheduler, timeout=CONNECT_TIMEOUT)
     except (OSError, ValueError, TimeoutError) as error:
-        raise FleetError(f'--scheduler {scheduler}: does not answer: {error}') from error
+        raise FleetError(f'--scheduler {scheduler}: no Dask scheduler answers: {error}') from error
     with client:
         found = client.get_versions(packages=['armid_ros'])['workers'].values()
         other = {str(worker['packages']['armid_ros']) for worker in found} - {__version__}

@@ -44,7 +44,7 @@ _alpha = click.option(
     type=click.FloatRange(0.0, 1.0, min_open=True, max_open=True),
     default=0.05,
     show_default=True,
-    help='False discovery rate: mean share of healthy arms among the named ones.',
+    help='False discovery rate: mean share of healthy arms among the reported arms.',
 )
 
 
@@ -90,7 +90,7 @@ def _results(out: str, doing: str) -> Iterator[tuple[Store, Callable[..., None]]
 
 
 def _print_shown(lines: Sequence[str], rest: str) -> None:
-    """Print up to eight lines; if there are more, name the file that has all lines."""
+    """Print at most eight lines; if there are more, name the file `rest` with all lines."""
     most = 8
     for line in lines[:most]:
         say(line)

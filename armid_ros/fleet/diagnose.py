@@ -51,7 +51,7 @@ DIAGNOSES = pa.schema(
 
 def cases(found: Watch, arms: Sequence[str] = (), everyone: bool = False) -> list[Case]:
     """
-    Choose for each arm the baseline bags (before its change) and the bags to diagnose (after).
+    Choose the baseline bags (before the change) and the bags to diagnose (after) of each arm.
 
     Parameters
     ----------
@@ -77,7 +77,7 @@ def cases(found: Watch, arms: Sequence[str] = (), everyone: bool = False) -> lis
     by_name = {arm.arm: arm for arm in found.arms}
     for name in set(arms) - by_name.keys():
         known = ', '.join(sorted(by_name)[:5])
-        raise FleetError(f'--arm {name}: the results have no such arm; arms are {known} ...')
+        raise FleetError(f'--arm {name}: no results of an arm of this name; arms are {known} ...')
     chosen = [by_name[name] for name in arms]
     if not arms:
         chosen = [arm for arm in found.arms if arm.named or everyone]
@@ -104,7 +104,7 @@ def diagnose_fleet(
     report: Callable[[int, int], None] = lambda finished, arms: None,
 ) -> list[dict[str, Any]]:
     """
-    Diagnose arms on a cluster; return each arm's row for ``watch/diagnoses.parquet``.
+    Diagnose arms on a cluster; return and store one row of diagnoses.parquet for each arm.
 
     Rows of other arms in the table are kept.
 
@@ -139,7 +139,7 @@ def diagnose_fleet(
 def one_arm(
     case: Case, model: ArmModel, filters: Conditioning, topic: str | None, out: str
 ) -> dict[str, Any]:
-    """Dask task: identify an arm from baseline bags, diagnose later bags, return the diagnosis."""
+    """Dask task: identify an arm from its baseline bags; diagnose its later bags; return a row."""
     store = Store(out)
     try:
         with ExitStack() as stack:

@@ -40,7 +40,7 @@ import numpy as np
 @dataclass(frozen=True)
 class Refused:
     """
-    Bag that is left out of the identification of its arm, and the reason.
+    Bag that the identification of its arm leaves out, with the reason.
 
     Attributes
     ----------
@@ -89,7 +89,7 @@ class FleetEstimate:
 @dataclass(frozen=True, eq=False)
 class FleetFit:
     """
-    Parameters fitted by least squares, before their standard deviations are known.
+    Parameters fitted by least squares, without standard deviations.
 
     Attributes
     ----------
@@ -108,7 +108,7 @@ class FleetFit:
 
     @classmethod
     def of(cls, normal: NormalEquations, job: Job) -> FleetFit | None:
-        """Fit parameters to normal equations; return None for too few samples."""
+        """Fit parameters to normal equations; return None if there are too few samples."""
         base, kept = identifiable_base(job.theory, normal)
         if normal.counts.sum() < 2 * base.rank:
             return None
@@ -117,7 +117,7 @@ class FleetFit:
         return cls(base, tuple(kept), replace(fit, values=values))
 
     def noise(self, rows: Iterable[Regression]) -> FloatArray:
-        """Return the noise covariance (r, r) of the normal equations of the given rows."""
+        """Return the noise covariance, (r, r), of the normal equations of regression rows."""
         products = np.zeros((len(self.kept), len(self.kept)))
         for part in rows:
             some = part.restrict(self.kept)
@@ -127,7 +127,7 @@ class FleetFit:
         return products
 
     def estimate(self, normal: NormalEquations, noise: FloatArray) -> FleetEstimate:
-        """Return the estimate with standard deviations, from the covariance of the noise."""
+        """Return the estimate, with standard deviations from the noise covariance (r, r)."""
         some, inverse = normal.restrict(self.kept), self.fit.inverse
         return FleetEstimate(
             self.base.parameters,
@@ -167,7 +167,7 @@ class MergedBags:
 
     @classmethod
     def of(cls, bag: BagSummary | Refused) -> MergedBags:
-        """Return the normal equations of a bag, without its rows, or the refused bag."""
+        """Convert the summary of a bag, without the rows of the bag, or a refused bag."""
         if isinstance(bag, Refused):
             return cls(refused=(bag,))
         version = bag.bag.url, bag.bag.version
@@ -225,7 +225,7 @@ class BagSummary:
     rows: tuple[Regression, ...] | None = None
 
     def rows_again(self, job: Job) -> Iterator[Regression]:
-        """Yield the regression rows of the bag, from memory if kept, else from the file."""
+        """Yield the regression rows of the bag from memory, or by a second reading of the bag."""
         if self.rows is not None:
             yield from self.rows
             return
@@ -236,7 +236,7 @@ class BagSummary:
 
 def prepare(bag: BagFile, job: Job, bags_of_arm: int = 1) -> BagSummary | Refused:
     """
-    Return the normal equations of a bag, or a `Refused` if the bag cannot be used.
+    Return the normal equations of a bag, or a `Refused` with the reason if it is not usable.
 
     Parameters
     ----------
@@ -264,7 +264,7 @@ def prepare(bag: BagFile, job: Job, bags_of_arm: int = 1) -> BagSummary | Refuse
 
 
 def pieces(path: str, job: Job) -> Iterator[tuple[Recording, Sequence[Regression]]]:
-    """Read a bag in successive pieces; yield each piece with its regression rows."""
+    """Read a bag piece by piece; yield each piece with the regression rows of the piece."""
     yield from streamed(
         path,
         job.arm,

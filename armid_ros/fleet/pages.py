@@ -134,7 +134,7 @@ def _arm_page(found: Watch, arm: WatchedArm, diagnoses: Diagnoses) -> str:
 
 
 def _step(arm: WatchedArm, is_diagnosed: bool, fault: str) -> str:
-    """Return the advice for the user on the page of an arm."""
+    """Return the advice on the page of an arm: what the user should do next."""
     if not (arm.named or fault):
         return 'After the next recordings, run armid fleet identify and armid fleet watch again.'
     if is_diagnosed:
@@ -143,7 +143,7 @@ def _step(arm: WatchedArm, is_diagnosed: bool, fault: str) -> str:
 
 
 def _verdict(found: Watch, diagnoses: Diagnoses) -> VerdictSection:
-    """Return the first section of index.html: how many arms changed, and why."""
+    """Return the first section of index.html: number of changed arms, and named effects."""
     counts = Counter(arm.health for arm in found.arms)
     blamed = [arm.arm for arm in found.arms if _diagnosed(arm, diagnoses.get(arm.arm))]
     ill = counts['changed'] + counts['wearing']
@@ -184,7 +184,7 @@ def _verdict(found: Watch, diagnoses: Diagnoses) -> VerdictSection:
 
 
 def _diagnosed(arm: WatchedArm, diagnosis: Mapping[str, Any] | None) -> str:
-    """Return the verdict of a diagnosis that found a fault in an unchanged arm; else empty."""
+    """Return the verdict of a diagnosis that found a fault in an unchanged arm; otherwise ''."""
     if arm.named or diagnosis is None or diagnosis['verdict'] in ('consistent', 'failed'):
         return ''
     return str(diagnosis['verdict']).replace('_', ' ')
@@ -270,14 +270,14 @@ def _table(
     numbers: Sequence[int] = (),
     hint: str = '',
 ) -> Section:
-    """Return a section with a table, whose cells may hold links and curves."""
+    """Return a section with a table, whose cells may contain links and curves."""
     words = [k for k in range(len(heads)) if k not in numbers]
     table = DataTable(heads, rows, words, 'fleet')
     return Section(title, [table, *([Paragraph(hint, 'hint')] if hint else [])])
 
 
 def _link(target: str, text: str) -> Markup:
-    """Return a text with a link to a page, or the text alone if there is no page."""
+    """Return a text with a link to a page, or the text alone without a page (target '')."""
     return Markup('<a href="{}">{}</a>').format(target, text) if target else escape(text)
 
 

@@ -79,7 +79,7 @@ class FleetSettings:
 
 def filters_at(filters: Conditioning, rate_hz: float, source: str) -> Conditioning:
     """
-    Adapt the filters, chosen for a kind of arm, to the sampling rate of a recording.
+    Adapt the filters of a kind of arm to the sampling rate of a recording.
 
     Raises
     ------
@@ -90,7 +90,7 @@ def filters_at(filters: Conditioning, rate_hz: float, source: str) -> Conditioni
     if filters.cutoff_hz >= 0.5 * rate_hz:
         raise FleetError(
             f'{source}: {rate_hz:.4g} samples/s are too few for the cut-off of '
-            f'{filters.cutoff_hz:.4g} Hz of its arm; set a lower one with --cutoff'
+            f'{filters.cutoff_hz:.4g} Hz; set a lower cut-off with --cutoff'
         )
     decimation = filters.decimation
     # sampling rates that differ by less than this share are treated as equal
@@ -102,7 +102,7 @@ def filters_at(filters: Conditioning, rate_hz: float, source: str) -> Conditioni
 @dataclass(frozen=True)
 class Job:
     """
-    Arm model, filters and settings with which bags of one kind of arm are identified.
+    Arm model, filters and settings for the bags of all arms of the same kind.
 
     Attributes
     ----------
@@ -130,7 +130,7 @@ class Job:
 
     @cached_property
     def facts(self) -> dict[str, Any]:
-        """Return the settings that determine a bag's results, in the form of fleet.json."""
+        """Settings that determine the results of a bag, in the form of fleet.json."""
         robot, effects = self.arm.robot, self.arm.effects
         return {
             'robot': robot.name,
@@ -147,13 +147,13 @@ class Job:
 
     @cached_property
     def digest(self) -> str:
-        """Return a hash of the settings and kinematics that determine a bag's results."""
+        """Hash of the settings and kinematics that determine the results of a bag."""
         facts = {**self.facts, 'kinematics': kinematics_digest(self.arm.robot)}
         return digest(json.dumps(facts, sort_keys=True))
 
     @property
     def samples(self) -> int:
-        """Return how many samples of a bag are read into memory at once."""
+        """Number of samples of a bag that are read into memory at once."""
         joints = self.arm.robot.n_joints
         rows = 16_000_000 // (joints * self.theory.rank)  # larger columns are read in pieces
         return min(rows * self.filters.decimation, 1_400_000 // joints)
@@ -223,7 +223,7 @@ def plan_fleet(
     settings: FleetSettings,
 ) -> dict[str, Job]:
     """
-    Choose robot, filters and settings for every arm, and write them to fleet.json.
+    Choose and return robot, filters and settings of every arm; write fleet.json.
 
     Parameters
     ----------
@@ -282,7 +282,7 @@ def plan_fleet(
 
 
 def kind_arm(store: Store, facts: Mapping[str, Any], key: str) -> ArmModel:
-    """Return the arm model of a kind of arm, by its key in the entry `kinds` of fleet.json."""
+    """Return the model of a kind of arm, from the URDF and `facts` stored under `key`."""
     urdf = store.read(f'robots/{key}.urdf')
     if urdf is None:
         raise FleetError(
@@ -295,7 +295,7 @@ def kind_arm(store: Store, facts: Mapping[str, Any], key: str) -> ArmModel:
 
 def document(store: Store) -> dict[str, Any]:
     """
-    Return the content of fleet.json; empty if the file does not exist.
+    Return the content of fleet.json; an empty mapping if the file does not exist.
 
     Raises
     ------
@@ -310,7 +310,7 @@ def document(store: Store) -> dict[str, Any]:
         found: Mapping[str, Any] = json.loads(data.decode())
         if found['schema'] != SCHEMA:
             raise FleetError(
-                f'schema {found["schema"]} is of another version, not {SCHEMA}; name another --out'
+                f'schema {found["schema"]} is not {SCHEMA} of this version; name another --out'
             )
     return dict(found)
 
@@ -319,7 +319,7 @@ def choose_filters(
     arm: ArmModel, theory: BaseParameters, bags: Sequence[BagFile], settings: FleetSettings
 ) -> Conditioning:
     """
-    Choose cut-off and decimation for one kind of arm from up to four of its bags.
+    Choose the cut-off and the decimation of one kind of arm from at most four bags.
 
     All bags of all days use these filters: with different filters, estimates differ by more than
     noise.

@@ -88,12 +88,12 @@ REFUSED = pa.schema(
 
 
 def _part(data_set: str, bag: BagFile, day: str) -> str:
-    """Return the path of a bag's file in a data set that is partitioned by arm and day."""
+    """Return the path of a bag's results in a data set partitioned by arm and day."""
     return f'{data_set}/{folder_of(bag.arm)}/day={day}/{bag.name}.parquet'
 
 
 def write_summary(store: Store, summary: BagSummary, job: Job) -> None:
-    """Write a bag's summary to the table `bags`, and its estimate to the table `parameters`."""
+    """Write the summary of a bag to the table `bags`, and its estimate to `parameters`."""
     bag, own = summary.bag, summary.own
     start = datetime.datetime.fromtimestamp(summary.start_ns * 1e-9, datetime.UTC)
     robot = job.arm.robot
@@ -155,7 +155,7 @@ def find_summary(store: Store, bag: BagFile, job: Job) -> BagSummary | Refused |
 
 
 def write_refused(store: Store, refused: Refused, job: Job) -> None:
-    """Write to the table `refused` that a bag is left out, and why."""
+    """Write a refused bag and the reason to the table `refused`."""
     row = {
         'bag': refused.bag.url,
         'version': refused.bag.version,
@@ -215,7 +215,7 @@ def arm_is_done(store: Store, arm: str, bags: Sequence[BagFile], job: Job) -> li
 
 
 def _versions(versions: Sequence[tuple[str, str]]) -> str:
-    """Return a hash of the URLs and versions of bags."""
+    """Return a hash of the (URL, version) pairs of bags."""
     return digest(*sorted('\t'.join(pair) for pair in versions))
 
 
@@ -234,6 +234,6 @@ def _estimate(arm: str) -> str:
 
 
 def _days(store: Store, bag: BagFile, data_set: str = 'bags') -> list[str]:
-    """Return the days under which the stored results contain a file of the bag."""
+    """Return the days for which the data set contains results of the bag."""
     pattern = f'{data_set}/{folder_of(bag.arm)}/day=*/{bag.name}.parquet'
     return [name.split('/')[2].removeprefix('day=') for name in store.names(pattern)]

@@ -109,7 +109,7 @@ def take(bag: BagFile, job: Job, bags_of_arm: int) -> BagSummary | Refused:
 
 
 def same(job: Job) -> Job:
-    """Dask task: return a job unchanged, so that a worker keeps it and Dask can recreate it."""
+    """Dask task: return the job, so that workers store the job and Dask can recreate it."""
     return job
 
 
@@ -120,7 +120,7 @@ def fit(bags: Sequence[MergedBags], job: Job) -> Fitted:
 
 
 def noise(taken: BagSummary | Refused, fitted: Fitted, job: Job) -> FloatArray | None:
-    """Dask task: compute the noise covariance of the normal equations of a bag."""
+    """Dask task: return the noise covariance (r, r) of the normal equations of a bag."""
     known = fitted[1]
     if known is None or isinstance(taken, Refused):
         return None
@@ -130,7 +130,7 @@ def noise(taken: BagSummary | Refused, fitted: Fitted, job: Job) -> FloatArray |
 def finish(
     arm: str, fitted: Fitted, products: Sequence[FloatArray | None], job: Job
 ) -> ArmOutcome:
-    """Dask task: write the estimate of an arm to the results; return the arm's outcome."""
+    """Dask task: write the estimate of an arm to the results, and return the outcome."""
     merged, known = fitted
     problem = ''
     if known is None or merged.normal is None:
@@ -148,7 +148,7 @@ def identify_fleet(
     report: Callable[[int, int], None] = lambda finished, bags: None,
 ) -> FleetOutcome:
     """
-    Identify every arm of a fleet.
+    Identify every arm of a fleet on a cluster, and return the outcome.
 
     Parameters
     ----------
@@ -176,7 +176,7 @@ def identify_fleet(
 
 @dataclass(frozen=True)
 class _Waiting:
-    """Arm whose Dask tasks are not submitted yet, with bags to read and failed bags."""
+    """Arm that waits for the submission of its Dask tasks: bags to read and failed bags."""
 
     arm: str
     bags: tuple[BagFile, ...]
@@ -186,7 +186,7 @@ class _Waiting:
 
 @dataclass
 class _UnderWay:
-    """Submitted Dask tasks of an arm, in the order of its bags."""
+    """Submitted Dask tasks of an arm; tasks of bags are in the order of the bags."""
 
     arm: _Waiting
     prepared: list[Future]
@@ -222,7 +222,7 @@ class _Run:
                 self._count(own)
 
     def work(self) -> None:
-        """Process all arms, with enough arms in progress that no worker is idle."""
+        """Process all arms, with enough arms at the same time to keep all workers busy."""
         # bags in progress: a constant, and a number per thread
         limit = 2 + 4 * sum(self._client.nthreads().values())
         under_way: dict[Any, _UnderWay] = {}
@@ -283,7 +283,7 @@ class _Run:
         return _UnderWay(arm, prepared, fitted, products, last)
 
     def _begin_again(self, tasks: _UnderWay) -> None:
-        """Submit a failed arm again, without the bags that caused its failure."""
+        """Submit a failed arm again, without the bags that caused the failure."""
         # Tasks that depend on a failed task fail too, so the noise tasks are checked only if all
         # bags were read. If another bag may have killed the worker, the bag is read once more
         # alone.

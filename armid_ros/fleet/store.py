@@ -22,12 +22,12 @@ from pyarrow import parquet
 
 
 class StoreError(Exception):
-    """Failed access to a store or invalid answer; the operation can be repeated."""
+    """Failed access to a file store, or an invalid answer; the operation can be repeated."""
 
 
 def opened(url: str) -> tuple[Any, str]:
     """
-    Return the file system of a URL, and the path in this file system.
+    Return the file system of a URL (fsspec), and the path in this file system.
 
     Raises
     ------
@@ -44,7 +44,7 @@ def opened(url: str) -> tuple[Any, str]:
 @contextmanager
 def fetched(url: str) -> Iterator[str]:
     """
-    Yield the local path of a bag; a remote bag is copied first, and the copy is deleted later.
+    Yield the local path of a bag; copy a remote bag first, and delete the copy at the end.
 
     Raises
     ------
@@ -63,7 +63,7 @@ def fetched(url: str) -> Iterator[str]:
         try:
             filesystem.get(path, here, recursive=filesystem.isdir(path))
         except FileNotFoundError as error:
-            raise RecordingError(f'{url}: there is no such bag') from error
+            raise RecordingError(f'{url}: the bag does not exist') from error
         except PermissionError as error:
             raise RecordingError(f'{url}: no permission to read: {error}') from error
         except Exception as error:  # stores raise different exceptions
@@ -92,7 +92,7 @@ class Store:
 
     @property
     def local(self) -> Path | None:
-        """Return the path of the folder if it is on this machine; None if it is remote."""
+        """Path of the folder if the folder is on this machine; None for a remote folder."""
         filesystem, path = self._place
         return Path(path) if isinstance(filesystem, LocalFileSystem) else None
 
@@ -117,7 +117,7 @@ class Store:
             raise StoreError(f'{self.url}/{name}: {type(error).__name__}: {error}') from error
 
     def read(self, name: str) -> bytes | None:
-        """Return the content of a file; None if there is no such file."""
+        """Return the content of a file; None if the file does not exist."""
         filesystem, root = self._place
         try:
             return bytes(filesystem.cat_file(f'{root}/{name}'))
@@ -127,7 +127,7 @@ class Store:
             raise StoreError(f'{self.url}/{name}: {type(error).__name__}: {error}') from error
 
     def remove(self, name: str) -> None:
-        """Remove a file, if there is one."""
+        """Remove a file, if the file exists."""
         filesystem, root = self._place
         with suppress(FileNotFoundError):
             filesystem.rm_file(f'{root}/{name}')
@@ -139,18 +139,18 @@ class Store:
         return sorted(path[len(root) + 1 :] for path in found)
 
     def write_table(self, name: str, table: pyarrow.Table) -> None:
-        """Write a table as Parquet."""
+        """Write a table as a Parquet file."""
         buffer = io.BytesIO()
         parquet.write_table(table, buffer, compression='zstd')
         self.write(name, buffer.getvalue())
 
     def read_table(self, name: str) -> pyarrow.Table | None:
-        """Return the table of a Parquet file; None if there is no such file."""
+        """Return the table in a Parquet file; None if the file does not exist."""
         data = self.read(name)
         return None if data is None else parquet.read_table(io.BytesIO(data))
 
     def data_set(self, name: str) -> pyarrow.Table | None:
-        """Return all parts of a partitioned data set in a single table; None if there are none."""
+        """Return a partitioned data set as a single table; None if it does not exist."""
         filesystem, root = self._place
         if not filesystem.isdir(f'{root}/{name}'):
             return None

@@ -86,7 +86,7 @@ ARMS = pa.schema(
 @dataclass(frozen=True, eq=False)
 class WatchedArm:
     """
-    The estimates of an arm over time, and their significant changes.
+    Estimates of an arm over time, and significant changes of the estimates.
 
     Attributes
     ----------
@@ -120,7 +120,7 @@ class WatchedArm:
 
     @property
     def health(self) -> str:
-        """Return the health of the arm: changed, wearing, healthy or too few bags."""
+        """Health of the arm: changed, wearing, healthy or too few bags."""
         if self.named:
             return 'changed' if self.named[0].kind == 'step' else 'wearing'
         return 'healthy' if self.judged.changes else 'too few bags'
@@ -168,7 +168,7 @@ def watch_fleet(store: Store, alpha: float = 0.05) -> Watch:
     facts = document(store)
     kind_of: Mapping[str, str] = facts.get('arms', {})
     if not kind_of:
-        raise FleetError(f'{store.url}: holds no fleet results; run `armid fleet identify` first')
+        raise FleetError(f'{store.url}: no fleet results; run `armid fleet identify` first')
     bags = _by_arm(_table(store, 'bags').drop_columns(['normal_equations']))
     for rows in bags.values():
         rows.sort(key=lambda row: (row['start_ns'], row['bag']))
@@ -296,7 +296,7 @@ def day_text(days: float) -> str:
 
 
 def parameter_label(name: str, joint: str) -> str:
-    """Return a readable name of a watched parameter, such as 'viscous coefficient of elbow'."""
+    """Return the name of a watched parameter in words: 'viscous coefficient of elbow'."""
     if name == RESIDUAL:
         return f'residual torque of {joint}'
     if name.isidentifier() and '_' in name:
@@ -307,7 +307,7 @@ def parameter_label(name: str, joint: str) -> str:
 def _table(store: Store, data_set: str) -> pa.Table:
     table = store.data_set(data_set)
     if table is None:
-        raise FleetError(f'{store.url}: holds no {data_set}; run `armid fleet identify` first')
+        raise FleetError(f'{store.url}: no table {data_set}; run `armid fleet identify` first')
     return table
 
 
@@ -321,7 +321,7 @@ def _by_arm(table: pa.Table | None) -> dict[str, list[dict[str, Any]]]:
 def _series(
     parameters: pa.Table, bags: Mapping[str, list[dict[str, Any]]]
 ) -> list[ParameterHistory]:
-    """Return the history of each parameter and of each joint's log residual, for all arms."""
+    """Return histories, for all arms, of each parameter and of each joint's log residual."""
     found = []
     for arm, own in sorted(bags.items()):
         fitted = [row for row in own if row['residual_std']]

@@ -69,7 +69,7 @@ def test_the_version_changes_with_the_bag(store):
     [
         ('/nowhere/*/*', None, 'there is no bag'),
         ('gopher://host/*', None, 'gopher'),
-        ('{store}/line_1/*/*/*', 'arm', r'no \(group\)'),
+        ('{store}/line_1/*/*/*', 'arm', r'add a \(group\)'),
         ('{store}/line_1/*/*/*', 'robot_(.)', 'does not match'),
         ('{store}/line_1/*/*/*', '(', '--arm'),
         ('{store}/line_1/*/*/*', '/line_1/()', '--arm'),
