@@ -52,7 +52,7 @@ class RobotError(ArmidError):
 
 
 class RecordingError(ArmidError):
-    """Error for a recording that cannot be read, or that does not fit the robot."""
+    """Error if a recording cannot be read, or does not fit the robot."""
 
 
 class ModelError(ArmidError):
@@ -60,11 +60,11 @@ class ModelError(ArmidError):
 
 
 class TrajectoryError(ArmidError):
-    """Error for a trajectory that violates limits, or if no valid trajectory is found."""
+    """Error if a trajectory violates limits, or if no valid trajectory is found."""
 
 
 class IdentificationError(ArmidError):
-    """Error for data or settings from which no model can be identified."""
+    """Error if no model can be identified from the data with the chosen settings."""
 
 
 class RecordingEnded(RecordingError):

@@ -254,7 +254,7 @@ class DiagnosisResult(ShownModel):
         return replace(result, next_run=run, no_run='; '.join(why))
 
     def _steps(self, model: str) -> list[str]:
-        """Return the next steps for the user; their commands contain `model`, the model's path."""
+        """Return the next steps for the user; `model` is the model's path in their commands."""
         worse = dict.fromkeys(joint for pair in self.forward for joint in pair.worse)
         learned = self.residual is not None
         steps = next_steps(self.core, self.next_run, self.no_run, model, tuple(worse), learned)

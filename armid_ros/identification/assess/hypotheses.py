@@ -182,7 +182,7 @@ def delayed(seconds: float, half_width: float) -> Hypothesis:
 
 def shifted(motion: Motion, seconds: float) -> Motion:
     """
-    Shift the positions of a motion in time by the delay of the torque [s].
+    Delay the positions of a motion by `seconds`, as its torques are delayed.
 
     The torque is not interpolated, as this would reduce its noise.
 

@@ -21,11 +21,11 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from armid_ros.arm import ArmModel
-from armid_ros.errors import ArmidError, IdentificationError
+from armid_ros.errors import ArmidError
 from armid_ros.identification.fitting.instruments import check_noise, NoiseCheck
 from armid_ros.identification.fitting.nonlinear import linearised
 from armid_ros.identification.identify import Identification
-from armid_ros.identification.rows.signals import Conditioning, decimate, segments
+from armid_ros.identification.rows.signals import Conditioning, decimate, no_stretch, segments
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.recording import Recording
 from armid_ros.simulation import Controller, Plant, simulate
@@ -109,7 +109,7 @@ def _forward_score(
     """Return errors of an arm simulated with recorded torques and feedback of `nominal`."""
     motion = next(iter(segments(recording, used)), None)
     if motion is None:
-        raise IdentificationError(f'{recording.source}: no section is long enough; record longer')
+        raise no_stretch(recording, used)
     motion = motion.select(motion.t <= motion.t[0] + duration)
     reference = replace(motion, t=motion.t - motion.t[0])
     # With slower feedback, the friction of a light joint dominates. No model predicts to the

@@ -134,8 +134,8 @@ class NuisanceRows:
 
 
 @dataclass(eq=False)
-class _Stretch:
-    """Samples of a block that was not searched yet; `end` is None before an interruption."""
+class _RawBlock:
+    """Samples of a block before the search for changes; `end` is None before an interruption."""
 
     begin: float
     end: float | None = None
@@ -191,8 +191,8 @@ class ChangeWatch:
         # of the assumed noise, which is 1e-4 of the torque limit [-]
         self._residual_scale = ResidualScale(0.01 if self._estimator.noise_is_relative else 1.0)
         self._fit_ratios: deque[float] = deque(maxlen=MAX_BLOCKS)
-        self._open: _Stretch | None = None
-        self._queued: deque[_Stretch] = deque()
+        self._open: _RawBlock | None = None
+        self._queued: deque[_RawBlock] = deque()
         self._searching = False
 
     def use(self, false_alarm_time: float | None, forgetting: float) -> None:
@@ -212,7 +212,7 @@ class ChangeWatch:
 
     def interrupt(self) -> None:
         """Begin a new block after an interruption of the stream."""
-        self._open = self._open or _Stretch(0.0)
+        self._open = self._open or _RawBlock(0.0)
         self._queue(None)
 
     def update(self, row: Row) -> None:
@@ -220,7 +220,7 @@ class ChangeWatch:
         if self._open is not None and row.t - self._open.begin >= BLOCK_LENGTH:
             self._queue(row.t)
         if self._open is None:
-            self._open = _Stretch(row.t)
+            self._open = _RawBlock(row.t)
         self._open.rows.append(row)
         self._estimator.update(*row.sample)
 
@@ -293,7 +293,7 @@ class ChangeWatch:
 
     def _block(
         self,
-        stretch: _Stretch,
+        stretch: _RawBlock,
         end: float,
         samples: Sequence[WeightedSample],
         before: RecursiveLeastSquares,

@@ -148,7 +148,7 @@ def stacked(problems: Sequence[InteractionProblem]) -> InteractionProblem:
 
     """
     if any(part.rigid != problems[0].rigid for part in problems):
-        raise IdentificationError('a section has too little motion to fit inertias; record longer')
+        raise IdentificationError('sections determine different inertias; record more in each')
     joined = {name: np.concatenate([getattr(part, name) for part in problems]) for name in STACKED}
     return replace(problems[0], **joined)  # type: ignore[arg-type]
 

@@ -88,4 +88,4 @@ def test_missing_friction_moves_the_arm_by_its_torque_over_the_stiffness(arm):
     assert wrong.position_error[0] > 5.0 * right.position_error[0]
     assert 0.02 < wrong.feedback_torque[0] < 0.2
     _, (why,) = simulate_held_out(other, arm, USED, [exact.select(slice(0, 20))])
-    assert why.startswith('bag: not simulated: bag: no stretch')
+    assert why.startswith('bag: not simulated: bag: no section')
