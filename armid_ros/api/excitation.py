@@ -156,7 +156,7 @@ class ExcitationResult(Shown):
 
     @cached_property
     def isolability(self) -> Isolability:
-        """Return which effects the trajectory makes detectable, and which it cannot separate."""
+        """Effects that the trajectory makes detectable, and effects that it cannot separate."""
         settings = self.core.settings
         noise, count = torque_noise(self.arm, settings), settings.rate * self.duration
         return isolability(self.arm, self.motion(), noise, count)

@@ -343,7 +343,7 @@ def _spread(group: Sequence[ParameterHistory]) -> Spread:
 
 
 def _prior_freedom(
-    group: Sequence[ParameterHistory], found: Mapping[tuple[str, str], Spread]
+    group: Sequence[ParameterHistory], scatters: Mapping[tuple[str, str], Spread]
 ) -> float:
     """
     Return prior degrees of freedom for the variances of single arms, by empirical Bayes.
@@ -356,7 +356,7 @@ def _prior_freedom(
     tested = [one for one in group if len(one.values) >= _MIN_BAGS]
     if len(tested) < _MIN_ARMS:
         return _MAX_FREEDOM
-    logs = np.log([_ratio(one, found[one.parameter]) for one in tested])
+    logs = np.log([_ratio(one, scatters[one.parameter]) for one in tested])
     own = [_trigamma(0.5 * _freedom(len(one.values))) for one in tested]
     # relative standard error of a variance from the median of n absolute deviations
     sure = 1.0 - 2.33 / np.sqrt(len(logs))
@@ -395,14 +395,14 @@ def _variances(series: ParameterHistory, spread: Spread) -> tuple[FloatArray, fl
 
 
 def _inflation(
-    group: Sequence[ParameterHistory], found: dict[tuple[str, str], Spread]
+    group: Sequence[ParameterHistory], scatters: dict[tuple[str, str], Spread]
 ) -> tuple[float, float]:
     """Return inflation factors (at least 1) for the steps and the trends of healthy arms."""
     steps, trends = [], []
     for one in group:
         if len(one.values) < _MIN_BAGS:
             continue
-        split = _splits(one, found[one.parameter])
+        split = _splits(one, scatters[one.parameter])
         third = len(split.scores) // 3
         steps.append(float(np.median(split.scores[third : len(split.scores) - third] ** 2)))
         trends.append(split.trend**2)

@@ -77,11 +77,11 @@ def two_means(x: FloatArray, weights: FloatArray) -> tuple[FloatArray, FloatArra
     return low, high, np.sqrt(1.0 / before + 1.0 / after)
 
 
-def beyond_chance(chances: Sequence[float] | FloatArray, allowed: float) -> list[bool]:
-    """Return whether each p-value is significant at a family-wise error rate, by Holm (1979)."""
-    beyond = [False] * len(chances)
-    for tried, index in enumerate(np.argsort(chances)):
-        if chances[index] > allowed / (len(chances) - tried):
+def beyond_chance(p_values: Sequence[float] | FloatArray, error_rate: float) -> list[bool]:
+    """Return whether each p-value is significant at `error_rate` over all tests (Holm 1979)."""
+    beyond = [False] * len(p_values)
+    for tried, index in enumerate(np.argsort(p_values)):
+        if p_values[index] > error_rate / (len(p_values) - tried):
             break
         beyond[int(index)] = True
     return beyond

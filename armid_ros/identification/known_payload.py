@@ -217,16 +217,16 @@ def drive_gains(
 
 
 def _gain(
-    columns: FloatArray, known: FloatArray, tau: FloatArray, blocks: FloatArray
+    columns: FloatArray, payload_torque: FloatArray, tau: FloatArray, blocks: FloatArray
 ) -> tuple[float, float, float]:
     """Return a drive's gain, with the standard deviation and half-width of its 95 % interval."""
     scale = np.linalg.norm(columns, axis=0)
     columns = columns[:, scale > 0.0] / scale[scale > 0.0]
     # regression of the effort's residual on that of the payload's torque (Frisch and Waugh)
-    column, target = residual_of_fit(np.column_stack([known, tau]), columns).T
+    column, target = residual_of_fit(np.column_stack([payload_torque, tau]), columns).T
     size = float(column @ column)
     # the joint's own columns explain the torque of the payload
-    if size <= 1e-8 * float(known @ known):
+    if size <= 1e-8 * float(payload_torque @ payload_torque):
         return 1.0, np.inf, np.inf
     gain = float(column @ target) / size
     residual = target - gain * column

@@ -59,7 +59,7 @@ class ParameterChange:
 @dataclass(frozen=True)
 class GroupChange:
     """
-    Test for a common change of the parameters of a joint's effects, or of the rigid body.
+    Test result for a common change of the effects of a joint, or of the rigid body.
 
     Attributes
     ----------

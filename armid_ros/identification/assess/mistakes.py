@@ -162,10 +162,10 @@ def find_mistake(
     if without.gain(exact) < LIMITS.gain and not alone:
         return None
 
-    def rows(some: Sequence[Hypothesis]) -> list[_Tested]:
+    def rows(tested: Sequence[Hypothesis]) -> list[_Tested]:
         """Test hypotheses; also fit the links if errors of the links may change the decision."""
         found = []
-        for one in some:
+        for one in tested:
             after = _error(robot, slow, one, near=False)
             if after is None:
                 continue
@@ -207,14 +207,14 @@ def find_mistake(
 
 
 def _error(
-    robot: Robot, slow: Sequence[Motion], one: Hypothesis, *, near: bool
+    robot: Robot, slow: Sequence[Motion], hypothesis: Hypothesis, *, near: bool
 ) -> PredictionError | None:
     """Return the torque error after the correction of a hypothesis; None for too few samples."""
     # 200 samples: twenty for each of the ten parameters of a link
-    motion = thinned([one.motion(motion) for motion in slow], 200)
+    motion = thinned([hypothesis.motion(motion) for motion in slow], 200)
     if motion is None or len(motion) < _MIN_SAMPLES:
         return None
-    return prediction_error(one.body(robot), motion, near=near)
+    return prediction_error(hypothesis.body(robot), motion, near=near)
 
 
 def _most_likely(rows: Sequence[_Tested], ratio: str, before: PredictionError) -> Mistake:

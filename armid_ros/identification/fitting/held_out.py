@@ -258,10 +258,10 @@ def _fit(
 
 
 def _some_rows(
-    problem: Sequence[Regression], most: int
+    problem: Sequence[Regression], count: int
 ) -> tuple[int, FloatArray, FloatArray, FloatArray, npt.NDArray[np.bool_]]:
-    """Return stride, columns, torque, target and informative mask of about `most` samples."""
-    step = max(1, sum(len(part.tau) for part in problem) // most)
+    """Return stride, columns, torque, target and informative mask of about `count` samples."""
+    step = max(1, sum(len(part.tau) for part in problem) // count)
     columns, tau, target = (
         np.concatenate([getattr(part, name) for part in problem])[::step]
         for name in ('columns', 'tau', 'target')

@@ -121,16 +121,16 @@ class ScoreStatistics:
         values = np.linalg.solve(own, score[sets][:, :, np.newaxis])
         return np.asarray(np.einsum('gp,gp->g', score[sets], values[:, :, 0]))
 
-    def size(self, some: slice) -> tuple[FloatArray, FloatArray]:
+    def size(self, selection: slice) -> tuple[FloatArray, FloatArray]:
         """
         Return the estimated sizes of selected changes, with their covariance for white noise.
 
         The variance of a change is infinite if this window alone does not determine the change.
 
         """
-        information = self.information[some, some]
+        information = self.information[selection, selection]
         covariance = np.linalg.pinv(information, hermitian=True)
-        values = np.asarray(covariance @ self.score[some])
+        values = np.asarray(covariance @ self.score[selection])
         shown = np.einsum('pq,qp->p', covariance, information)  # 1 for a change that is determined
         hidden = np.flatnonzero(shown < 1.0 - 1e-6)
         covariance[hidden, hidden] = np.inf

@@ -181,13 +181,13 @@ class RobustCovariance:
         return np.asarray(half @ half.T)
 
 
-def _sum(some: _Bands, more: _Bands) -> Pieces[_Bands]:
+def _sum(left: _Bands, right: _Bands) -> Pieces[_Bands]:
     """Return the sum of two sets of Fourier products, computed in short pieces of work."""
-    products = np.empty_like(some.products)
-    for place, first, second in zip(products, some.products, more.products, strict=True):
+    products = np.empty_like(left.products)
+    for place, first, second in zip(products, left.products, right.products, strict=True):
         np.add(first, second, out=place)
         yield
-    return _Bands(products, some.counts + more.counts)
+    return _Bands(products, left.counts + right.counts)
 
 
 def _transformed(columns: FloatArray) -> Pieces[_Bands]:
