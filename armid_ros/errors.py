@@ -21,7 +21,7 @@ def meant(name: str, names: Iterable[str]) -> str:
 
 
 def visible(text: str) -> str:
-    """Return a text with its control characters escaped, which is safe to print on a terminal."""
+    """Return a text, safe to print on a terminal, with its control characters escaped."""
     if text.isprintable():
         return text
     return ''.join(c if c.isprintable() or c in '\n\t' else repr(c)[1:-1] for c in text)

@@ -30,7 +30,7 @@ def read_only(values: npt.ArrayLike) -> FloatArray:
 
 
 def freeze(instance: object, *names: str) -> None:
-    """Make array attributes of a frozen dataclass read-only, in its ``__post_init__``."""
+    """Make the named array attributes of a frozen dataclass instance read-only."""
     for name in names:
         if getattr(instance, name) is not None:
             object.__setattr__(instance, name, read_only(getattr(instance, name)))

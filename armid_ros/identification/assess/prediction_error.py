@@ -59,7 +59,7 @@ class PredictionError:
 
     def gain(self, better: PredictionError) -> float:
         """
-        Return the likelihood ratio of another prediction to this one, per independent sample.
+        Return the likelihood ratio of `better` to this prediction, per independent sample.
 
         The likelihood ratio of models with unknown noise is multiplied by the ratio of the
         priors of their links. Errors are limited to the range from the floor to the torque itself.

@@ -34,7 +34,7 @@ from scipy.integrate import cumulative_trapezoid
 @dataclass(frozen=True)
 class Fault:
     """
-    Fault of one recording or of all recordings, with its effect on the grade.
+    Fault of one or of all recordings, and the best grade possible with the fault.
 
     Attributes
     ----------

@@ -224,7 +224,7 @@ class RecursiveLeastSquares:
 
     def forget_directions(self, directions: FloatArray) -> None:
         """
-        Forget the information on some combinations of parameters.
+        Forget the information on `directions`, combinations of parameters.
 
         Parameters
         ----------
@@ -274,7 +274,7 @@ class RecursiveLeastSquares:
     @property
     def variance_factor(self) -> float:
         """
-        Return the variance of the weighted residuals, which is 1 if the given noise is right.
+        Return the variance of the weighted residuals, which is 1 if the assumed noise is right.
 
         It is also 1 while there are no more observations than parameters.
 

@@ -140,7 +140,7 @@ class CausalMotion(NamedTuple):
 
 class CausalFilter:
     """
-    Motion filter for a stream of joint states, which also differentiates positions.
+    Motion filter that smooths and differentiates a stream of joint states.
 
     The sampling period is the median of the first intervals, learned again after every restart.
     A sample with a wrong length, or with a number that is not finite or above MAX_MAGNITUDE, is

@@ -56,7 +56,7 @@ class _Sender:
 
 class JointMerger:
     """
-    Merger of joint states from several senders, each of which has different joints.
+    Merger of joint states from several senders with different joints.
 
     The sender of the first joint defines the times of the merged samples; signals of other senders
     are interpolated linearly between their stamps of the same clock. A joint with two senders is

@@ -59,7 +59,7 @@ class StreamSample:
 @dataclass(frozen=True, eq=False)
 class Excursion:
     """
-    Successive samples off the predicted straight line, to which later samples return.
+    Successive samples off a predicted straight line that later samples are on again.
 
     Attributes
     ----------

@@ -217,7 +217,7 @@ def _white(signals: FloatArray) -> FloatArray:
 @dataclass(frozen=True)
 class SensorNoise:
     """
-    Torque noise of an arm that springs connect to another machine.
+    Torque noise of an arm that is connected to another machine by springs.
 
     With springs, the noise of angles dominates. It is known far better from the angles themselves
     than from the difference of two periods of some seconds.
