@@ -150,7 +150,7 @@ class ExcitationResult(Shown):
 
     @cached_property
     def run(self) -> Run:
-        """Return approach, trajectory and return as a run; TrajectoryError if there is no path."""
+        """Run of approach, trajectory and way back; TrajectoryError if no path is found."""
         excitation = self.core.excitation
         return plan_run(excitation, self.planner, self.start, WAYPOINT_RATE, seed=self.seed)
 

@@ -281,7 +281,9 @@ def parameters_of(source: str, document: dict[str, Any]) -> ParameterFile:
     values: dict[ParameterName, tuple[float, float]] = {}
     for row in rows:
         if 'unit' not in row:
-            raise ValueError(f"parameter '{row['name']}' of joint '{row['joint']}' has no unit")
+            raise ValueError(
+                f"parameter '{row['name']}' of joint '{row['joint']}' has no 'unit'; add this key"
+            )
         name = ParameterName(str(row['name']), str(row['joint']), str(row['unit']))
         parameter = f'{name.name} of joint {name.joint}'
         if name in values:
@@ -372,5 +374,7 @@ def _covariance(rows: list[list[float]] | None, size: int) -> FloatArray | None:
     largest = np.outer(deviations, deviations)
     # numbers in the file have 16 digits
     if (np.diag(matrix) < 0.0).any() or (np.abs(matrix) > largest * (1.0 + 1e-9)).any():
-        raise ValueError('the covariance has a negative variance, or a correlation beyond one')
+        raise ValueError(
+            'the covariance has a negative variance, or a correlation above 1; identify again'
+        )
     return matrix

@@ -260,7 +260,7 @@ def _fit(
 def _some_rows(
     problem: Sequence[Regression], count: int
 ) -> tuple[int, FloatArray, FloatArray, FloatArray, npt.NDArray[np.bool_]]:
-    """Return stride, columns, torque, target and informative mask of about `count` samples."""
+    """Return stride, columns, torque, target and `informative` of about `count` samples."""
     step = max(1, sum(len(part.tau) for part in problem) // count)
     columns, tau, target = (
         np.concatenate([getattr(part, name) for part in problem])[::step]

@@ -130,11 +130,11 @@ def _suspects(
     t: FloatArray, x: FloatArray, floor: FloatArray
 ) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.bool_], ErrorModel]:
     """
-    Find samples that are off the straight line through the two previous samples.
+    Return section starts, a mask of samples off their predicted line, and the error model.
 
-    Returns for each sample the first sample of its stretch, (N,), and whether a signal is off its
-    line by more than the largest allowed error, (N,); then the prediction errors in the noisiest
-    window.
+    Returns for each sample the first sample of its section, (N,), and whether a signal is off
+    the line through the two previous samples by more than the largest allowed error, (N,); then
+    the prediction errors in the noisiest window.
 
     """
     dt = np.diff(t)

@@ -213,7 +213,7 @@ class Score:
     def of_rows(
         residual: FloatArray, tau: FloatArray, informative: npt.NDArray[np.bool_]
     ) -> Score:
-        """Return the torque errors at informative samples, from residuals and torques, (N, n)."""
+        """Return torque errors from residuals and torques, (N, n), where `informative` is true."""
         errors, lengths = (np.linalg.norm(informative * x, axis=0) for x in (residual, tau))
         count, whole = np.maximum(informative.sum(axis=0), 1), np.linalg.norm(lengths)
         return Score(

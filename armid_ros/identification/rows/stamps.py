@@ -62,16 +62,7 @@ def rounded_stamps(recording: Recording) -> str:
 
 
 def check_recordings(recordings: Sequence[Recording]) -> None:
-    """
-    Raise an error for a recording that has too few samples per second, or two senders.
-
-    Raises
-    ------
-    IdentificationError
-        If samples are too far apart, as with stamps that are not in seconds, or if two senders
-        publish on the topic.
-
-    """
+    """Raise IdentificationError for too few samples per second, or for two senders of a topic."""
     for recording in recordings:
         source, rate = recording.source or 'recording', 1.0 / recording.period
         if rate < 2.0:  # too slow to resolve the motion of an arm

@@ -154,5 +154,7 @@ def joint_places(joints: Sequence[str], names: Sequence[str]) -> npt.NDArray[np.
         )
     twice = [joint for joint in joints if list(names).count(joint) > 1]
     if twice:
-        raise RecordingError(f'the joint states contain joint {", ".join(twice)} twice')
+        raise RecordingError(
+            f'the joint states contain joint {", ".join(twice)} twice; publish each joint once'
+        )
     return np.array([list(names).index(joint) for joint in joints], dtype=np.intp)

@@ -64,7 +64,9 @@ def recorded_interaction_problem(
 
     """
     if recording.tau is None:
-        raise IdentificationError(f'{recording.source}: no effort on {recording.topic}; record it')
+        raise IdentificationError(
+            f'{recording.source}: {recording.topic} has no effort; record the efforts of the arm'
+        )
     together = recorded_together(recording, other_recording, machines.other, machines.ties)
     settings = SignalSettings()
     both = _one_machine(together)
