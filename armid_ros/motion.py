@@ -17,7 +17,7 @@ Samples = slice | npt.NDArray[np.intp] | npt.NDArray[np.bool_]
 
 def read_only(values: npt.ArrayLike) -> FloatArray:
     """
-    Convert values to a contiguous float64 array that cannot be written to.
+    Return values as a contiguous float64 array that cannot be written to.
 
     An array that is already a read-only view of immutable memory is not copied.
 

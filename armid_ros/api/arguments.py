@@ -72,7 +72,7 @@ def arm_of(arm: RobotLike, effects: str = USUAL) -> ArmModel:
 
 
 def with_effects(arm: ArmModel, names: str) -> ArmModel:
-    """Add effects from a comma-separated list to an arm, unless the arm has them already."""
+    """Return the arm with the effects of a comma-separated list added, without duplicates."""
     for name in filter(None, parted(names)):
         effect = make_effect(name, arm.robot)
         if (effect.name, effect.joints) not in [(own.name, own.joints) for own in arm.effects]:
@@ -119,7 +119,7 @@ def recordings_of(
 
 
 def with_unique_sources(*groups: list[Recording]) -> tuple[list[Recording], ...]:
-    """Append numbers to equal source names of recordings, except names of existing files."""
+    """Return recordings with numbers appended to equal source names, except file names."""
     taken: Counter[str] = Counter()
     named = [list(group) for group in groups]
     for group in named:

@@ -195,7 +195,7 @@ class DiagnosisResult(ShownModel):
         )
 
     def fill(self, folder: Path, origin: ResultOrigin = DEFAULT_ORIGIN) -> dict[str, Any]:
-        """Write diagnosis.json, model.yaml and report.html into a folder."""
+        """Write diagnosis.json, model.yaml and report.html to a folder; return the document."""
         source = origin.of(source_of(self.description.robot)).source
         save_model(folder / 'model.yaml', self.arm, source, self.core.estimate, self.misfit)
         if self.residual is not None:
@@ -214,7 +214,7 @@ class DiagnosisResult(ShownModel):
         ]
 
     def with_residual(self, seed: int) -> DiagnosisResult:
-        """Add a learned map of the unexplained residual torque, or a note why there is none."""
+        """Return the result with a learned map of the unexplained residual, or a note why not."""
         if self.verdict not in OPEN:
             note = f'nothing is learned for the verdict {self.verdict.replace("_", " ")}'
             return replace(self, notes=(*self.notes, note))

@@ -246,7 +246,7 @@ def corrected(
     gains: DriveGains,
     signals: SignalSettings,
 ) -> list[Recording]:
-    """Convert efforts to torques of the bare arm: divide by gains, subtract payload torques."""
+    """Return recordings with the bare arm's torques: efforts over gains, minus payload."""
     result = []
     for recording in recordings:
         assert recording.tau is not None

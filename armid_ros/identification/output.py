@@ -145,7 +145,7 @@ def write_document(path: str | Path, document: Mapping[str, Any]) -> None:
 
 
 def with_digests(document: Mapping[str, Any]) -> dict[str, Any]:
-    """Add size and digest of each recording to the content of identification.json."""
+    """Return the content of identification.json with size and digest of each recording."""
     there = [(name, Path(name)) for name in _names(document)]
     rows = [{'bag': name, **_content(path)} for name, path in there if path.exists()]
     return {**document, 'recordings': rows}

@@ -163,7 +163,7 @@ def find_mistake(
         return None
 
     def rows(tested: Sequence[Hypothesis]) -> list[_Tested]:
-        """Test hypotheses; also fit the links if errors of the links may change the decision."""
+        """Return tests of hypotheses; fit links too if link errors may change the decision."""
         found = []
         for one in tested:
             after = _error(robot, slow, one, near=False)

@@ -135,7 +135,7 @@ def prediction_error(robot: Robot, motion: Motion, *, near: bool) -> PredictionE
 
 def common_values(motion: Motion, fixed: FloatArray, columns: FloatArray) -> FloatArray:
     """
-    Fit parameters that all joints share, such as the gravity vector, together with friction.
+    Return parameters that all joints share, such as gravity, fitted together with friction.
 
     The motion has N samples with torque, of which `fixed`, (N, n) [N m or N], is known. The
     regressor of the k values has shape (N, n, k). Returns the values, (k,).
@@ -153,7 +153,7 @@ def shared_values(
     own: FloatArray, shared: FloatArray, near: FloatArray | None = None
 ) -> tuple[FloatArray, FloatArray]:
     """
-    Fit parameters that all joints share, and nuisance parameters of each joint.
+    Return fitted parameters that all joints share, and the half-widths of their intervals.
 
     Columns of single joints are projected out (Frisch and Waugh 1933). Joints are weighted by
     their residuals, down to the floor. The interval allows for residuals that are correlated in

@@ -128,7 +128,7 @@ def noise_products(
 def _noise_spectrum(
     residual: FloatArray, informative: npt.NDArray[np.bool_], leverage: FloatArray
 ) -> FloatArray:
-    """Estimate the power spectrum (M + 1,) of a joint's torque noise from residuals (M,)."""
+    """Return the power spectrum (M + 1,) of a joint's torque noise, from residuals (M,)."""
     count = len(residual)
     size = 2 * count
     # the autocovariance of the informative samples is divided by the number of their pairs
@@ -161,7 +161,7 @@ def _noise_spectrum(
 
 
 def _smoothed(spectrum: FloatArray, reach: int) -> FloatArray:
-    """Smooth a power spectrum by Parzen's window over the first `reach` lags."""
+    """Return a power spectrum smoothed by Parzen's window over the first `reach` lags."""
     size = 2 * (len(spectrum) - 1)
     lags = np.fft.irfft(spectrum, size)
     x = np.arange(reach) / reach

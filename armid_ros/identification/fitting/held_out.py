@@ -250,7 +250,7 @@ def _fit(
     weights: npt.NDArray[np.floating] | npt.NDArray[np.bool_],
     precision: FloatArray | float = 0.0,
 ) -> FloatArray:
-    """Fit r parameters by weighted least squares, with a prior of mean 0 and given precision."""
+    """Return r parameters by weighted least squares, with a prior of mean 0 and `precision`."""
     rows = (x * weights[:, :, np.newaxis]).reshape(-1, x.shape[2])
     normal = rows.T @ rows
     normal[np.diag_indices_from(normal)] += precision

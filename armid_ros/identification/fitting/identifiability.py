@@ -74,7 +74,7 @@ def excited(
     theory: BaseParameters, problem: Sequence[Regression]
 ) -> tuple[BaseParameters, tuple[Regression, ...]]:
     """
-    Group parameters that a motion does not separate, such as the parameters of a resting joint.
+    Group parameters that a motion does not separate; return base parameters and their columns.
 
     Parameters
     ----------
@@ -99,7 +99,7 @@ def identifiable_base(
     theory: BaseParameters, normal: NormalEquations
 ) -> tuple[BaseParameters, list[int]]:
     """
-    Group the parameters that the normal equations do not separate.
+    Group parameters that normal equations do not separate; return base and column indices.
 
     Parameters
     ----------
@@ -140,7 +140,7 @@ def fit_determined(
     arm: ArmModel, base: BaseParameters, problem: Sequence[Regression], method: Method
 ) -> tuple[BaseParameters, tuple[Regression, ...], Solution]:
     """
-    Fit base parameters; keep described values if they are more certain than the data.
+    Fit the base parameters that the data determine better than the description does.
 
     Parameters are fixed one at a time, as each fixed parameter makes the others more certain.
 

@@ -137,7 +137,7 @@ def _by_instruments(
 
 
 def _smoothed(recordings: Sequence[Recording], used: Conditioning) -> list[Recording]:
-    """Low-pass the positions of recordings far below the cut-off of the regressor."""
+    """Return recordings with positions low-passed far below the cut-off of the regressor."""
     calm = []
     for recording in recordings:
         # band of the instruments over that of the regressor, which is ten times the band of the

@@ -374,7 +374,7 @@ def informative_basis(products: FloatArray) -> FloatArray:
 
 def informative_solution(products: FloatArray, aim: FloatArray) -> FloatArray:
     """
-    Solve normal equations; the solution is zero in unidentifiable directions.
+    Return the solution of normal equations, zero in unidentifiable directions, (p,) or (p, k).
 
     Parameters
     ----------
@@ -394,7 +394,7 @@ def informative_solution(products: FloatArray, aim: FloatArray) -> FloatArray:
 
 def scaled_inverse(matrix: FloatArray) -> FloatArray:
     """
-    Invert a covariance or precision matrix, (p, p), of values with different units.
+    Return the inverse of a covariance or precision matrix, (p, p), of different units.
 
     Eigenvalues below the rounding error are raised to the rounding error.
 

@@ -210,7 +210,7 @@ def linearised(
     arm: ArmModel, base: BaseParameters, recordings: Sequence[Recording], used: Conditioning
 ) -> tuple[tuple[Regression, ...], Torques]:
     """
-    Linearise the torque of an arm model at its present parameters.
+    Return the linearised torque of an arm model at its parameters, and the torque itself.
 
     Returns
     -------
@@ -233,7 +233,7 @@ def torques(arm: ArmModel, recordings: Sequence[Recording], used: Conditioning) 
 def exact_at(
     problem: Sequence[Regression], predicted: Torques, values: FloatArray
 ) -> tuple[Regression, ...]:
-    """Set the constants of linear problems so that `values` predict the torques `predicted`."""
+    """Return linear problems whose constants let `values` predict the torques `predicted`."""
     return tuple(
         replace(part, constant=torque - part.columns @ values)
         for part, torque in zip(problem, predicted, strict=True)

@@ -225,7 +225,7 @@ class ChangeWatch:
         self._estimator.update(*row.sample)
 
     def _with_nuisance(self, directions: FloatArray) -> FloatArray:
-        """Append zeros for the nuisance parameters to directions in parameter space."""
+        """Return directions in parameter space, with zeros appended for nuisance parameters."""
         more = len(self._wider.parameters) - self._count
         return np.vstack([directions, np.zeros((more, directions.shape[1]))])
 

@@ -369,7 +369,7 @@ class OnlineIdentifier:
     def _new_row(
         self, motion: CausalMotion, step: float, used: npt.NDArray[np.bool_], begins: bool
     ) -> OnlineSample:
-        """Compute the regressor and the torque prediction of a filtered joint state."""
+        """Return the torque prediction of a filtered joint state; store its regression row."""
         state = (motion.q[None], motion.dq[None], motion.ddq[None])
         one = Motion(self.arm.robot.joints, np.array([motion.t]), *state)
         robot = self.arm.robot

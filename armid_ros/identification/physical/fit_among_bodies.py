@@ -207,7 +207,7 @@ def fit_consistent_links(
     settings: PhysicalSettings,
 ) -> tuple[FittedValues, PhysicalCertificate]:
     """
-    Fit physically consistent links, starting from an unconstrained fit.
+    Fit physically consistent links, starting from an unconstrained fit; return a certificate too.
 
     Parameters
     ----------
@@ -251,7 +251,7 @@ def fit_consistent_links(
 def _fit_links(
     arm: ArmModel, fit: FittedValues, settings: PhysicalSettings
 ) -> tuple[FittedValues, PhysicalCertificate]:
-    """Fit physically consistent links to the linearised problem of an earlier fit."""
+    """Fit physically consistent links to a fit's linear problem; return fit and certificate."""
     base, problem, weights = fit.base, fit.problem, fit.solution.weights
     program, notes = physical_program(arm, base, settings)
     # normal equations of blocks of successive samples, which are left out in turn

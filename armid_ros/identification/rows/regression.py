@@ -235,7 +235,7 @@ def weighted_rows(
 
 
 def by_stretch(problem: Sequence[Stretch], rows: FloatArray) -> list[FloatArray]:
-    """Split an array (N, ...) of all samples into one array per gap-free section."""
+    """Return an array (N, ...) of all samples, split into one array per gap-free section."""
     return np.split(rows, np.cumsum([len(part.motion) for part in problem])[:-1])
 
 
@@ -375,7 +375,7 @@ def held_samples(
 
 def bridged(values: FloatArray, unsure: npt.NDArray[np.bool_]) -> FloatArray:
     """
-    Interpolate torques or columns linearly across samples with unknown dry friction.
+    Return torques or columns, interpolated linearly where dry friction is unknown.
 
     Parameters
     ----------

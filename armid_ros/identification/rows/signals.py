@@ -399,7 +399,7 @@ def mean_spectrum(
     segment: float = 8.0,
 ) -> tuple[FloatArray, FloatArray]:
     """
-    Return the mean power spectrum of signals, by the method of Welch (1967).
+    Return frequencies [Hz] and mean power spectrum of signals, by the method of Welch (1967).
 
     Parameters
     ----------

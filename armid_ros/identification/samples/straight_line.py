@@ -101,7 +101,7 @@ class ErrorModel:
     quantile: float
 
     def growth(self, noise: Factor, acceleration: Factor) -> FloatArray:
-        """Combine growth factors of noise and acceleration by signal, (m,) or (N, m)."""
+        """Return each signal's growth factor, (m,) or (N, m), from noise and acceleration."""
         squares = acceleration**2
         return np.asarray(np.sqrt(squares + self.white * (noise**2 - squares)))
 
@@ -174,7 +174,7 @@ def unwrapped(x: FloatArray, last: FloatArray, turn: FloatArray) -> FloatArray:
 
 
 def all_unwrapped(samples: Sequence[StreamSample], turn: FloatArray) -> list[StreamSample]:
-    """Remove jumps by full turns from the positions of successive samples."""
+    """Return successive samples without jumps of positions by full turns."""
     found = [samples[0]]
     for sample in samples[1:]:
         found.append(replace(sample, x=unwrapped(sample.x, found[-1].x, turn)))

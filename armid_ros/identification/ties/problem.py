@@ -284,7 +284,7 @@ def _regressor_by_motion(robot: Robot, motion: Motion, kept: npt.NDArray[np.intp
 
 
 def _placed(by_own: FloatArray, count: int) -> FloatArray:
-    """Append zero derivatives by the other machine's motion to derivatives by the own motion."""
+    """Return derivatives by the own motion, followed by zeros for the other machine's motion."""
     result = np.zeros((*by_own.shape[:-1], count))
     result[..., : by_own.shape[-1]] = by_own
     return result.reshape((*by_own.shape[:-2], 3 * count))

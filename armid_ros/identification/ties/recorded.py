@@ -176,7 +176,7 @@ def band_of_motion(
     margin: float = 2.0,
 ) -> Conditioning:
     """
-    Reduce the pass band of filters to the band of the motion, unless set by the user.
+    Return filters with the pass band reduced to the band of the motion, unless set by the user.
 
     Parameters
     ----------
