@@ -244,7 +244,7 @@ def add_effect(arm: ArmModel, effect: Effect, values: FloatArray) -> ArmModel:
 
 
 def _find_effect(arm: ArmModel, effect: Effect) -> tuple[int, list[int]] | None:
-    """Return the index of an effect in an arm and the indices of its parameters, or None."""
+    """Find an effect in an arm; return its index and the indices of its parameters, or None."""
     wanted = [(p.name, p.joint) for p in effect.parameters(arm.robot)]
     for position, own in enumerate(arm.effects):
         if isinstance(effect, type(own)) and not own.shapes and not own.points:
@@ -391,7 +391,7 @@ def _arm(document: dict[str, Any], robot: Robot) -> ArmModel:
 
 
 def _values(rows: Sequence[dict[str, Any]], names: Sequence[ParameterName]) -> FloatArray:
-    """Return the values of parameters `names` from entries; each must have exactly one entry."""
+    """Return parameter values from entries of model.yaml, with one entry for each of `names`."""
     table: dict[tuple[str, str], dict[str, Any]] = {}
     units = {(name.name, name.joint): [name.unit] for name in names}
     for row in rows:
