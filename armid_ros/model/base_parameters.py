@@ -92,7 +92,7 @@ class BaseParameters:
 
     def lift(self, beta: npt.ArrayLike, prior: npt.ArrayLike) -> FloatArray:
         """
-        Return the standard parameters with base parameters beta that are nearest to a prior.
+        Return the standard parameters nearest to a prior, for given base parameters beta.
 
         Parameters
         ----------
@@ -175,7 +175,7 @@ def group_columns(
 
 def regroup(theory: BaseParameters, data: BaseParameters) -> BaseParameters:
     """
-    Return the base parameters of a data set, as combinations of all standard parameters.
+    Return the base parameters identified by data, in terms of all standard parameters.
 
     Parameters
     ----------

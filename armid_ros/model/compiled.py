@@ -106,7 +106,7 @@ def kernel_body(
     robot: Robot, added_inertia: FloatArray | None = None, weighs: bool = True
 ) -> BodyOfKernel | None:
     """
-    Convert a robot to the format of the compiled kernel; None if the kernel is not usable.
+    Convert a robot for the compiled kernel; None without kernel, or with too many joints.
 
     Parameters
     ----------
