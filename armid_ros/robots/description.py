@@ -274,7 +274,9 @@ def _check_tree(links: Iterable[str], joints: Iterable[Joint]) -> None:
         for link in TopologicalSorter(above).static_order():
             depth[link] = depth[carriers[link].parent] + 1 if link in carriers else 0
     except CycleError as error:
-        raise RobotError(f"link '{error.args[1][0]}' is part of a closed loop of joints") from None
+        raise RobotError(
+            f"link '{error.args[1][0]}' is part of a closed loop of joints; a URDF is a tree"
+        ) from None
     deepest = max(depth, key=depth.__getitem__)
     most = 500  # the reader of Pinocchio is recursive
     if depth[deepest] > most:
@@ -300,7 +302,7 @@ def _inertial(link: ElementTree.Element, name: str) -> Inertial | None:
     mass, inertia = element.find('mass'), element.find('inertia')
     if mass is None or inertia is None:
         missing = 'mass' if mass is None else 'inertia'
-        raise RobotError(f'{link_name}: its <inertial> has no <{missing}>')
+        raise RobotError(f'{link_name}: its <inertial> has no <{missing}>; add this element')
     xyz, rpy = _origin(element, link_name)
     inertial = Inertial(
         mass=_number(mass, 'value', link_name),
@@ -395,7 +397,7 @@ def _link(element: ElementTree.Element, role: str, joint: str) -> str:
     reference = element.find(role)
     link = None if reference is None else reference.get('link')
     if not link:
-        raise RobotError(f'{joint} has no {role} link')
+        raise RobotError(f'{joint} has no {role} link; add <{role} link="...">')
     return link
 
 

@@ -48,7 +48,9 @@ class Configuration(NamedTuple):
 @dataclass(frozen=True, eq=False)
 class Mechanism:
     """
-    Map from n driven to m moving joint positions, q = A u + B p(u) + b.
+    Map from positions u of the n driven joints to positions q of the m moving joints.
+
+    The map is q = A u + B p(u) + b, where p are the positions of passive joints in loops.
 
     Attributes
     ----------

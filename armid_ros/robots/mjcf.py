@@ -91,7 +91,7 @@ def _compiled(mujoco: ModuleType, path: Path, notes: list[str]) -> Any:
             if not body.explicitinertial and geom.mass != 0.0 and geom.density != 0.0:  # noqa: RUF069 - as it is written
                 raise RobotError(
                     f"{path}: the inertia of body '{body.name}' is computed from the mesh {file}, "
-                    f'which is not in {folder}'
+                    f'which is not in {folder}; add the file, or give the body an <inertial>'
                 )
             notes.append(f"link '{body.name}': mesh {file} not found; left out")
             spec.delete(geom)
