@@ -237,8 +237,8 @@ def _files_of(path: Path) -> BagMetadata:
         foreign = [file.name for file in files if _storage_suffix(file) not in _STORAGES]
         if foreign or not files:
             raise RecordingError(
-                f'{path / FILE_NAME}: lists {", ".join(foreign) or "no file"}, but a bag '
-                'consists of .mcap or .db3 files'
+                f'{path / FILE_NAME}: lists {", ".join(foreign) or "no file"}, but only .mcap and '
+                '.db3 files can be read'
             )
         return metadata
     found = [file for file in path.iterdir() if _storage_suffix(file) in _STORAGES]

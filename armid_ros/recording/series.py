@@ -256,7 +256,7 @@ def _finite(
             absent.append(name if everyone else f'{name} of {", ".join(missing)}')
         quantities.append(None if missing else values)
     if quantities[0] is None:
-        raise RecordingError(f'{where}: the recording has no {absent[0]}')
+        raise RecordingError(f'{where}: the recording has no {absent[0]}; record all positions')
     bad, not_finite = np.zeros(len(series), np.bool_), []
     most = 1e15  # uninitialised memory can hold any number
     for name, values in zip(QUANTITIES, quantities, strict=True):

@@ -182,7 +182,7 @@ class JointStateDecoder:
         return free[:count]
 
     def _plan_for(self, first: npt.NDArray[np.void]) -> _Plan | None:
-        """Return the plan for decoding messages like `first`; None if `first` is malformed."""
+        """Return the decoding plan for messages with the layout of `first`; None if malformed."""
         length = first.dtype.itemsize
         known = self._plans.setdefault(length, [])
         for plan in known:

@@ -55,7 +55,7 @@ def joint_state_cdr(
         if values is not None and values.shape != (len(stamps), n):
             raise RecordingError(
                 f'the array {name} has shape {values.shape}, but {len(stamps)} stamps and {n} '
-                f'joints need {(len(stamps), n)}'
+                f'joints need shape {(len(stamps), n)}'
             )
     frame = frame_id.encode()
     counts = tuple(0 if values is None else n for values in fields)

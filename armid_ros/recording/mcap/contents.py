@@ -118,7 +118,7 @@ def _read_group(
 
 
 def _content(found: FileMap, chunk: Chunk, settings: ReadSettings) -> bytes | memoryview:
-    """Return the decompressed content of a chunk; raise one of CORRUPT for a damaged chunk."""
+    """Return the decompressed content of a chunk; raise an error of CORRUPT if it is damaged."""
     stored = memoryview(found.data)[chunk.begin : chunk.end]
     if chunk.compression not in ('', 'zstd', 'lz4'):
         raise ValueError(
@@ -193,7 +193,7 @@ def messages_in(found: FileMap, contents: Contents) -> tuple[IntArray, npt.NDArr
 def _heads_by_index(
     data: bytes | mmap.mmap, offsets: IntArray, ranges: IntArray
 ) -> npt.NDArray[np.void] | None:
-    """Read the headers at the ascending positions of an index; None if the index is wrong."""
+    """Read message headers at ascending byte positions `offsets`; None if these are wrong."""
     # It is correct if messages and definitions fill each chunk, a row of `ranges`, without gaps.
     begins, ends = ranges.T
     if not len(offsets) or offsets[0] < begins[0] or offsets[-1] + MESSAGE.itemsize > ends[-1]:

@@ -67,7 +67,7 @@ def open_table(path: Path, *, episode: int | None = None) -> Table:
     lerobot = (path / INFO).is_file()
     if not lerobot and _suffix(path) not in _READERS:
         known = ', '.join(_READERS)
-        raise RecordingError(f'{path}: is not a table; tables are {known} and LeRobot datasets')
+        raise RecordingError(f'{path}: not a table; tables are {known} and LeRobot datasets')
     if not lerobot:
         with open_regular(path, RecordingError):  # opening a FIFO would block
             pass
@@ -90,7 +90,7 @@ def _suffix(path: Path) -> str:
 
 
 def _with_names(table: Table) -> Table:
-    """Replace numbered columns by columns of joints, whose names are in columns of text."""
+    """Replace numbered columns by one column per joint, with joint names from text columns."""
     names: dict[str, dict[str, npt.NDArray[np.str_]]] = {}  # by the text before 'name', and number
     for name, cells in table.words.items():
         match = _NAME.fullmatch(name)
