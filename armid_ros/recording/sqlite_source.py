@@ -114,7 +114,7 @@ class SqliteSource(Source):
                 yield RawMessage(_text(name), time, time, data)
 
     def _opened(self) -> dict[str, set[str]]:
-        """Return the column names of the rosbag2 tables; RecordingError if one is missing."""
+        """Return the column names of the rosbag2 tables; RecordingError if a table is missing."""
         database = self._database
         database.text_factory = lambda text: text.decode('utf-8', 'replace')
         database.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, min(self._settings.memory_limit, 2**31 - 1))

@@ -71,8 +71,8 @@ def _lines(path: Path) -> list[str]:
         text = raw.decode('latin-1')
     if '\0' in text:
         raise RecordingError(
-            f'{path}: the file is binary, not text; give it the suffix of its format (.npz, .mat, '
-            '.parquet, .mcap), or save it as CSV in UTF-8'
+            f'{path}: the file is binary, not text; use the suffix of the format (.npz, .mat, '
+            '.parquet, .mcap), or save the data as CSV in UTF-8'
         )
     return text.rstrip().splitlines()
 
@@ -116,7 +116,7 @@ def _same_width(header: str, row: str) -> bool:
 
 
 def _separator(lines: list[str]) -> str:
-    """Return the cell separator: the first candidate that occurs in every line."""
+    """Return the cell separator: the first candidate that occurs in every line, or a blank."""
     there = [line for line in lines if line.strip()]
     return next((s for s in _SEPARATORS if all(s in line for line in there)), ' ')
 
