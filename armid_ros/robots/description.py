@@ -212,7 +212,7 @@ def parse_description(root: ElementTree.Element) -> Description:
         mimic = _mimic(element, f"joint '{name}'", joints[name].mimic)
         joints[name] = replace(joints[name], mimic=mimic)
     if GROUND not in links and any(joint.parent == GROUND for joint in joints.values()):
-        notes.append(f"link '{GROUND}' is not in the file; taken as the ground")
+        notes.append(f"link '{GROUND}' is not in the file; assumed to be the ground")
         links = {GROUND: None, **links}
     _check_tree(links, joints.values())
     return Description(
@@ -372,13 +372,13 @@ def _limits(
     limit = element.find('limit')
     if kind not in MOVABLE or limit is None:
         if kind in ('revolute', 'prismatic'):
-            notes.append(f'{joint}: no <limit>; taken as unlimited')
+            notes.append(f'{joint}: no <limit>; assumed unlimited')
         return -math.inf, math.inf, math.inf, math.inf
     rates = []
     for name in ('velocity', 'effort'):
         rate = abs(_number(limit, name, joint, math.inf, endless=True))
         if rate == 0.0:  # noqa: RUF069 - as described
-            notes.append(f'{joint}: {name} limit 0; taken as not given')
+            notes.append(f'{joint}: {name} limit 0; assumed unlimited')
             rate = math.inf
         rates.append(rate)
     if kind == 'continuous':
@@ -388,7 +388,7 @@ def _limits(
     if lower > upper:
         raise RobotError(f'{joint}: its lower limit {lower:g} is above its upper limit {upper:g}')
     if lower == upper:
-        notes.append(f'{joint}: no range of motion in <limit>; taken as unlimited')
+        notes.append(f'{joint}: no range of motion in <limit>; assumed unlimited')
         lower, upper = -math.inf, math.inf
     return lower, upper, rates[0], rates[1]
 
