@@ -120,7 +120,7 @@ def fit_summary(found: PositionFit, document: dict[str, Any], step: str) -> Summ
     mass = cell('payload_m', joints[-1])
     tool = f'none ({mass} kg)' if '<' in mass else f'{mass} kg at {", ".join(center)} m'
     title = f'command delay {cell("command_delay", factor=1e3)} ms, tool {tool}'
-    lines = [f'{found.duration:.0f} s compared; links are taken as described']
+    lines = [f'{found.duration:.0f} s compared; links are assumed as described']
     ratio, error = found.gain_ratio, found.gain_ratio_std
     if error.any():
         # by more than three standard errors and 2 %
