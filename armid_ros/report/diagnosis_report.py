@@ -160,8 +160,8 @@ def _verdict(diagnosis: Diagnosis, worse: Sequence[str], step: str) -> VerdictSe
     notes = [sentence(note) for note in diagnosis.notes]
     if worse:
         notes.append(
-            f'Driven by the recorded torques, the patched model has larger position errors than '
-            f'before in {", ".join(worse)}; see Forward validation.'
+            'Driven by the recorded torques, the patched model has larger position errors than '
+            f'the given model in {", ".join(worse)}; see Forward validation.'
         )
     first, stop, more = pretty(diagnosis.summary).partition('. ')
     badge = {'named': 'cause named'}.get(diagnosis.verdict, diagnosis.verdict.replace('_', ' '))

@@ -184,7 +184,7 @@ def _verdict(
         beware.append('Not all bodies were checked for collision; see Clearance.')
     tone = 'good' if checked.word == FIT and not design.stopped else 'fair'
     tone = 'bad' if unseen or checked.word == UNFIT else tone
-    word = 'blind' if unseen else checked.word
+    word = 'not identifiable' if unseen else checked.word
     return VerdictSection(word, tone, sentences, beware, bars, step)
 
 
@@ -248,11 +248,11 @@ def _input_section(
             'Run',
             f'{run.n_periods} periods of {run.trajectory.period:.4g} s, '
             f'{counted(run.trajectory.harmonics, "harmonic")}, {run.run_in:.3g} s of '
-            f'fade-in and of fade-out; from {start}',
+            f'run-in and of run-out; from {start}',
         ),
         ('Torque noise', f'{noise} at {settings.rate:g} Hz'),
         ('Clearance', f'{100.0 * settings.clearance:g} cm'),
-        ('Around the arm', ', '.join(o.name for o in obstacles) or 'nothing'),
+        ('Obstacles', ', '.join(o.name for o in obstacles) or 'none'),
         (
             'Search',
             f'{counted(settings.starts, "start")}, at most {settings.iterations} iterations each',
@@ -318,7 +318,7 @@ def _clearance_section(
             'distance [cm]',
             height=240,
             link='planned',
-            levels=[(100.0 * margin, f'{100.0 * margin:g} cm to keep')],
+            levels=[(100.0 * margin, f'{100.0 * margin:g} cm required')],
         )
     ]
     if not curves:
@@ -339,7 +339,7 @@ def _accuracy_section(design: Design, links: Sequence[str] = ()) -> Section:
         relative = f'{digits(100.0 * std / abs(value))} %' if value and seen else ''
         return (
             f'{value:.3g}' if known else 'not known',
-            digits(float(std)) if seen else TableCell('not seen', 'unknown'),
+            digits(float(std)) if seen else TableCell('not identifiable', 'unknown'),
             relative if std < abs(value) or not relative else TableCell('> 100 %', 'unknown'),
         )
 

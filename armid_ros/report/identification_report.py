@@ -159,8 +159,9 @@ def _input_section(result: Identification, robot: str) -> Section:
         ('Method', IN_WORDS[result.settings.method]),
         (
             'Filter',
-            f'positions below {used.cutoff_hz:.3g} Hz of {used.rate_hz:.4g} Hz; torque and model '
-            f'alike, then one sample of {used.decimation} kept ({kept:.3g} Hz)',
+            f'low-pass of positions at {used.cutoff_hz:.3g} Hz, sampled at {used.rate_hz:.4g} Hz; '
+            f'the same for torque and regressor; then decimation by {used.decimation} to '
+            f'{kept:.3g} Hz',
         ),
         (
             'Excitation',
@@ -229,7 +230,7 @@ def _physical_section(
         kinds = Counter(line.split(':')[0] for line in lines)
         if kinds:
             named = ', '.join(f'{kind} ({counted(n, "value")})' for kind, n in kinds.items())
-            text = f'{file} has no place for {named}: a comment in it lists them.'
+            text = f'{file} cannot contain {named}: a comment in the file lists the values.'
             homeless.append(Paragraph(text))
     return Section(
         'Physical consistency',

@@ -242,7 +242,7 @@ def _contents_section(found: Inspection) -> Section:
         ]
         heads = ('Topic', 'Messages', 'Type', 'Joints')
         blocks.insert(0, DataTable(heads, rows, (0, 2, 3)))
-    return Section('What is in it', blocks)
+    return Section('Contents', blocks)
 
 
 def _curves_section(found: Inspection) -> Section:

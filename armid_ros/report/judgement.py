@@ -101,8 +101,8 @@ def findings_of(
         worst = max(verification.forward, key=lambda pair: float(pair.after.position_error.max()))
         before = '' if worst.before is None else f' (links as described: {worst.before.worst})'
         yield (
-            f'Driven by the recorded torques, its position error is at most {worst.after.worst} '
-            f'rms{before}.'
+            'Driven by the recorded torques, the identified arm has a position error of at most '
+            f'{worst.after.worst} rms{before}.'
         )
 
 

@@ -21,7 +21,7 @@ DASH = '\N{EN DASH}'
 _MAX_NUMBER = 1e12
 #: Terms with a tooltip.
 TERMS = {
-    'usual error': 'Error that a perfect model would have: noise, or the earlier error.',
+    'usual error': 'Larger of the torque noise and the earlier model error of a joint.',
     'held out': 'Not used to fit the model.',
     'condition number': 'Ratio of best to worst excitation of parameters; below 100 is good.',
 }

@@ -202,7 +202,7 @@ def parameter_section(
     count = int(changed.sum())
     blocks: list[Templated] = [
         Paragraph(
-            f'The {reference} has values of {sum(known)} of these '
+            f'The {reference} has values for {sum(known)} of these '
             f'{counted(len(names), "parameter")}; {count} of them {"is" if count == 1 else "are"} '
             'outside the 95 % interval of the estimate (in bold). Each row has its own scale, '
             'with zero in the middle.'

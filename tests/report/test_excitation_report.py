@@ -99,7 +99,7 @@ def test_what_the_run_does_not_show_comes_first(case, planned):
     matrix[0], matrix[:, 0] = 0.0, 0.0
     blind = replace(planned, information=replace(planned.information, matrix=matrix))
     page = ExcitationResult(blind, case.truth, scene_of(case.truth.robot)).page()
-    assert '>blind<' in page
+    assert '>not identifiable<' in page
 
 
 def test_an_arm_without_bodies_is_drawn_though_its_links_are_points_for_the_floor():

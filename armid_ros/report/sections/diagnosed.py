@@ -314,7 +314,7 @@ def _candidate_value(diagnosis: Diagnosis, trial: CauseResult) -> str:
 def gap_section(diagnosis: Diagnosis, gap: Gap) -> Section:
     """Return the section with each joint's torque error, without and with named effects."""
     usual_error, harmful = diagnosis.baseline, bool(diagnosis.harmful)
-    recordings = 'recordings not used for the fit' if gap.predicted else 'the data it was found in'
+    recordings = 'recordings not used for the fit' if gap.predicted else 'the diagnosed recordings'
     unpatched = ' The model in model.yaml does not have the named cause.' * harmful
     return Section(
         'Error of each joint',
@@ -341,7 +341,7 @@ def gap_bars(diagnosis: Diagnosis, gap: Gap) -> BarChart:
     for joint in np.argsort(-first / np.maximum(gap.floor, 1e-12)):
         name = robot.joints[joint]
         if not any(errors[joint] for _, _, errors in roles):  # at rest: no row counts
-            rows.append((name, [Bar(0.0, 'floor', 'not judged')]))
+            rows.append((name, [Bar(0.0, 'floor', 'at rest, not compared')]))
             continue
         unit, least = robot.torque_units[joint], max(float(gap.floor[joint]), 1e-12)
         bars = []

@@ -172,8 +172,8 @@ def forward_section(
     blocks: list[Templated] = [
         Paragraph(
             'Root mean square position error of each joint, the worst joint first. The recorded '
-            'torques drive the simulated arm. An 8 Hz feedback keeps it at the recorded motion, '
-            'because commanded positions are not recorded.'
+            'torques drive the simulated arm. An 8 Hz feedback keeps the arm at the recorded '
+            'motion, because commanded positions are not recorded.'
         )
     ]
     for number, pair in enumerate(pairs):
@@ -183,7 +183,7 @@ def forward_section(
         own: list[Templated] = []
         if pair.before is None:
             inconsistent = 'its inertias are not physically consistent'
-            own.append(Paragraph(f'The model before cannot be simulated: {inconsistent}.'))
+            own.append(Paragraph(f'The {labels[0]} cannot be simulated: {inconsistent}.'))
         comment = pair.comment()
         if comment:
             own.append(Paragraph(sentence(comment)))
