@@ -58,7 +58,7 @@ class DryFriction:
 
     def torque(self, dq: FloatArray, load: FloatArray) -> FloatArray:
         """
-        Return the friction torques (..., n) [N m]; an element at rest has its mean level.
+        Return the friction torques (..., n) [N m]; at rest, the mean of lower and upper level.
 
         Parameters
         ----------

@@ -165,7 +165,7 @@ class Effect(ABC):
         return {}
 
     def with_particulars(self, entry: Mapping[str, Any]) -> Self:
-        """Return a copy of the effect with the entries of model.yaml from `particulars`."""
+        """Return a copy of the effect with the entries that `particulars` wrote to model.yaml."""
         return self
 
     def named_as(self, values: FloatArray, arm: Arm) -> tuple[tuple[Effect, FloatArray], ...]:
@@ -201,8 +201,8 @@ class Effect(ABC):
             spread = np.broadcast_to(np.asarray(values, dtype=float), size)
         except ValueError:
             raise ModelError(
-                f'{self.name}: shape parameters need an array of size {size}, not '
-                f'{np.shape(values)}: joints by {", ".join(s.name for s in self.shapes) or "none"}'
+                f'{self.name}: shapes need an array of size {size}, not {np.shape(values)}; its '
+                f'columns are {", ".join(s.name for s in self.shapes) or "none"}'
             ) from None
         return replace(self, shape=tuple(spread.ravel().tolist()))
 
@@ -220,7 +220,7 @@ class Effect(ABC):
 
     def shape_starts(self, unexplained: Unexplained, arm: Arm) -> tuple[FloatArray, ...]:
         """
-        Return start values for a search of each shape parameter, arrays of shape (owners, G).
+        Return G start values for the search of each shape parameter, an array (owners, G) each.
 
         Parameters
         ----------

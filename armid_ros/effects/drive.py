@@ -32,7 +32,7 @@ class RotorInertia(Effect):
     quantities = (Quantity('rotor_inertia', 'kg m^2', lower=0.0, typical=(0.001, 1.1)),)
 
     def columns(self, motion: Motion, arm: Arm) -> FloatArray:
-        """Return the torque per unit of Ia: ddq [rad/s^2], shape (N, n, P)."""
+        """Return the torque per unit of rotor inertia: ddq [rad/s^2], shape (N, n, P)."""
         return joint_columns(self, motion, motion.ddq)
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
@@ -93,7 +93,7 @@ class TorqueRipple(JointLaw):
         return bool(np.all(self.shape_values > 1.05 * _MIN_RIPPLE_ORDER))
 
     def law(self, x: JointStates) -> tuple[FloatArray, ...]:
-        """Return the ripple torque per unit of A and B: sin(n q) and cos(n q) [-]."""
+        """Return the torque per unit of sine and cosine amplitude: sin(n q) and cos(n q) [-]."""
         angle = self.shape_values[:, 0] * x.q
         return np.sin(angle), np.cos(angle)
 

@@ -35,7 +35,7 @@ class ViscousFriction(Effect):
     quantities = (Quantity('viscous_coefficient', 'N m s/rad', lower=0.0, typical=(0.004, 10.0)),)
 
     def columns(self, motion: Motion, arm: Arm) -> FloatArray:
-        """Return the friction torque per unit of Fv: dq [rad/s], shape (N, n, P)."""
+        """Return the torque per unit of viscous coefficient: dq [rad/s], shape (N, n, P)."""
         return joint_columns(self, motion, motion.dq)
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
@@ -61,7 +61,7 @@ class CoulombFriction(Effect):
     holds_at_rest = True
 
     def columns(self, motion: Motion, arm: Arm) -> FloatArray:
-        """Return the friction torque per unit of Fc: sign(dq) [-], shape (N, n, P)."""
+        """Return the torque per unit of Coulomb torque: sign(dq) [-], shape (N, n, P)."""
         return joint_columns(self, motion, direction(motion))
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
@@ -99,7 +99,7 @@ class AsymmetricFriction(JointLaw):
         return bool(np.all(shift <= known + MIN_Z_SCORE * doubt))
 
     def law(self, x: JointStates) -> tuple[FloatArray, ...]:
-        """Return the friction torque per unit of dFc and dFv: |sign(dq)| and |dq|."""
+        """Return the torque per unit of Coulomb and viscous asymmetry: |sign(dq)| and |dq|."""
         return x.forwards**2, x.forwards * x.dq
 
 
@@ -121,7 +121,7 @@ class QuadraticFriction(JointLaw):
     quantities = (Quantity('quadratic_coefficient', 'N m s^2/rad^2', typical=(0.0004, 1.0)),)
 
     def law(self, x: JointStates) -> tuple[FloatArray, ...]:
-        """Return the friction torque per unit of Fq: dq |dq| [rad^2/s^2]."""
+        """Return the torque per unit of quadratic coefficient: dq |dq| [rad^2/s^2]."""
         return (x.dq * np.abs(x.dq),)
 
 
@@ -148,7 +148,7 @@ class StribeckFriction(JointLaw):
     holds_at_rest = True
 
     def law(self, x: JointStates) -> tuple[FloatArray, ...]:
-        """Return the friction torque per unit of dFs: exp(-|dq / vs|^d) sign(dq) [-]."""
+        """Return the torque per unit of Stribeck torque: exp(-|dq / vs|^d) sign(dq) [-]."""
         velocity, exponent = self.shape_values.T
         return (np.exp(-(np.abs(x.dq / velocity) ** exponent)) * x.forwards,)
 
@@ -156,13 +156,13 @@ class StribeckFriction(JointLaw):
 @dataclass(frozen=True)
 class ThermalFriction(JointLaw):
     """
-    Viscous friction that changes while the joint warms up, tau = dFv (1 - exp(-t / T)) dq.
+    Viscous friction that changes while the joint warms up, with one time constant.
 
-    Time counts from the beginning of the recording. dFv is negative if the grease gets thinner,
-    by 20 to 60 % of the cold coefficient. The effect makes two equal periods different, unlike
-    effects that depend on velocity only. torque_drift does the same, but does not depend on
-    velocity. Source: Bittencourt, Wernholt, Sander-Tavallaey and Brogardh 2010, with one time
-    constant.
+    tau = dFv (1 - exp(-t / T)) dq, t from the beginning of the recording. dFv is negative if the
+    grease gets thinner, by 20 to 60 % of the cold coefficient. The effect makes two equal periods
+    different, unlike effects that depend on velocity only. torque_drift does the same, but does
+    not depend on velocity.
+    Source: Bittencourt, Wernholt, Sander-Tavallaey and Brogardh 2010.
 
     """
 
@@ -179,7 +179,7 @@ class ThermalFriction(JointLaw):
         return ThermalChange
 
     def law(self, x: JointStates) -> tuple[FloatArray, ...]:
-        """Return the friction torque per unit of dFv: (1 - exp(-t / T)) dq [rad/s]."""
+        """Return the torque per unit of viscous change: (1 - exp(-t / T)) dq [rad/s]."""
         return (-np.expm1(-x.t / self.shape_values[:, 0]) * x.dq,)
 
 
@@ -196,7 +196,7 @@ class ThermalChange(ThermalFriction):
     quantities = (*ThermalFriction.quantities, *ViscousFriction.quantities)
 
     def law(self, x: JointStates) -> tuple[FloatArray, ...]:
-        """Return the friction torque per unit of dFv and c: (1 - exp(-t / T)) dq and dq."""
+        """Return the torque per unit of viscous change and of viscous coefficient [rad/s]."""
         return *super().law(x), x.dq
 
     def named_as(self, values: FloatArray, arm: Arm) -> tuple[tuple[Effect, FloatArray], ...]:
@@ -284,7 +284,7 @@ class TemperatureDependentFriction(Effect):
         return not (steep.any() or np.any(slopes[0] > doubts[0]))
 
     def columns(self, motion: Motion, arm: Arm) -> FloatArray:
-        """Return the torque per unit of a and b: (T - T0) dq and (T - T0) sign(dq), (N, n, P)."""
+        """Return the torque per unit of viscous and Coulomb slope, (N, n, P) [K rad/s and K]."""
         warmer = self.along(motion).warmer(motion.t, motion.joints)
         return joint_columns(self, motion, warmer * motion.dq, warmer * direction(motion))
 

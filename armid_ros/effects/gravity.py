@@ -54,7 +54,7 @@ class GravityMagnitude(_GravityEffect):
     quantities = (Quantity('gravity_difference', 'm/s^2', typical=(0.05, 10.0)),)
 
     def columns(self, motion: Motion, arm: Arm) -> FloatArray:
-        """Return the joint torques per unit of dg [N m per m/s^2], shape (N, n, 1)."""
+        """Return the joint torques per unit of gravity difference [N m per m/s^2], (N, n, 1)."""
         direction = _unit(arm.robot.gravity)[:, np.newaxis]
         return np.asarray(arm.gravity_columns(motion) @ direction)
 

@@ -33,7 +33,7 @@ class LoadDependentFriction(Effect):
     holds_at_rest = True
 
     def columns(self, motion: Motion, arm: Arm) -> FloatArray:
-        """Return the friction torque per unit of Kl: |tau_load| sign(dq), (N, n, P) [N m]."""
+        """Return the torque per unit of load coefficient: |tau_load| sign(dq), (N, n, P) [N m]."""
         load = arm.load(arm.link_motion(motion))
         return joint_columns(self, motion, np.abs(load) * direction(motion))
 
@@ -68,7 +68,7 @@ class PreslidingHysteresis(Effect):
     instantaneous = False
 
     def columns(self, motion: Motion, arm: Arm) -> FloatArray:
-        """Return the friction torque per unit of F: hysteresis state h [-], shape (N, n, P)."""
+        """Return the torque per unit of presliding torque: spring states, -1 to 1, (N, n, P)."""
         columns = np.zeros((*motion.q.shape, len(self.joints)))
         states = self._elements(np.ones(len(self.joints)), motion.joints).along(
             motion.q, motion.dq

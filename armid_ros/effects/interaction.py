@@ -216,7 +216,7 @@ class InterfaceSlack(Attached):
 
 
 def _proposals(places: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return candidate anchors (A, 3) and slacks (A,) of a strap, for places of its link end."""
+    """Return candidate anchors (A, 3) and slacks (A,) of a strap, for positions of its end."""
     middle, spread = places.mean(axis=0), float(places.std(axis=0).max())
     directions = np.array(
         [direction for direction in product((-1.0, 0.0, 1.0), repeat=3) if any(direction)]

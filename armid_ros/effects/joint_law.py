@@ -122,7 +122,7 @@ def joint_columns(effect: Effect, motion: Motion, *quantities: FloatArray) -> Fl
 
 def scatter(effect: Effect, values: FloatArray, robot: Robot) -> FloatArray:
     """
-    Arrange an effect's values as an array with one column per robot joint, zero by default.
+    Arrange an effect's values as an array with a column per robot joint, zero for other joints.
 
     Parameters
     ----------

@@ -123,7 +123,7 @@ class TorqueMap:
         return cho_factor(self._kernel(self.points) + np.diag(share))
 
     def _kernel(self, inputs: FloatArray) -> FloatArray:
-        """Return the kernel k / s^2 between inputs and the M inducing points, shape (..., M)."""
+        """Return the normalized kernel of inputs and the M inducing points, shape (..., M)."""
         own, others = (scaled_inputs(x, self.knee) for x in (inputs, self.points))
         difference = (own[..., np.newaxis, :] - others) / self.lengths
         return np.asarray(np.exp(-0.5 * np.sum(difference**2, axis=-1)))

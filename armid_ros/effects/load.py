@@ -107,7 +107,7 @@ class Payload(_LinkBody):
         return not most * heaviest < np.maximum(aside, 0.0) ** 2
 
     def _weighs(self, values: FloatArray, std: FloatArray, arm: Arm) -> bool:
-        """Return whether, within errors, the mass is positive and its centre within reach."""
+        """Return whether a positive mass with its centre near the arm is within the errors."""
         if std[0] == 0.0:  # noqa: RUF069 - set exactly to zero if no motion identifies it, as for an inner link
             return bool(np.any(values[1:4]))
         places = [placement.translation for placement in arm.robot.model.jointPlacements]

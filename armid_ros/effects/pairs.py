@@ -47,7 +47,7 @@ class _Pairs(Effect):
         return tuple(chain.from_iterable(pairwise(robot.joints)))
 
     def in_usual_place(self, robot: Robot) -> bool:
-        """Return True, because no pair of joints is more usual than another."""
+        """Return True, because the effect is equally likely on all pairs of joints."""
         return True
 
     @classmethod
@@ -104,7 +104,7 @@ class CoupledJointFriction(_Pairs):
         return super()._default_joints(robot)[-2:]
 
     def columns(self, motion: Motion, arm: Arm) -> FloatArray:
-        """Return the torque per unit of Ia, Fv and Fc of each pair, shape (N, n, P)."""
+        """Return the torque per unit of shaft inertia, viscous and Coulomb friction, (N, n, P)."""
         columns = np.zeros((len(motion), motion.n_joints, 3 * len(self.owners)))
         for position, (i, k) in enumerate(self.pairs(motion.joints)):
             forwards = direction(motion, (i, k))

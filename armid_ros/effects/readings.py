@@ -41,7 +41,7 @@ class Displacing(Effect):
         """
 
     def columns(self, motion: Motion, arm: Arm) -> FloatArray:
-        """Return the torque change by link displacements per unit of parameter, (N, n, P)."""
+        """Return the torque changes that displacements per unit of parameter cause, (N, n, P)."""
         return arm.torque_change(motion, self.displacements(motion, arm))
 
     def action(self, values: FloatArray, arm: Arm) -> Action:

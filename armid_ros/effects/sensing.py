@@ -66,18 +66,18 @@ class TorqueGain(TorqueReading):
         return np.asarray(tau * gain.reshape(-1, *(1,) * (tau.ndim - 2)))
 
     def sensitivity(self, values: FloatArray, motion: Motion, tau: FloatArray) -> FloatArray:
-        """Return the derivative of the reading by epsilon: the true torque, (N, n, P) [N m]."""
+        """Return the derivative of the reading by the gain error: the true torque, (N, n, P)."""
         return joint_columns(self, motion, tau)
 
 
 @dataclass(frozen=True)
 class TorqueDrift(TorqueReading):
     """
-    Drift of torque readings while sensor or electronics warm up, d (1 - exp(-t / T)).
+    Drift of torque readings while sensor or electronics warm up, with one time constant.
 
-    Time counts from the beginning of the recording. The drift does not depend on the motion,
-    unlike thermal_friction. It makes equal periods differ. Confounded with torque_offset if the
-    recording begins with a warm sensor and, in one short recording, with a payload that slips.
+    The drift is d (1 - exp(-t / T)), t from the beginning of the recording. It does not depend on
+    the motion, unlike thermal_friction, and makes equal periods differ. Confounded with
+    torque_offset if the sensor is warm at the beginning, and with a slipping payload.
 
     """
 
@@ -87,7 +87,7 @@ class TorqueDrift(TorqueReading):
     shapes = (Shape('drift_time', 's', 0.1, 1e5, 600.0, (10.0, 60.0, 300.0, 1000.0, 3000.0)),)
 
     def shape_starts(self, unexplained: Unexplained, arm: Arm) -> tuple[FloatArray, ...]:
-        """Return start values of T: 0.3, 1 and 3 times the duration of the recordings."""
+        """Return start values of the time constant: 0.3, 1 and 3 times the recorded time span."""
         # a faster drift is an offset, and a slower drift is a straight line
         times = np.maximum(
             float(np.ptp(unexplained.motion.t)) * np.array((0.3, 1.0, 3.0)), self.shapes[0].lower
@@ -105,7 +105,7 @@ class TorqueDrift(TorqueReading):
         return columns
 
     def sensitivity(self, values: FloatArray, motion: Motion, tau: FloatArray) -> FloatArray:
-        """Return the derivative of the reading by d: 1 - exp(-t / T) [-], shape (N, n, P)."""
+        """Return the derivative of the reading by the drift: 1 - exp(-t / T) [-], (N, n, P)."""
         constants = np.ones(motion.n_joints)
         constants[self.indices(motion.joints)] = self.shape_values[:, 0]
         return joint_columns(self, motion, -np.expm1(-motion.t[:, np.newaxis] / constants))

@@ -71,7 +71,7 @@ class Hysteresis:
 
 
 def _monotone_parts(travel: FloatArray) -> list[tuple[int, int, float]]:
-    """Return first sample, last sample and direction (-1, 0, 1) of motion between reversals."""
+    """Return (first sample, last sample, direction +-1 or 0) of each motion between reversals."""
     step = np.sign(np.diff(travel))
     turns = np.flatnonzero(np.diff(step)) + 1
     ends = zip(np.append(0, turns), np.append(turns, len(step)), strict=True)
