@@ -28,7 +28,7 @@ Progress = Callable[[float, float], None]
 @dataclass(frozen=True)
 class Design:
     """
-    Designed excitation, and the parameter information that its recording would contain.
+    Designed excitation, and the Fisher information that its recording would contain.
 
     Attributes
     ----------

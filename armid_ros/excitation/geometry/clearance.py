@@ -27,7 +27,7 @@ IntArray = npt.NDArray[np.intp]
 @dataclass(frozen=True)
 class NearPairs:
     """
-    Pairs of bodies that are close to each other in N poses: m entries of a pose and a pair.
+    All m cases in which a pair of bodies is close to each other in one of N poses.
 
     Attributes
     ----------
@@ -150,7 +150,7 @@ class ClearanceModel:
         return cls(collision, margin, joints, spheres, planes, numbers, pairs, between, most)
 
     def without_distant_pairs(self, q: FloatArray, reach: float) -> ClearanceModel:
-        """Return the model without pairs of bodies that stay ``reach`` [m] apart in poses q."""
+        """Return the model without pairs of bodies at least ``reach`` [m] apart in all poses q."""
         kept = np.unique(self.near(q, reach).pair)
         return replace(
             self,
@@ -209,7 +209,7 @@ class ClearanceModel:
         times: FloatArray,
     ) -> Approach | None:
         """
-        Return an approach closer than the margin on a path; None proves that bodies keep it.
+        Return an approach closer than the margin on a path; None proves that there is none.
 
         On an interval, the joints between two bodies move them by a limited travel. Their distance
         is at least the mean of the distances at both ends, minus half this travel. An interval

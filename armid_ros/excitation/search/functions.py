@@ -110,7 +110,7 @@ class Objective:
         return cost, gradient
 
     def _state_gradient(self, motion: Motion, here: FloatArray, weights: FloatArray) -> FloatArray:
-        """Differentiate sum(weights * columns of `_state_columns`) by the Fourier coefficients."""
+        """Return the gradient of the weighted sum of `_state_columns` by Fourier coefficients."""
         count, n = motion.q.shape
         total = np.zeros((n, self.basis[0].shape[1]))
         state = np.array([motion.q, motion.dq, motion.ddq])
