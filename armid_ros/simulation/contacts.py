@@ -44,7 +44,7 @@ def solve_box_complementarity(
     shift: float = REGULARISATION,
 ) -> tuple[FloatArray, Modes]:
     """
-    Solve the complementarity problem for torques and modes of all friction elements.
+    Solve the complementarity problem of dry friction for the torques and modes of all elements.
 
     Parameters
     ----------
@@ -131,7 +131,7 @@ class Contacts:
 
     @classmethod
     def of(cls, friction: DryFriction) -> Contacts:
-        """Return the contacts of dry friction elements, without joint stops."""
+        """Return the contacts of friction elements; a stop is an element of infinite friction."""
         joints = [np.flatnonzero(direction).tolist() for direction in friction.directions]
         axes = tuple(some[0] if len(some) == 1 else -1 for some in joints)
         loaded = None if friction.load_share is None else friction
@@ -146,7 +146,7 @@ class Contacts:
         return replace(self, lower=self.friction.lower - more, upper=self.friction.upper + more)
 
     def torques(self, g: FloatArray, w_free: FloatArray, modes: Modes) -> tuple[FloatArray, Modes]:
-        """Return torques and modes of the elements; see `solve_box_complementarity`."""
+        """Return torques (m,) and modes of the elements, from `solve_box_complementarity`."""
         regular = self.friction is None and self.of_single_joints
         shift = 0.0 if regular else REGULARISATION
         return solve_box_complementarity(self.lower, self.upper, g, w_free, modes, shift)

@@ -25,7 +25,7 @@ import numpy.typing as npt
 
 def two_link_arm(parameters: TwoLinkParameters, robot: Robot | None = None) -> ArmModel:
     """
-    Return the two-link arm as an arm model with effects of the catalogue.
+    Return the shipped elastic two-link arm as an arm model with effects of the catalogue.
 
     The model does not contain the friction of the links, which the plant adds.
 
@@ -44,7 +44,7 @@ def two_link_arm(parameters: TwoLinkParameters, robot: Robot | None = None) -> A
 
 
 def two_link_loop(shipped: TwoLinkSet, share: float = 1.0) -> VelocityLoop:
-    """Return the velocity loops of the two-link arm, with gains multiplied by a factor."""
+    """Return the velocity loops of the shipped two-link arm, with gains times `share`."""
     # units of the gains are V s/rad and V/rad at the motors
     scale = share * shipped.parameters.torque_per_volt * shipped.parameters.gear
     proportional, integral = (
@@ -300,7 +300,7 @@ def step_course(
 def _next_pose(
     robot: Robot, here: FloatArray, rng: np.random.Generator, clear: Clear, beyond: FloatArray
 ) -> FloatArray:
-    """Draw a pose that a free straight line reaches, and from which the next step is free, too."""
+    """Draw a pose with a collision-free straight line to it, and with room for the next step."""
     middle = robot.middle_pose
     reach, tries = np.pi / 3.0, 1000  # largest distance from the middle [rad or m]; drawn poses
     lower = np.maximum(robot.lower, middle - reach)
@@ -312,7 +312,7 @@ def _next_pose(
             return np.asarray(there)
     raise TrajectoryError(
         f'{robot.name}: none of {tries} poses can be reached from the middle of the ranges in a '
-        'straight line without bodies coming too close to each other'
+        'straight line without bodies coming too close; try another --seed'
     )
 
 

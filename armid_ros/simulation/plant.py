@@ -339,7 +339,7 @@ class Plant:
 
 
 def _damping_weight(robot: Robot, inertia: FloatArray, damping: FloatArray, dt: float) -> float:
-    """Return the weight of the end velocity, 0.5 to 1, in the damping torque of a step."""
+    """Return the weight, 0.5 to 1, of the end velocity in the implicit damping of a step."""
     # 1/2 (second order) for weak damping, 1 (no overshoot) for stiff damping. In between, the
     # value for which the fastest decay rate of the arm is exact (Liniger and Willoughby 1970)
     try:
