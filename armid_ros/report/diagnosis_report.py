@@ -146,7 +146,7 @@ def diagnosis_report(
 
 
 def _at_fault(diagnosis: Diagnosis, read: Mapping[str, Sequence[Recording]]) -> list[str]:
-    """Return the recordings that a bad_data verdict names, or all of the fit; otherwise []."""
+    """Return the recordings with bad data by the verdict; [] for verdicts other than bad_data."""
     if diagnosis.verdict != 'bad_data':
         return []
     sources = [one.source for several in read.values() for one in several if one.source]
@@ -322,7 +322,7 @@ def _worst(diagnosis: Diagnosis, gap: Gap) -> int:
 
 
 def _of_recording(gap: Gap, shown: Overlay, joint: int) -> tuple[FloatArray, ...]:
-    """Return times, measured torque and the torque of both models, of a joint in a recording."""
+    """Return the times of a recording, and the measured and modelled torques of one joint."""
     here = shown.trajectory.source, shown.trajectory.fold
     parts = [(one, one.trajectory) for one in gap.overlays]
     own = [one for one, part in parts if (part.source, part.fold) == here]

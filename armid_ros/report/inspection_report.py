@@ -104,7 +104,7 @@ def inspection_word(found: Inspection) -> str:
 
 
 def check_word(remarks: Sequence[Remark], found: LinkCheck | None) -> str:
-    """Return the verdict on a URDF as a word: 'clean', 'look' or 'wrong'."""
+    """Return the verdict on a URDF as a word: 'clean', 'look' (suspicious) or 'wrong'."""
     weights = {remark.weight for remark in remarks}
     # with a smaller share explained, an effect may be missing instead
     if 'bad' in weights or (found is not None and found.wrong and found.explained >= 0.9):
