@@ -128,7 +128,7 @@ class QuadraticFriction(JointLaw):
 @dataclass(frozen=True)
 class StribeckFriction(JointLaw):
     """
-    Stribeck friction, which adds to Coulomb friction at low velocity and then vanishes.
+    Stribeck friction, which adds to Coulomb friction at low velocity and vanishes at high speed.
 
     tau = dFs exp(-|dq / vs|^d) sign(dq), where dFs = Fs - Fc is the breakaway torque beyond the
     Coulomb torque. The additional friction is below 3 vs. Confounded with presliding_hysteresis,

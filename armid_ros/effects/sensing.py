@@ -77,7 +77,7 @@ class TorqueDrift(TorqueReading):
 
     The drift is d (1 - exp(-t / T)), t from the beginning of the recording. It does not depend on
     the motion, unlike thermal_friction, and makes equal periods differ. Confounded with
-    torque_offset if the sensor is warm at the beginning, and with a slipping payload.
+    torque_offset if the sensor starts warm and, in one short recording, with a slipping payload.
 
     """
 
