@@ -269,7 +269,7 @@ class PoseMonitor:
         return self._unreachable(source, state, others)
 
     def _unreachable(self, source: _Source, state: _State, last: _State) -> str:
-        """Return a message if a position is unreachable from the last, or has no later stamp."""
+        """Return a message if a position is unreachable from the last position, or not newer."""
         if state.stamp_ns and state.stamp_ns <= last.stamp_ns:
             back = (last.stamp_ns - state.stamp_ns) * 1e-9
             return (
