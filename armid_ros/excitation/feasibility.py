@@ -189,8 +189,8 @@ def _feasible_pose(
         nearest = clearance.closest(motion.select(np.array([best])))
         assert nearest is not None  # without pairs the clearance is infinite
         raise TrajectoryError(
-            f'no pose keeps a clearance of {clearance.margin:g} m; in the best pose '
-            f'{nearest.first} and {nearest.second} are {nearest.distance:.4f} m apart'
+            f'no pose keeps a clearance of {clearance.margin:g} m; {nearest.first} and '
+            f'{nearest.second} are {nearest.distance:.4f} m apart at best; lower --clearance'
         )
     return np.asarray(q[best])
 
