@@ -164,7 +164,7 @@ def split_constant(friction: DryFriction | None, n_joints: int) -> tuple[DryFric
         raise ModelError(
             f'dry friction of joint {joint} is negative: its upper limit, '
             f'{friction.upper[worst]:g} N m, is below its lower limit, '
-            f'{friction.lower[worst]:g} N m'
+            f'{friction.lower[worst]:g} N m; its Coulomb friction has to be positive'
         )
     share = np.zeros(len(friction.lower)) if friction.load_share is None else friction.load_share
     constant = (span <= NO_FRICTION) & (np.abs(share) <= NO_FRICTION)

@@ -242,7 +242,7 @@ def multisine_course(
         here = there
     if not parts:
         raise TrajectoryError(
-            f'a duration of {duration:g} s is too short: one experiment alone takes '
+            f'a duration of {duration:g} s is too short: one move with a multisine needs '
             f'{samples / _RATE:.3g} s'
         )
     q = np.vstack([*(part[0] for part in parts), still + here])
@@ -292,7 +292,7 @@ def step_course(
         number += 1
     if not number:
         raise TrajectoryError(
-            f'a duration of {duration:g} s is too short: one step alone takes {times[-1]:.3g} s'
+            f'a duration of {duration:g} s is too short: one step needs {times[-1]:.3g} s'
         )
     return Reference(robot.joints, np.array(t), np.array(q))
 
