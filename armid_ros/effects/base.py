@@ -220,7 +220,7 @@ class Effect(ABC):
 
     def shape_starts(self, unexplained: Unexplained, arm: Arm) -> tuple[FloatArray, ...]:
         """
-        Return G start values for the search of each shape parameter, an array (owners, G) each.
+        Return start values for the search of shape parameters: an array (owners, G) per shape.
 
         Parameters
         ----------
