@@ -119,7 +119,7 @@ def draw_arm(
     robot: Robot, marked: Sequence[str], q: FloatArray | None = None, label: str = ''
 ) -> ArmDrawing:
     """
-    Draw an arm in the pose of `q` with the largest visible area, by default in its middle pose.
+    Draw an arm in the pose of `q` with the largest visible area; without `q`, in mid-range.
 
     Parameters
     ----------

@@ -105,7 +105,7 @@ class Whiteness:
 
 def torque_reach(result: Identification, fits: Sequence[Fit]) -> FloatArray:
     """
-    Return the 95 % half-width of each joint's predicted torque by parameter errors, (n,).
+    Return the 95 % half-width of each joint's predicted torque due to parameter errors, (n,).
 
     The half-widths are root mean squares over a motion [N m].
 
