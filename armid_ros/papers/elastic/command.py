@@ -111,7 +111,7 @@ def elastic(
         if demo:
             bags, steps = work.simulate(robot, radius, staged, experiments, seed, tick)
         elif not bags:
-            raise RecordingError('no bag is given; name a bag, or give --demo to simulate an arm')
+            raise RecordingError('no bag is named; name a bag, or use --demo to simulate an arm')
         how = options.read_settings(), options.tell_damage
         runs, responses = (
             [run for path in paths for run in read_runs(path, robot, radius, *how)]

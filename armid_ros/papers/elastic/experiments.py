@@ -22,7 +22,7 @@ _JOINTS = ('joint1', 'joint2')
 
 def resonance_experiments(count: int, rng: np.random.Generator) -> list[Reference]:
     """
-    Return reference motions that excite the resonances of both joints.
+    Return `count` reference motions that excite the resonances of both joints.
 
     The motors follow a slow sine of velocity under a loop of low gain, so that friction rarely
     changes its sign. A multisine of torque is added. Poses are random around the stretched arm,
@@ -55,7 +55,7 @@ def resonance_experiments(count: int, rng: np.random.Generator) -> list[Referenc
 
 
 def step_experiments() -> list[Reference]:
-    """Return velocity steps from poses that together make all parameters identifiable."""
+    """Return steps of velocity from four poses that make all parameters identifiable."""
     angles = (0.0, np.pi / 2, np.pi / 4, 3 * np.pi / 4)  # of joint 2 [rad]
     velocities = ((1.0, 0.0), (0.0, 1.0), (1.0, -1.0), (1.0, 1.0))  # [rad/s]
     return [
@@ -65,7 +65,7 @@ def step_experiments() -> list[Reference]:
 
 
 def step_of_velocity(pose: FloatArray, velocity: FloatArray) -> Reference:
-    """Return a reference motion of two joints: rest in a pose, then 0.5 s at constant velocity."""
+    """Return a motion that rests in a pose [rad], then has a velocity [rad/s] for 0.5 s."""
     t = np.array([0.0, _DT, _DT + 0.5])
     return Reference(_JOINTS, t, np.array([pose, pose, pose + 0.5 * velocity]))
 
@@ -79,7 +79,7 @@ def run_experiment(
     sensors: Sensors | None = None,
 ) -> ElasticRun:
     """
-    Simulate an experiment of the two-link arm from rest; return motor and link motions.
+    Simulate a two-link arm that follows a reference; return the motions of motors and links.
 
     Parameters
     ----------

@@ -188,7 +188,7 @@ _SIZE = 'magnitude [dB re rad/(N m s)]'
 
 
 def responses_section(result: TwoInertiaIdentification) -> Section:
-    """Return the section with frequency responses of motor velocity to motor torque."""
+    """Return the section with the frequency responses from motor torque to motor velocity."""
     text = (
         'Motor velocity per motor torque at each frequency. At the dip (antiresonance), the link '
         'swings on its spring; at the peak (resonance), motor and link swing against each other. '
@@ -207,7 +207,7 @@ def responses_section(result: TwoInertiaIdentification) -> Section:
 def response_error(
     result: TwoInertiaIdentification, joint: int, *, decoupled: bool = True
 ) -> float:
-    """Return the rms error of a joint's modelled frequency response, 5 to 60 Hz [dB]."""
+    """Return the rms error [dB] of a joint's modelled frequency response, 5 to 60 Hz."""
     measured = result.measured[joint]
     seen = (measured.frequency >= _COMPARED_BAND[0]) & (measured.frequency <= _COMPARED_BAND[1])
     ideal = ideal_response(result.parameters, joint, measured.frequency[seen])[:, 0, 0]
@@ -216,7 +216,7 @@ def response_error(
 
 
 def _joint(result: TwoInertiaIdentification, k: int) -> list[Templated]:
-    """Return charts of a joint's frequency response, and facts on resonances and model errors."""
+    """Return charts of the frequency response of joint k, with resonances and model errors."""
     measured = result.measured[k]
     seen = (measured.frequency >= _SHOWN_BAND[0]) & (measured.frequency <= _SHOWN_BAND[1])
     own = measured.frequency[seen]
@@ -338,7 +338,7 @@ def elastic_document(result: TwoInertiaIdentification, robot: str) -> dict[str, 
 
 
 def total_damping(result: TwoInertiaIdentification) -> list[dict[str, Any]]:
-    """Return total viscous friction dl + dm gear^2 of each joint and its standard deviation."""
+    """Return one row per joint: total damping dl + dm gear^2, and standard deviation."""
     assert result.tuning is not None
     estimate, gear = result.tuning.estimate, result.parameters.gear
     rows = []
@@ -362,7 +362,7 @@ def tuning_story(
     tuning: Tuning, start: TwoLinkParameters, truth: TwoLinkParameters
 ) -> dict[str, Any]:
     """
-    Return parameter and velocity errors before and after the tuning, for a simulated arm.
+    Return the errors of parameters and velocities of a simulated arm before and after tuning.
 
     Returns
     -------

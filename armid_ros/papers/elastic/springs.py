@@ -72,7 +72,7 @@ def _motor_row(one: SpringEstimate) -> tuple[str, ...]:
 
 
 def verdict(found: Sequence[SpringEstimate]) -> VerdictSection:
-    """Return the verdict box: number of joints with a known stiffness, and the softest joint."""
+    """Return the verdict box: number of identified stiffnesses, and the softest joint."""
     known = [one for one in found if one.informative]
     lost = [one.joint for one in found if not one.informative]
     beware = [
@@ -110,12 +110,12 @@ def identify_springs(
     bags: Sequence[Path], robot: Robot, source: str, model: Path | None, out: Path,
     as_json: bool,
 ) -> None:  # fmt: skip
-    """Fit the stiffness of each joint to bags with motor and link encoders, and write results."""
+    """Fit the stiffness of each joint to bags with motor and link encoders; write results."""
     staged = options.stage(out, SPRINGS_SCHEMA, source)
     body = robot if model is None else options.model_of(model, robot).body
     if not bags:
         raise RecordingError(
-            'no bag is given; name a bag with encoders on both sides of the joints'
+            'no bag is named; name a bag with encoders on both sides of the joints'
         )
     with progress('reading') as tick:
         try:

@@ -36,7 +36,7 @@ DEMO_BAGS = ('resonances', 'steps')
 
 
 def machine(**given: str | None) -> tuple[FloatArray, TwoLinkParameters, VelocityLoop]:
-    """Return accelerometer positions, drives, velocity loop; defaults are of the shipped arm."""
+    """Return accelerometer distances [m], drives and velocity loop from options or defaults."""
     shipped = two_link_set('after')
     loop = two_link_loop(shipped)
     defaults = {
@@ -55,7 +55,7 @@ def machine(**given: str | None) -> tuple[FloatArray, TwoLinkParameters, Velocit
             found[name] = np.empty(0)
         if found[name].shape != (2,) or not np.all(found[name] > 0.0):
             raise RobotError(
-                f"--{name} takes two positive numbers, one for each joint, not '{text}'"
+                f"--{name} needs two positive numbers, one for each joint, not '{text}'"
             )
     drives = replace(shipped.parameters, gear=found['gear'])
     return found['accelerometers'], drives, VelocityLoop(found['kp'], found['ki'])
@@ -64,7 +64,7 @@ def machine(**given: str | None) -> tuple[FloatArray, TwoLinkParameters, Velocit
 def simulate(
     robot: Robot, radius: FloatArray, staged: Staged, experiments: int, seed: int, tick: Tick
 ) -> tuple[list[Path], list[Path]]:
-    """Simulate the two-link arm, and return bags of resonance and step experiments."""
+    """Simulate a two-link arm; return the paths of resonance bags and of step bags."""
     for name in DEMO_BAGS:
         require_new(staged.out / name)
     resonances, steps = (staged.folder / name for name in DEMO_BAGS)

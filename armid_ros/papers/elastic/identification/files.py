@@ -40,7 +40,7 @@ def read_runs(
     read: Callable[..., None] | None = None,
 ) -> list[ElasticRun]:
     """
-    Read the experiments with a two-link arm from a bag.
+    Read all experiments with a two-link arm from a bag.
 
     Parameters
     ----------
@@ -113,7 +113,7 @@ def read_runs(
 def _accelerations(
     robot: Robot, radius: FloatArray, q: FloatArray, dq: FloatArray, sideways: Sequence[FloatArray]
 ) -> FloatArray:
-    """Return angular accelerations of the joints, (N, 2), from sideways link accelerations."""
+    """Return joint accelerations, (N, 2) [rad/s^2], from sideways accelerations of links."""
     offset = np.asarray(robot.model.jointPlacements[2].translation)
     length = np.hypot(offset[0], offset[1])
     first = sideways[0] / radius[0]
@@ -125,7 +125,7 @@ def read_sides(
     path: str | Path, robot: Robot, settings: ReadSettings = DEFAULT
 ) -> tuple[Recording, Recording]:
     """
-    Read the joint states of motors and of links from a bag.
+    Read a bag; return the joint states of the motors, and those of the links.
 
     Raises
     ------
@@ -149,7 +149,7 @@ def _motor_topic(path: str | Path, settings: ReadSettings) -> str:
 def _experiments(
     t: FloatArray, moving: npt.NDArray[np.bool_], period: float
 ) -> list[tuple[int, int, int]]:
-    """Return the sample indices of each experiment: start of rest, start and end of motion."""
+    """Return three sample indices of each experiment: start of rest, start and end of motion."""
     # time of rest between two experiments [s]
     pause, shortest = round(0.1 / period), round(_MIN_DURATION / period)
     found = []
@@ -168,7 +168,7 @@ def _experiments(
 def _common(
     path: str | Path, names: Sequence[str], stamps: Sequence[npt.NDArray[np.int64]]
 ) -> npt.NDArray[np.int64]:
-    """Return the time stamps [us] that all topics share; RecordingError for too few stamps."""
+    """Return the time stamps [us] that all topics have; RecordingError if they are too few."""
     common: npt.NDArray[np.int64] = reduce(np.intersect1d, stamps)
     # smallest share of samples with a common timestamp on all topics
     if len(common) < 0.9 * max(map(len, stamps)):

@@ -37,7 +37,7 @@ HOLD: tuple[Hold, Hold] = ('zero', 'first')
 
 def link_columns(q: FloatArray, dq: FloatArray, ddq: FloatArray) -> FloatArray:
     """
-    Return the regressor of link torques for the inertias alpha, beta and gamma.
+    Return the derivative of link torques by the inertias alpha, beta, gamma, (N, 2, 3).
 
     Parameters
     ----------
@@ -61,7 +61,7 @@ def link_columns(q: FloatArray, dq: FloatArray, ddq: FloatArray) -> FloatArray:
 
 def interaction_torques(link: Motion, parameters: TwoLinkParameters) -> FloatArray:
     """
-    Return the torque that the motion of one link exerts on the other, shape (N, 2) [N m].
+    Return the torque on each link due to the motion of the other link, shape (N, 2) [N m].
 
     Only beta and gamma of the parameters are used. The motion needs measured accelerations.
 
@@ -74,7 +74,7 @@ def interaction_torques(link: Motion, parameters: TwoLinkParameters) -> FloatArr
 
 def direction(velocity: FloatArray) -> FloatArray:
     """
-    Return the mean velocity sign between neighbouring samples, (N, n), for dry friction.
+    Return the mean sign of velocity between neighbouring samples, (N, n), for dry friction.
 
     Velocities are interpolated linearly; the last row is the sign of the last sample.
 
@@ -88,7 +88,7 @@ def joint_signals(
     runs: Sequence[ElasticRun], parameters: TwoLinkParameters, joint: int, *, decoupled: bool
 ) -> list[Signals]:
     """
-    Return motor torque, interaction torque and velocities of a joint for each experiment.
+    Return inputs (torques) and outputs (velocities) of a joint for each experiment.
 
     Inputs are the torque of the motor less Coulomb friction, and the interaction torque. Outputs
     are the velocities of motor and link. All are at the joint.
@@ -167,7 +167,7 @@ def measured_response(
 
 
 def decibel_error(found: npt.NDArray[np.complex128], wanted: npt.NDArray[np.complex128]) -> float:
-    """Return the rms difference between the magnitudes of two frequency responses [dB]."""
+    """Return the rms ratio [dB] of the magnitudes of two frequency responses."""
     difference = 20.0 * np.log10(np.abs(found) / np.abs(wanted))
     return float(np.sqrt(np.mean(difference**2)))
 
@@ -181,7 +181,7 @@ def ideal_response(
     parameters: TwoLinkParameters, joint: int, frequency: npt.ArrayLike
 ) -> ComplexArray:
     """
-    Return the modelled frequency response of a joint with motor, spring and link.
+    Return the frequency response of the model of a joint: motor, spring and link.
 
     Parameters
     ----------
@@ -266,13 +266,13 @@ def fit_joints(
 
 
 def frequencies(parameters: TwoLinkParameters) -> tuple[FloatArray, FloatArray]:
-    """Return undamped antiresonances and resonances of both joints, two arrays (2,) [Hz]."""
+    """Return the undamped antiresonances and resonances of the joints, each (2,) [Hz]."""
     by_link, by_motor = (parameters.stiffness / x for x in (parameters.inertia, parameters.rotor))
     return np.sqrt(by_link) / (2.0 * np.pi), np.sqrt(by_link + by_motor) / (2.0 * np.pi)
 
 
 def _response(s: ComplexArray, values: FloatArray) -> ComplexArray:
-    """Return the modelled frequency response of a joint at Laplace variables s, (K, 2, 2)."""
+    """Return the response (K, 2, 2) of a joint at Laplace variables s, (K,) [rad/s]."""
     rotor, inertia, stiffness, between, motor, link, gain = values
     spring = stiffness / s + between
     a, b = rotor * s + motor + spring, inertia * s + link + spring
@@ -282,7 +282,7 @@ def _response(s: ComplexArray, values: FloatArray) -> ComplexArray:
 
 
 def _first_guess(joint: str, frequency: FloatArray, found: ComplexArray) -> FloatArray:
-    """Return initial joint parameters, from antiresonance and resonance of the motor."""
+    """Return initial parameters for `_response`, from antiresonance and resonance."""
     size = np.abs(found[:, 0, 0])
     lowest = int(np.argmin(size[frequency > 4.0 * frequency[0]]))
     lowest += int(np.count_nonzero(frequency <= 4.0 * frequency[0]))

@@ -74,7 +74,7 @@ class TransmissionFit:
 
 def fit_transmission(sides: Sequence[Sides], used: Conditioning, joint: int) -> TransmissionFit:
     """
-    Fit compliance and backlash of one joint to the twist between motor and link.
+    Fit compliance and backlash of a joint to the twist between its motor and its link.
 
     Parameters
     ----------
@@ -132,7 +132,7 @@ def fit_transmission(sides: Sequence[Sides], used: Conditioning, joint: int) -> 
 
 
 def _columns(sides: Sides, used: Conditioning, joint: int) -> tuple[FloatArray, FloatArray]:
-    """Return regressor and spring twist (motor minus link angle) at samples in motion."""
+    """Return regressor and twist (motor minus link angle [rad]) of samples in motion."""
     motor, link, torque = sides[0].q[:, joint], sides[1].q[:, joint], sides[2][:, joint]
     velocity = sides[0].dq[:, joint]
     # torque range in which the tooth contact reverses, as a share of the median torque
@@ -151,7 +151,7 @@ def _interval(value: float, std: float) -> tuple[float, float, float]:
 @dataclass(frozen=True, eq=False)
 class SpringEstimate:
     """
-    Stiffness, backlash, motor friction and inertias of one joint.
+    Estimated stiffness, backlash, motor friction and inertias of one joint.
 
     Attributes
     ----------
@@ -175,7 +175,7 @@ class SpringEstimate:
 
     @property
     def informative(self) -> bool:
-        """Whether load torque explains the twist of the joint, so that its stiffness is known."""
+        """Whether the load torque explains the twist, so that the stiffness is identifiable."""
         fit = self.transmission
         # smallest R^2 of the twist for an estimate of stiffness
         return fit.explained > 0.9 and bool(np.isfinite(fit.stiffness).all())
@@ -237,7 +237,7 @@ def fit_springs(
 def _stretches(
     robot: Robot, motors: Recording, links: Recording, used: Conditioning
 ) -> list[Sides]:
-    """Return filtered motor and link motions of gap-free sections, with spring torques."""
+    """Return filtered motor and link motions and spring torques of each gap-free section."""
     both = recorded_together(motors, links, robot)
     assert both.partner is not None
     tau = np.zeros_like(both.q) if both.tau is None else both.tau
@@ -248,7 +248,7 @@ def _stretches(
 
 
 def _motor(sides: Sequence[Sides], used: Conditioning, joint: int) -> FloatArray:
-    """Fit rotor inertia and friction of a motor to its torque minus the load torque."""
+    """Fit rotor inertia and two friction parameters, (3,), to motor minus load torque."""
     rows = []
     for motor, _, load in sides:
         assert motor.tau is not None

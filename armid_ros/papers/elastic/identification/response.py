@@ -37,13 +37,13 @@ SIZE = 3 + 2 * len(PER_JOINT)
 
 
 def unpack(parameters: TwoLinkParameters) -> FloatArray:
-    """Return the 13 tuned parameters as a vector: alpha, beta, gamma, then `PER_JOINT`."""
+    """Convert parameters to a vector, (13,): alpha, beta, gamma, then those of `PER_JOINT`."""
     joints = [getattr(parameters, field) for field, _, _ in PER_JOINT]
     return np.concatenate([[parameters.alpha, parameters.beta, parameters.gamma], *joints])
 
 
 def pack(values: npt.ArrayLike, like: TwoLinkParameters) -> TwoLinkParameters:
-    """Return parameters from a vector of `unpack`; `like` gives Coulomb friction and drives."""
+    """Convert a vector of `unpack` to parameters, with the other parameters of `like`."""
     vector = np.asarray(values, dtype=float)
     pairs = vector[3:].reshape(len(PER_JOINT), 2)
     fields = {field: pair for (field, _, _), pair in zip(PER_JOINT, pairs, strict=True)}
@@ -52,7 +52,7 @@ def pack(values: npt.ArrayLike, like: TwoLinkParameters) -> TwoLinkParameters:
 
 
 def parameter_names(joints: tuple[str, ...]) -> tuple[ParameterName, ...]:
-    """Return the name and unit of each element of the vector that `unpack` returns."""
+    """Return names and units of the 13 elements of a vector of `unpack`."""
     rigid = [ParameterName(name, '', 'kg m^2') for name in ('alpha', 'beta', 'gamma')]
     own = [ParameterName(name, joint, unit) for _, name, unit in PER_JOINT for joint in joints]
     return (*rigid, *own)
@@ -92,7 +92,7 @@ class Steps:
 
     @classmethod
     def of(cls, runs: Sequence[ElasticRun], loop: VelocityLoop) -> Steps:
-        """Return the step experiments of recorded runs, cut to the length of the shortest run."""
+        """Convert recorded runs to step experiments with the length of the shortest run."""
         count = min(len(run.motor) for run in runs)
         t = runs[0].motor.t
         return cls(
@@ -114,7 +114,7 @@ def sensitivities(
     steps: Steps, parameters: TwoLinkParameters, directions: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """
-    Simulate velocities and their derivatives along given directions in parameter space.
+    Simulate velocities, and their derivatives along D directions in parameter space.
 
     Parameters
     ----------
@@ -139,12 +139,12 @@ def sensitivities(
 
 
 def _point(parameters: TwoLinkParameters) -> FloatArray:
-    """Return the 13 parameters of `unpack`, followed by two Coulomb torques of the motors."""
+    """Return a vector (15,): the 13 parameters of `unpack`, then two Coulomb torques."""
     return np.concatenate([unpack(parameters), parameters.coulomb])
 
 
 def _simulate(steps: Steps, values: DualArray, gear: FloatArray) -> DualArray:
-    """Simulate E experiments with D parameter vectors; return velocities, (N, E, D, 4)."""
+    """Simulate E experiments with each of D parameter vectors; return (N, E, D, 4) [rad/s]."""
     experiments, sets, substeps = len(steps.q), len(values), 2
     arm = _Arm(np.tile(values, (experiments, 1)), gear, steps.dt / substeps)
     size = experiments * sets
@@ -203,7 +203,7 @@ class _Arm:
         modes: npt.NDArray[np.int_],
         torque: DualArray,
     ) -> tuple[DualArray, DualArray, DualArray, npt.NDArray[np.int_]]:
-        """Advance by a time step; return angle of joint 2, state, accelerations, friction mode."""
+        """Integrate one time step; return angle of joint 2, state, accelerations, slip modes."""
         dt, a = self.dt, self.a
         middle = q2 + 0.5 * dt * (x[:, 5] + 0.25 * dt * dv[:, 3])
         v = x[:, 4:] + 0.5 * dt * dv[:, 2:]
@@ -250,7 +250,7 @@ class _Arm:
 def _friction(
     response: DualArray, free: DualArray, level: DualArray, modes: npt.NDArray[np.int_]
 ) -> tuple[DualArray, npt.NDArray[np.int_]]:
-    """Return friction torques, (B, 2), and whether each motor slips (1, -1) or sticks (0)."""
+    """Return friction torques (B, 2), and modes: a motor slips (1 or -1) or sticks (0)."""
     # response: change of the final velocity per torque; free: final velocity without friction;
     # modes: initial guess, 1 slips forwards, -1 slips backwards, 0 sticks
     modes = modes.copy()

@@ -35,7 +35,7 @@ _ROWS_PER_PERIOD = 10
 @dataclass(frozen=True, eq=False)
 class RigidFit:
     """
-    Eight identified parameters of the two-link arm with rigid joints.
+    Eight identified parameters of a two-link arm whose joints are modelled as rigid.
 
     Attributes
     ----------
@@ -58,7 +58,7 @@ class RigidFit:
 
 def fit_rigid(runs: Sequence[ElasticRun]) -> RigidFit:
     """
-    Fit the arm with rigid joints to slow motion, by least squares weighted by torque noise.
+    Fit a two-link arm with rigid joints to slow motion by weighted least squares.
 
     Torques and columns pass the same low-pass filter. Accelerations come from accelerometers on
     the links, positions from encoders at the links. Friction depends on the velocity of the
@@ -115,7 +115,7 @@ def fit_rigid(runs: Sequence[ElasticRun]) -> RigidFit:
 
 
 def _rows(run: ElasticRun, source: str) -> list[Regression]:
-    """Return the filtered regression of an experiment; [] for an experiment that is too short."""
+    """Return the filtered regression rows of an experiment; [] if the experiment is too short."""
     motor, link = run.motor, run.link
     assert motor.tau is not None
     dt = float(motor.t[-1] - motor.t[0]) / (len(motor) - 1)

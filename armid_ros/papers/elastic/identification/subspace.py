@@ -79,7 +79,7 @@ def identify_subspace(
     experiments: Sequence[Signals], dt: float, order: int, hold: Sequence[Hold]
 ) -> StateSpace:
     """
-    Identify a linear system with a given number of states from sampled experiments.
+    Identify a linear system with `order` states from sampled inputs and outputs.
 
     Parameters
     ----------
@@ -120,7 +120,7 @@ def identify_subspace(
     eigenvalues, vectors = np.linalg.eig(a)
     if np.any((np.abs(eigenvalues.imag) < 1e-12) & (eigenvalues.real <= 0.0)):
         raise IdentificationError(
-            f'subspace identification: {order} states give poles that no sampled system has; '
+            f'subspace identification: {order} states give a pole on the negative real axis; '
             'record more data'
         )
     poles = np.log(eigenvalues.astype(complex)) / dt
@@ -130,7 +130,7 @@ def identify_subspace(
 
 
 def _observable(experiments: Sequence[Signals], order: int) -> tuple[FloatArray, FloatArray]:
-    """Return state matrix and output matrix of the sampled system, from input and output data."""
+    """Estimate and return state matrix (r, r) and output matrix (p, r) of the sampled system."""
     m, p = experiments[0].u.shape[1], experiments[0].y.shape[1]
     triangle = np.empty((0, 2 * _HORIZON * (m + p)))
     for e in experiments:
@@ -162,7 +162,7 @@ def _inputs(
     modal: ComplexArray,
     hold: Sequence[Hold],
 ) -> ComplexArray:
-    """Return input gains of the modes; each experiment has a free initial state."""
+    """Fit and return the input gains of the modes, (r, m), with free initial states."""
     # The outputs are real, so the input gains of a conjugate pair of poles are conjugate as well.
     normal, right = [], []
     for e in experiments:
@@ -179,12 +179,12 @@ def _inputs(
 
 
 def _outputs(modal: ComplexArray, states: ComplexArray) -> ComplexArray:
-    """Return each mode's contribution to the outputs, (N p, r), from mode states (N, r)."""
+    """Return the output of each mode, (N p, r), for mode states (N, r)."""
     return np.asarray((states[:, np.newaxis] * modal).reshape(-1, modal.shape[1]))
 
 
 def _driven(u: FloatArray, dt: float, poles: ComplexArray, hold: Hold) -> ComplexArray:
-    """Return the response of each of r modes to an input with unit gain, shape (N, r)."""
+    """Return the states of r modes, (N, r), that an input u (N,) drives with unit gain."""
     states = np.empty((len(u), len(poles)), complex)
     for k, pole in enumerate(poles):
         factor = np.exp(pole * dt)

@@ -83,7 +83,7 @@ class Tuning:
 
 def tune(runs: Sequence[ElasticRun], start: TwoLinkParameters, loop: VelocityLoop) -> Tuning:
     """
-    Fit the parameters of the arm to measured velocities after reference steps, in closed loop.
+    Fit the parameters of a two-link arm to step responses under velocity control.
 
     Parameters
     ----------
@@ -155,7 +155,7 @@ def tune(runs: Sequence[ElasticRun], start: TwoLinkParameters, loop: VelocityLoo
 
 
 def _covariance(jacobian: FloatArray) -> FloatArray:
-    """Return the covariance of the logarithms of the parameters, for unit residual variance."""
+    """Return the covariance of the log parameters for residuals of unit variance."""
     scale = np.linalg.norm(jacobian, axis=0)
     if not np.all(scale > 0.0):
         raise IdentificationError(
@@ -227,7 +227,7 @@ class TwoInertiaIdentification:
 
     @property
     def parameters(self) -> TwoLinkParameters:
-        """Return the tuned parameters; without tuning, the fit to the frequency responses."""
+        """Tuned parameters; without tuning, the parameters fitted to frequency responses."""
         return self.untuned if self.tuning is None else self.tuning.parameters
 
 
@@ -241,7 +241,7 @@ def identify_two_inertia(
     progress: Callable[[float, str], None] = lambda share, what: None,
 ) -> TwoInertiaIdentification:
     """
-    Identify a planar two-link arm with elastic joints in three steps.
+    Identify a planar two-link arm with elastic joints in three steps; return the results.
 
     Parameters
     ----------
