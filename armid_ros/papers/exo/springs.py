@@ -29,7 +29,7 @@ from scipy.optimize import minimize_scalar
 @dataclass(frozen=True)
 class Slack:
     """
-    Common slack of the straps between two machines, and their stiffness with this slack.
+    Common slack of the straps between two machines, and strap stiffness at this slack.
 
     Attributes
     ----------
@@ -56,7 +56,7 @@ class Slack:
 
 def find_slack(problem: Callable[[float], InteractionProblem]) -> Slack:
     """
-    Fit a common slack of all straps, together with their stiffness.
+    Fit a common slack of all straps, together with the strap stiffness.
 
     Parameters
     ----------
@@ -92,7 +92,7 @@ _AVERAGED_RATE = 100.0
 
 @dataclass
 class _Averages:
-    """Buffer of the latest seconds of samples, averaged to 100 Hz."""
+    """Buffer of the samples of the last `memory` seconds, averaged to 100 Hz."""
 
     memory: float
     t: deque[float] = field(default_factory=deque)
@@ -183,19 +183,19 @@ class OnlineInteraction:
         self.slack: Slack | None = None
 
     def interrupt(self) -> None:
-        """Discard the samples after a break in the motion, but keep the estimates."""
+        """Discard all samples, but not the estimates, after an interruption of the motion."""
         self._own.clear()
         self._far.clear()
         self._due: float | None = None
         self._slack_due: float | None = None
 
     def take_other(self, t: float, q: FloatArray) -> None:
-        """Add positions of the second machine, shape (m,) [rad], at a time [s]."""
+        """Add a sample of the second machine: time [s] and joint positions (m,) [rad]."""
         self._far.take(t, q)
 
     def take(self, t: float, q: FloatArray, tau: FloatArray) -> bool:
         """
-        Add positions and torques of the first machine; update the estimates if due.
+        Add a sample of the first machine, and update the estimates once per period.
 
         Parameters
         ----------
@@ -235,7 +235,7 @@ class OnlineInteraction:
         return True
 
     def _problem(self, *, separate: bool, slack: float = 0.0) -> InteractionProblem:
-        """Return the stiffness regression of the samples in the buffers."""
+        """Return the regression of strap stiffness for the samples in the buffers."""
         robot, other = self.machines.robot, self.machines.other
         n = robot.n_joints
         if len(self._own.t) < 2 or len(self._far.t) < 2:

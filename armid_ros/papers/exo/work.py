@@ -38,7 +38,7 @@ def record(
     noise: tuple[float, float],
     rng: Generator,
 ) -> None:
-    """Write a bag of both machines' joint states, with noise of angles [deg] and torques [N m]."""
+    """Write a bag with noisy joint states; `noise` is that of angles [deg] and torques [N m]."""
     tau = pair_torques(pair, *motions).tau
     tau = tau + noise[1] * rng.normal(size=tau.shape)
     stamps = 10**9 + np.rint(motions.own.t * 1e9).astype(np.int64)
@@ -49,7 +49,7 @@ def record(
 
 
 def walk(pair: TiedPair, gait: Gait, stiffness: float | None, tick: Tick) -> SimulatedWalk:
-    """Simulate a gait cycle of exoskeleton and wearer, then joints driven by their torques."""
+    """Simulate a gait cycle, and its repeats with torque-driven joints of the exoskeleton."""
     tick(0.6, 'simulating a gait cycle')
     walkers = walking_pair(stiffness)
     cycle, rate = gait_cycle(walkers, gait), read_assumptions()['torque_rate'].value
@@ -77,7 +77,7 @@ def identify_ties(
 
 
 def recorded_motions(pair: TiedPair, machine: Recording, wearer: Recording) -> PairMotion:
-    """Return recorded positions of both machines on one time base."""
+    """Return the recorded positions of both machines on a common time base."""
     both = recorded_together(machine, wearer, pair.other)
     assert both.partner is not None
     return PairMotion(

@@ -100,11 +100,11 @@ class InteractionIdentifierNode(ArmidNode):
 
     @property
     def hardware(self) -> str:
-        """Name of the exoskeleton, for diagnostics."""
+        """Name of the exoskeleton on /diagnostics."""
         return str(self.identifier.machines.robot.name)
 
     def match(self) -> None:
-        """Subscribe to publishers of joint states, and report when they stop or resume."""
+        """Subscribe to publishers of joint states; publish whether joint states arrive."""
         for topic in self.topics:
             topic.match()
         stopped = any(fresh.stopped for fresh in self.freshness)
@@ -113,7 +113,7 @@ class InteractionIdentifierNode(ArmidNode):
             self.publish_diagnostics()
 
     def reset(self) -> str:
-        """Discard all samples and estimates; return the answer of the reset service."""
+        """Discard all samples and estimates; return the answer of the service."""
         self.identifier.reset()
         for machine, gate in enumerate(self._gates):
             gate.reset()
@@ -121,7 +121,7 @@ class InteractionIdentifierNode(ArmidNode):
         return 'samples and estimates are discarded'
 
     def condition(self) -> tuple[str, Mapping[str, object]]:
-        """Return a warning (or ''), and stiffness and slack of the straps, for diagnostics."""
+        """Return a warning or '', and stiffness and slack of the straps for /diagnostics."""
         core = self.identifier
         values: dict[str, object] = {'received': self.received}
         for part in (core.together, core.separate):
@@ -139,13 +139,13 @@ class InteractionIdentifierNode(ArmidNode):
         return '; '.join(filter(None, (f.trouble() for f in self.freshness))), values
 
     def level(self, troubled: bool) -> bytes:
-        """Return the diagnostic level: STALE if the joint states of a machine have stopped."""
+        """Return the level for /diagnostics: STALE if no more joint states of a machine arrive."""
         if any(fresh.stopped for fresh in self.freshness):
             return DiagnosticStatus.STALE
         return super().level(troubled)
 
     def _take(self, machine: int, message: JointState) -> None:
-        """Add a joint state of exoskeleton (0) or wearer (1); publish a new estimate, if any."""
+        """Process a joint state of exoskeleton (0) or wearer (1); publish any new estimate."""
         self.received += 1
         self.freshness[machine].mark_received()
         topic, n = _TOPICS[machine], len(self._joints[machine])
@@ -165,7 +165,7 @@ class InteractionIdentifierNode(ArmidNode):
                 self._estimates.publish(estimate)
 
     def _signals(self, machine: int, message: JointState) -> list[StreamSample]:
-        """Return the valid samples of a joint state; raise RecordingError if it is damaged."""
+        """Convert a joint state to valid samples; RecordingError for an invalid message."""
         topic, gate, fields = _TOPICS[machine], self._gates[machine], _FIELDS[machine]
         order = joint_places(self._joints[machine], message.name)
         parts = [np.array(getattr(message, name)) for name in fields]
@@ -177,11 +177,11 @@ class InteractionIdentifierNode(ArmidNode):
         signal = np.concatenate([part[order] for part in parts])
         if not np.all(np.abs(signal) <= MAX_MAGNITUDE):
             raise RecordingError(
-                f'a value of {" or ".join(fields)} is not finite or above {MAX_MAGNITUDE:g}'
+                f'a {" or ".join(fields)} is not finite or above {MAX_MAGNITUDE:g}'
             )
         stamp = message.header.stamp
         if stamp.sec < 0 or stamp.nanosec >= 10**9:
-            raise RecordingError(f'a stamp is invalid: {stamp.sec} s, {stamp.nanosec} ns')
+            raise RecordingError(f'a time stamp is invalid: {stamp.sec} s, {stamp.nanosec} ns')
         if self._epoch is None:
             self._epoch = stamp.sec
         good = gate.take(float(stamp.sec - self._epoch) + 1e-9 * stamp.nanosec, signal)
@@ -193,7 +193,7 @@ class InteractionIdentifierNode(ArmidNode):
 
 
 def _named(found: Interaction | None, suffix: str = '') -> dict[str, object]:
-    """Return stiffness values and their interval bounds by name, for diagnostics."""
+    """Return stiffnesses with 95 % interval bounds [N/m] by name, for /diagnostics."""
     if found is None:
         return {}
     values: dict[str, object] = {}

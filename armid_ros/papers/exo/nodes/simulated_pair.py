@@ -92,16 +92,16 @@ class SimulatedPairNode(ArmidNode):
 
     @property
     def hardware(self) -> str:
-        """Name of the exoskeleton, for diagnostics."""
+        """Name of the exoskeleton on /diagnostics."""
         return str(self._pair.robot.name)
 
     @property
     def stamp_ns(self) -> int:
-        """Timestamp of the current sample [ns]."""
+        """Time stamp of the present sample [ns]."""
         return self._origin_ns + round(self.t * 1e9)
 
     def step(self) -> int:
-        """Simulate the next sample, publish it on both topics, and return its timestamp [ns]."""
+        """Simulate and publish the next sample of both machines; return its time stamp [ns]."""
         sample = next(self._readings)
         self.t = float(sample.t)
         robot, other = self._pair.robot, self._pair.other
@@ -117,21 +117,21 @@ class SimulatedPairNode(ArmidNode):
         return self.stamp_ns
 
     def catch_up(self) -> None:
-        """Simulate up to the scaled real time; skip time if the computer is too slow."""
+        """Simulate up to the present real time; skip time if the computer is too slow."""
         factor = self.value('real_time_factor')
         skipped = self.real_time.catch_up(factor, 1.0 / self.value('rate'))
         if factor == 1.0:  # stamps stay those of the computer  # noqa: RUF069 - as it is written
             self._origin_ns += round(skipped * 1e9)
 
     def reset(self) -> str:
-        """Return both machines to the initial state, without a jump of the time stamps."""
+        """Restart both machines in the initial state; the time stamps continue."""
         self._origin_ns = self.stamp_ns
         self._readings, self.t = self._begin(), 0.0
         self.real_time.begin()
         return 'exoskeleton and wearer are in the initial state'
 
     def condition(self) -> tuple[str, Mapping[str, object]]:
-        """Return a warning if simulation is slower than real time, and the skipped time."""
+        """Return a warning if the simulation is too slow for real time, and the skipped time."""
         values = {
             'simulated_time': self.t,
             'skipped_real_time': self.real_time.given_up,

@@ -32,7 +32,7 @@ _COLUMNS = ['phase', 'hip_deg', 'knee_deg', 'ankle_deg']
 @dataclass(frozen=True)
 class Assumption:
     """
-    Assumed value of a quantity that the paper on the exoskeleton does not state.
+    Assumed value of a quantity that the source paper on the exoskeleton does not state.
 
     Attributes
     ----------
@@ -52,20 +52,20 @@ class Assumption:
 
 @lru_cache
 def read_assumptions() -> Mapping[str, Assumption]:
-    """Read the assumed quantities of exoskeleton and wearer, by name."""
+    """Read `assumptions.yaml`: assumed quantities of exoskeleton and wearer, by name."""
     text = leg_pair_file('exoskeleton_legs/assumptions.yaml').read_text(encoding='utf-8')
     return {name: Assumption(**entry) for name, entry in load_yaml(text).items()}
 
 
 def leg_pair_file(name: str) -> Path:
-    """Return the path of a shipped file, such as 'human_legs/gait.csv'."""
+    """Return the path of a shipped robot file, such as 'human_legs/gait.csv'."""
     return Path(str(resources.files('armid_ros.robots').joinpath(name)))
 
 
 @dataclass(frozen=True)
 class Gait:
     """
-    Joint angles of a leg as a Fourier series of the gait phase.
+    Hip, knee and ankle angles of a leg as a Fourier series of the gait phase.
 
     Attributes
     ----------
@@ -78,12 +78,12 @@ class Gait:
     sine: FloatArray
 
     def __post_init__(self) -> None:
-        """Freeze the coefficients."""
+        """Make the coefficients read-only."""
         freeze(self, 'cosine', 'sine')
 
     @classmethod
     def fit(cls, phase: FloatArray, angles: FloatArray, harmonics: int = _HARMONICS) -> Gait:
-        """Fit a Fourier series to joint angles, (N, 3) [rad], at gait phases from 0 to 1, (N,)."""
+        """Fit a Fourier series to joint angles, (N, 3) [rad], at gait phases 0 to 1, (N,)."""
         turn = 2.0 * np.pi * np.outer(phase, np.arange(harmonics + 1))
         basis = np.hstack([np.cos(turn), np.sin(turn[:, 1:])])
         solution = np.linalg.lstsq(basis, angles, rcond=None)[0]
@@ -91,7 +91,7 @@ class Gait:
         return cls(cosine, np.vstack([np.zeros((1, 3)), solution[harmonics + 1 :]]))
 
     def __call__(self, phase: FloatArray, derivative: int = 0) -> FloatArray:
-        """Return joint angles (N, 3) [rad] at N gait phases, or a derivative by the phase."""
+        """Return joint angles, or a derivative by the phase, (N, 3) [rad], at N gait phases."""
         w = 2.0 * np.pi * np.arange(len(self.cosine))
         turn = np.outer(phase, w) + derivative * np.pi / 2.0
         return np.asarray(
@@ -102,7 +102,7 @@ class Gait:
 
 def read_gait(path: Path | None = None) -> Gait:
     """
-    Read a gait from a CSV file, or the shipped gait of level walking.
+    Read a gait from a CSV file; by default, read the shipped gait of level walking.
 
     Parameters
     ----------
@@ -120,7 +120,7 @@ def read_gait(path: Path | None = None) -> Gait:
     lines = [line for line in text.splitlines() if line.strip() and not line.startswith('#')]
     head = [name.strip() for name in lines[0].split(',')] if lines else []
     if head != _COLUMNS:
-        raise TrajectoryError(f'{path}: the columns are {head}, but a gait needs {_COLUMNS}')
+        raise TrajectoryError(f'{path}: the columns are {head}, but have to be {_COLUMNS}')
     try:
         rows = np.array([[float(cell) for cell in line.split(',')] for line in lines[1:]])
     except ValueError as error:
@@ -136,7 +136,7 @@ def read_gait(path: Path | None = None) -> Gait:
 
 def stance_motion(gait: Gait, joints: tuple[str, ...], t: FloatArray, phase: FloatArray) -> Motion:
     """
-    Return the joint motion of a body that stands on one foot while the other leg swings.
+    Return the joint motion of a person or exoskeleton on one foot, while the other leg swings.
 
     Parameters
     ----------

@@ -86,12 +86,12 @@ class WalkingMachine:
 
     @property
     def feet(self) -> FloatArray:
-        """Ground force on right and left foot, forward and up, shape (N, 2, 2) [N]."""
+        """Ground force on right and left foot, forward and up components, (N, 2, 2) [N]."""
         return np.asarray(self.ground.reshape(-1, 2, 2, 2).sum(axis=2))
 
     @property
     def trunk_moment(self) -> FloatArray:
-        """External moment that holds the trunk at its lean, shape (N,) [N m]."""
+        """External moment that keeps the lean of the trunk constant, shape (N,) [N m]."""
         return np.asarray(self.tau[:, floating(self.robot)[2]])
 
     @property
@@ -101,7 +101,7 @@ class WalkingMachine:
         return np.asarray(np.sum(self.feet[:, :, 1] > 0.01 * self.weight, axis=1))
 
     def feet_by_shares(self) -> FloatArray:
-        """Return foot forces by equations (20) to (22) of the exoskeleton paper, (N, 2, 2) [N]."""
+        """Return foot forces, (N, 2, 2) [N], by equations (20) to (22) of the source paper."""
         robot, motion = self.robot, self.motion
         # centroids and m (c'' - g) of all bodies
         bodies = list(robot.model.inertias)[1:]
@@ -159,7 +159,7 @@ class GaitCycle:
     def torques(
         self, pair: TiedPair | None = None, ground: FloatArray | None = None
     ) -> FloatArray:
-        """Return exoskeleton torques (N, n), optionally with other straps or foot forces."""
+        """Return joint torques of the exoskeleton, (N, n), for given straps or ground forces."""
         feet = self.own.ground if ground is None else ground
         forces = (feet, self.other.ground)
         return walking_torques(pair or self.pair, self.motions, forces).tau
@@ -167,7 +167,7 @@ class GaitCycle:
 
 def gait_cycle(pair: TiedPair, gait: Gait) -> GaitCycle:
     """
-    Simulate walking of exoskeleton and wearer until it is periodic, and return one cycle.
+    Simulate three gait cycles of exoskeleton and wearer, and return the last cycle.
 
     Parameters
     ----------
@@ -222,7 +222,7 @@ def gait_cycle(pair: TiedPair, gait: Gait) -> GaitCycle:
 
 
 def _contact_motion(robot: Robot, motion: Motion) -> tuple[FloatArray, FloatArray]:
-    """Return positions and velocities, (N, 4, 2) each, of heels and toes, forward and up."""
+    """Return positions and velocities of heels and toes, each (N, 4, 2): forward and up."""
     place, jacobian = points_motion(robot, *contacts(robot), motion.q)
     speed = np.einsum('ncxj,nj->ncx', jacobian, motion.dq)
     return place[..., _PLANE], speed[..., _PLANE]
@@ -232,7 +232,7 @@ def walking_torques(
     pair: TiedPair, motions: PairMotion, ground: Sequence[FloatArray]
 ) -> PairTorques:
     """
-    Return joint torques of both machines with strap and ground forces, equation (27).
+    Return joint torques of both machines under strap and ground forces, by equation (27).
 
     Parameters
     ----------
@@ -256,7 +256,7 @@ def walking_torques(
 def _joint_motion(
     robot: Robot, plan: WalkableGait, t: FloatArray, phase: FloatArray, cycle: float
 ) -> Motion:
-    """Return the planned motion of both legs relative to fixed hips."""
+    """Return the planned motion of all joints of a machine, with hips at the origin."""
     parts = np.zeros((3, len(t), robot.n_joints))
     for order in range(3):
         for side, shift in zip(SIDES, (0.0, 0.5), strict=True):
@@ -270,7 +270,7 @@ def _walk(
     pair: TiedPair, legs: PairMotion, start: FloatArray, cycle: float
 ) -> tuple[FloatArray, FloatArray]:
     """
-    Integrate the hip motions of both machines over three gait cycles; leg angles are given.
+    Integrate the hip motions of both machines over three gait cycles with given leg angles.
 
     States and rates of the last cycle have the shape (N, 2, 2, 2): position and velocity, of the
     machine and its wearer, forward and up.
@@ -314,7 +314,7 @@ def check_cycle(
     cycle: GaitCycle, joint: str, rate: float, tau: FloatArray | None = None
 ) -> GaitCheck:
     """
-    Simulate a gait cycle in which one joint of the exoskeleton is driven by its torque.
+    Simulate a gait cycle in which a given torque drives one joint of the exoskeleton.
 
     The source does this check in another simulator and gives the errors of hip and knee. The hips
     are free, and the feet touch the ground.
@@ -341,7 +341,7 @@ def check_cycle(
 def driving_torque(
     cycle: GaitCycle, joint: str, rate: float, tau: FloatArray | None = None
 ) -> DrivingTorque:
-    """Return a function of time: the torque of one joint after two hip forces of zero, (3,)."""
+    """Return a function from time [s] to (3,): two zero hip forces, torque of a joint."""
     column = [cycle.pair.robot.index(joint)]
     own = (cycle.own.tau if tau is None else tau)[:, column]
     curve = splined(cycle.own.motion.t, own, rate)
@@ -350,7 +350,7 @@ def driving_torque(
 
 def ground_by_shares(cycle: GaitCycle) -> FloatArray:
     """
-    Return ground forces on heels and toes by equations (20) to (22), (N, 4, 2) [N].
+    Return ground forces on heels and toes, (N, 4, 2) [N], by equations (20) to (22).
 
     The equations do not give the centre of pressure, so that of the simulated ground is used.
 

@@ -32,7 +32,7 @@ import numpy.typing as npt
 @dataclass(frozen=True)
 class TiedPair(TiedMachines):
     """
-    Two machines, such as exoskeleton and wearer, and the S straps between them.
+    Two machines, such as exoskeleton and wearer, and S straps between the machines.
 
     Attributes
     ----------
@@ -47,7 +47,7 @@ class TiedPair(TiedMachines):
     slack: FloatArray | None = None
 
     def __post_init__(self) -> None:
-        """Expand a single stiffness or slack to all straps, and check the values."""
+        """Apply a single stiffness or slack to all straps, and check the values."""
         size = (len(self.ties),)
         for name in ('stiffness', 'slack'):
             values = getattr(self, name)
@@ -55,11 +55,11 @@ class TiedPair(TiedMachines):
                 spread = np.broadcast_to(np.asarray(0.0 if values is None else values), size)
             except ValueError:
                 raise ModelError(
-                    f'{name} has shape {np.shape(values)}, but there are {size[0]} straps: '
+                    f'{name} has shape {np.shape(values)}, but the pair has {size[0]} straps: '
                     f'{", ".join(tie.name for tie in self.ties)}'
                 ) from None
             if np.any(spread < 0.0) or not np.all(np.isfinite(spread)):
-                raise ModelError(f'{name}: {spread} must be finite and not negative')
+                raise ModelError(f'{name} is {spread}, but must be finite and not negative')
             object.__setattr__(self, name, read_only(np.array(spread, dtype=float)))
 
     @property
@@ -68,20 +68,20 @@ class TiedPair(TiedMachines):
         return tuple(tie.name for tie in self.ties)
 
     def with_stiffness(self, stiffness: npt.ArrayLike) -> TiedPair:
-        """Return the pair with another stiffness [N/m]: one value, or one for each strap."""
+        """Return a copy with another stiffness [N/m]: one value, or one value per strap."""
         return replace(self, stiffness=np.asarray(stiffness, dtype=float))
 
     def with_slack(self, slack: npt.ArrayLike) -> TiedPair:
-        """Return the pair with another slack [m]: one value, or one for each strap."""
+        """Return a copy with another slack [m]: one value, or one value per strap."""
         return replace(self, slack=np.asarray(slack, dtype=float))
 
     def geometry(self, motion: Motion, other_motion: Motion) -> TieGeometry:
-        """Return end points and Jacobians of the straps during motions of both machines."""
+        """Return the end points of the straps, with their Jacobians, along given motions."""
         return tie_geometry(self.robot, motion.q, self.other, other_motion.q, self.ties)
 
     def forces(self, way: FloatArray) -> FloatArray:
         """
-        Return the strap forces on the first machine, for given vectors between strap ends.
+        Return the strap forces on the first machine, from the vectors between the strap ends.
 
         The forces on the other machine are opposite.
 
@@ -118,7 +118,7 @@ class PairMotion(NamedTuple):
 @dataclass(frozen=True)
 class PairTorques:
     """
-    Joint torques of two connected machines, and the strap forces.
+    Joint torques of two machines that straps connect, and the strap forces.
 
     Attributes
     ----------
@@ -136,7 +136,7 @@ class PairTorques:
 
 def pair_torques(pair: TiedPair, motion: Motion, other_motion: Motion) -> PairTorques:
     """
-    Return the joint torques of both machines and the strap forces along given motions.
+    Return the joint torques of both machines, and the strap forces, along given motions.
 
     Parameters
     ----------
@@ -179,14 +179,14 @@ def leg_pair(
 
 
 def assumed_stiffness(stiffness: npt.ArrayLike | None) -> FloatArray:
-    """Return the given strap stiffness, or the stiffness in `assumptions.yaml` [N/m]."""
+    """Return the given strap stiffness [N/m], or by default that of `assumptions.yaml`."""
     assumed = read_assumptions()['interaction_stiffness'].value
     return np.asarray(assumed if stiffness is None else stiffness, dtype=float)
 
 
 def stepping(pair: TiedPair, gait: Gait, t: FloatArray, period: float | None = None) -> PairMotion:
     """
-    Return a periodic motion of exoskeleton and wearer: a step forward and back, on one foot.
+    Return the motion of exoskeleton and wearer who step forward and back on a standing foot.
 
     Parameters
     ----------
@@ -217,7 +217,7 @@ def following(
     pair: TiedPair, t: FloatArray, moving: Callable[[tuple[str, ...], FloatArray], Motion]
 ) -> PairMotion:
     """
-    Return motions of the wearer, and of the exoskeleton that follows with delay and errors.
+    Return the motion of a wearer, and of an exoskeleton that follows with delay and offset.
 
     Parameters
     ----------
@@ -252,7 +252,7 @@ EXERCISES = {
 
 def exercise(pair: TiedPair, name: str, t: FloatArray, gait: Gait | None = None) -> PairMotion:
     """
-    Return the motion of exoskeleton and wearer during an exercise on one foot.
+    Return the motion of exoskeleton and wearer during a named exercise on one foot.
 
     Parameters
     ----------
@@ -272,7 +272,7 @@ def exercise(pair: TiedPair, name: str, t: FloatArray, gait: Gait | None = None)
     (middle, reach), w = np.radians(angles), 2.0 * np.pi / period
 
     def moving(joints: tuple[str, ...], time: FloatArray) -> Motion:
-        """Return sinusoidal motion of hips and knees; foot flat and trunk upright."""
+        """Return a sinusoidal motion of hips and knees with flat foot and upright trunk."""
         cosine, sine = (np.outer(f(w * time), reach) for f in (np.cos, np.sin))
         parts = [
             np.column_stack([knee - hip, knee, hip, far_hip, far_knee, np.zeros_like(time)])

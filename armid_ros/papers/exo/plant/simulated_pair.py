@@ -19,7 +19,7 @@ _BLOCK = 50
 
 class PairSample(NamedTuple):
     """
-    Sensor readings of exoskeleton and wearer at one instant.
+    Sensor readings of exoskeleton and wearer at one time.
 
     Attributes
     ----------
@@ -50,7 +50,7 @@ def sensor_readings(
     rng: np.random.Generator,
 ) -> Iterator[PairSample]:
     """
-    Yield the sensor readings of exoskeleton and wearer who step forward and back.
+    Yield sensor readings of exoskeleton and wearer who step forward and back, without end.
 
     Parameters
     ----------

@@ -29,7 +29,7 @@ Rate = Callable[[int, FloatArray], FloatArray]
 
 def splined(t: FloatArray, tau: FloatArray, rate: float) -> DrivingTorque:
     """
-    Return torques as a function of time: resampled at a rate, joined by cubic splines.
+    Return torques as a function of time: cubic splines through samples at a given rate.
 
     Parameters
     ----------
@@ -49,7 +49,7 @@ def splined(t: FloatArray, tau: FloatArray, rate: float) -> DrivingTorque:
 
 def runge_kutta(rate: Rate, k: int, h: float, x: FloatArray) -> tuple[FloatArray, FloatArray]:
     """
-    Advance a state by one Runge-Kutta step of order 4, from sample k to sample k + 2.
+    Integrate a state from sample k to sample k + 2 by one Runge-Kutta step of order 4.
 
     Parameters
     ----------
@@ -85,7 +85,7 @@ def drive_by_torque(
     on_ground: bool = False,
 ) -> Motion:
     """
-    Simulate torque-driven joints of the exoskeleton; the other joints move as prescribed.
+    Simulate joints of the exoskeleton that torques drive; other joints move as prescribed.
 
     Parameters
     ----------
@@ -141,7 +141,7 @@ def _forward_dynamics(
     torque: DrivingTorque,
     on_ground: bool,
 ) -> Rate:
-    """Return a function that gives the state derivative of the torque-driven joints."""
+    """Return a function for the time derivative of positions and velocities `free`."""
     robot, own, tied = pair.robot, motions.own, len(pair.ties)
     ends = [(tie.joint, np.array(tie.point)) for tie in pair.ties]
     if on_ground:
@@ -183,7 +183,7 @@ def _forward_dynamics(
 @dataclass(frozen=True)
 class GaitCheck:
     """
-    Motion of one torque-driven joint, and its error against the prescribed motion.
+    Motion of one torque-driven joint, and the error relative to the prescribed motion.
 
     Attributes
     ----------

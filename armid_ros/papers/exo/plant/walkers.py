@@ -60,7 +60,7 @@ class LegLength:
 @dataclass(frozen=True)
 class WalkableGait:
     """
-    Gait whose feet do not slide, with the motion of the hips.
+    Gait without sliding feet, with lean of the trunk, stride and path of the hips.
 
     Attributes
     ----------
@@ -116,7 +116,7 @@ def walkable(
     lean: float | None = None,
 ) -> WalkableGait:
     """
-    Return the gait nearest to a desired gait whose feet neither slide nor sink in.
+    Return the gait without sliding or sinking feet that is nearest to a desired gait.
 
     Parameters
     ----------
@@ -181,7 +181,7 @@ def walkable(
 
 
 def _downward(angle: FloatArray) -> FloatArray:
-    """Return unit vectors that point down, rotated forward by angles, shape (N, 2)."""
+    """Return unit vectors, (N, 2), that point down, rotated forward by angles [rad]."""
     return np.column_stack([np.sin(angle), -np.cos(angle)])
 
 
@@ -191,7 +191,7 @@ def _inside(phase: FloatArray, ends: tuple[float, float]) -> np.typing.NDArray[n
 
 def ground_force(height: FloatArray, rising: FloatArray, sliding: FloatArray) -> FloatArray:
     """
-    Return the contact force of the ground on points of a foot.
+    Return the contact force of the ground on points of a foot, forward and up [N].
 
     Parameters
     ----------
@@ -225,7 +225,7 @@ SEGMENTS = tuple(f'{side}_{link}' for side in SIDES for link in ('shank', 'thigh
 
 def walker(robot: Robot) -> Robot:
     """
-    Convert a robot that stands on a fixed foot to a robot with a floating trunk.
+    Convert a robot with a fixed standing foot to a robot with a floating trunk and two legs.
 
     Parameters
     ----------
@@ -305,7 +305,7 @@ def floating(robot: Robot) -> list[int]:
 
 
 def contacts(robot: Robot) -> tuple[list[str], FloatArray]:
-    """Return ankle names and contact points in their frames, (4, 3) [m], of heels and toes."""
+    """Return ankle joints, and heels and toes in the frames of these joints, (4, 3) [m]."""
     prefix = robot.joints[0].split('_')[0]
     ankles = [f'{prefix}_{side}_ankle' for side in SIDES for _ in range(2)]
     return ankles, np.tile([[0.0, 0.0, 0.0], [leg_length(robot).foot, 0.0, 0.0]], (2, 1))
@@ -314,7 +314,7 @@ def contacts(robot: Robot) -> tuple[list[str], FloatArray]:
 def _joint_urdf(
     joint: str, parent: str, child: str, axis: str, body: pin.Inertia | None, up: float = 0.0
 ) -> str:
-    """Return the URDF text of a joint and its link; the joint of a massless link is prismatic."""
+    """Return URDF text of a joint and its link: prismatic without a body, else revolute."""
     kind, far, inside = 'prismatic', '1000', ''
     if body is not None:
         kind, far = 'revolute', '3.2'

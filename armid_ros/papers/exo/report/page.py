@@ -119,7 +119,7 @@ def _stiffness_section(found: Sequence[Interaction], walked: SimulatedWalk | Non
 
 
 def _range(values: FloatArray) -> str:
-    """Format a range of values; a single value if both ends agree in two digits."""
+    """Format the range of values, or a single value if both ends agree in two digits."""
     ends = dict.fromkeys(f'{end:.2g}' for end in (values.min(), values.max()))
     return ' to '.join(ends)
 

@@ -34,7 +34,7 @@ SOURCE_ERROR = {'exo_right_hip': 1.5, 'exo_right_knee': 2.5}
 
 class DrivenJoint(NamedTuple):
     """
-    Results of driving one exoskeleton joint by its torque over a gait cycle.
+    Simulated gait cycles in which three different torques drive one exoskeleton joint.
 
     Attributes
     ----------
@@ -148,7 +148,7 @@ class Walk(Templated):
 
 
 def feet_section(cycle: GaitCycle) -> Section:
-    """Return the section with foot forces, simulated and by the equations of the paper."""
+    """Return the section with foot forces: simulated, and by equations of the paper."""
     text = (
         'Ground forces on the feet, by the contact model of Table 3 of the paper '
         '(100 N/mm^1.5, 1 N s/mm, friction 0.3). Vertical lines: changes between one and two feet '
@@ -187,7 +187,7 @@ def feet_section(cycle: GaitCycle) -> Section:
 
 
 def by_torque_section(walked: SimulatedWalk) -> Section:
-    """Return the section with errors of torque-driven joints, here and in the paper."""
+    """Return the section with position errors of torque-driven joints, and paper errors."""
     rate = read_assumptions()['torque_rate'].value
     text = (
         f'One joint follows its torque ({rate:g} samples per second, cubic splines). The hips are '
@@ -220,7 +220,7 @@ def by_torque_section(walked: SimulatedWalk) -> Section:
 
 
 def _bodies(robot: Robot, motion: Motion, ahead: FloatArray) -> list[Any]:
-    """Return the drawn lines of trunk and legs in each frame of the animation [px]."""
+    """Return the lines of trunk and legs in each frame of the animation [px]."""
     leg = leg_length(robot)
     lean = robot.joints[floating(robot)[2]]
     joints, points = [lean, lean], [[0.0, 0.0, 0.55], [0.0, 0.0, 0.0]]
