@@ -95,7 +95,7 @@ def tables_section(repeated: Sequence[Repeated]) -> Section:
 
 
 def _table(one: Repeated) -> DataTable:
-    """Return a published table with additional rows for the results of the repetition."""
+    """Return a table of the paper, with additional rows for the repeated results."""
     gravity, dynamics = one.methods
     error, share = 'RMSE', 'RMSE over peak [%]'
     if one.table.uniform:

@@ -45,7 +45,7 @@ LOAD = 0.3
 @dataclass(frozen=True, eq=False)
 class PaperTable:
     """
-    Values of a published table that is repeated here.
+    Published torque errors in a table of the paper, with peak torques and torque noise.
 
     Attributes
     ----------
@@ -119,7 +119,7 @@ _RATE = 100.0
 @dataclass(frozen=True, eq=False)
 class MethodErrors:
     """
-    Torque errors of a model that has gravity torques only, or the full dynamics.
+    Torque errors of a model of the gravity torques alone, or of the full dynamics.
 
     Attributes
     ----------
@@ -169,7 +169,7 @@ class Repeated:
 
     @property
     def ratios(self) -> dict[str, FloatArray]:
-        """Torque errors (6,) as a percentage of peak torque, or relative to torque noise."""
+        """Relative torque errors (6,) by method: percent of peak torque, or over torque noise."""
         (gravity, dynamics), table = self.methods, self.table
         published, unit = 0.01 * table.peak, 0.01 * self.peak_run
         if table.uniform:
@@ -185,7 +185,7 @@ class Repeated:
 @dataclass(frozen=True)
 class Composite:
     """
-    True and identified value of one gravity parameter, without and with the load.
+    True and identified values of one gravity parameter, without and with the load.
 
     Attributes
     ----------
@@ -297,7 +297,7 @@ def attainable(robot: Robot, rng: np.random.Generator) -> FloatArray:
 def _repeat(
     table: PaperTable, run: Excitation, tests: Sequence[Motion], rng: np.random.Generator
 ) -> Repeated:
-    """Repeat a table: simulate the run, identify the arm, predict the held-out motions."""
+    """Simulate the run of a table, identify the arm, and predict the held-out motions."""
     robot = load_robot(table.robot, gravity=table.gravity)
     truth = ArmModel(robot)
     made = simulate(
@@ -344,7 +344,7 @@ def _repeat(
 
 
 def _size(errors: FloatArray, table: PaperTable) -> FloatArray:
-    """Return the torque error of each joint, (6,): mean absolute or rms, as in the paper."""
+    """Return mean absolute or rms torque errors of the joints, (6,), as in the table."""
     if table.uniform:
         return np.asarray(np.mean(np.abs(errors), axis=0))
     return np.asarray(np.sqrt(np.mean(errors**2, axis=0)))
@@ -353,7 +353,7 @@ def _size(errors: FloatArray, table: PaperTable) -> FloatArray:
 def _compared(
     bare: Repeated, loaded: Repeated, rng: np.random.Generator
 ) -> tuple[tuple[Composite, ...], float, float]:
-    """Return gravity parameters without and with the load, and the load's mass and its std."""
+    """Return gravity parameters with and without load; mass of the load and its std [kg]."""
     robots = [load_robot(r.table.robot, gravity='moon') for r in (bare, loaded)]
     theory = ArmModel(robots[0], quasi_static=True).base_parameters(rng)
     gravity = 1e3 * float(np.linalg.norm(robots[0].gravity))
