@@ -35,7 +35,7 @@ from trajectory_msgs.msg import JointTrajectory
 
 
 class _JumpGuard:
-    """Check that a recorded trajectory starts at the measured joint positions."""
+    """Check that recorded trajectories start at the measured joint positions."""
 
     def __init__(self, node: ArmidNode) -> None:
         self._node = node

@@ -51,7 +51,7 @@ class Complaints:
             self._logger.warning(text)
 
     def has_logged(self, text: str) -> bool:
-        """Return whether this message on a rejected input was logged."""
+        """Return whether the message `text` on a rejected input was logged before."""
         return any(text in logged for logged in self._logged.values())
 
     def add_exception(self, kind: str, error: Exception) -> None:

@@ -145,7 +145,7 @@ class ExcitationPublisherNode(ArmidNode):
         return elapsed if on_the_way else None
 
     def poll(self) -> None:
-        """Start a run once controller and joint states exist; stop it if one of them is lost."""
+        """Start a run once controller and joint states exist; stop the run if either is lost."""
         now, patience = self._arm.now(), self.value('state_timeout')
         if self.elapsed is not None:
             # no joint states were processed while the path was planned
@@ -184,7 +184,7 @@ class ExcitationPublisherNode(ArmidNode):
         return f'rehearsal at {100.0 * speed:.0f} % of the speed: {text}'
 
     def _start(self, speed: float) -> str:
-        """Plan a run at a share of the excitation's speed; send it to the controller."""
+        """Plan a run at the share `speed` of the planned speed; send the run to the controller."""
         self._waiting = False
         self._require_no_run()
         fault = self._arm.fault_at_start(self._simulated)
@@ -374,7 +374,7 @@ class ExcitationPublisherNode(ArmidNode):
         self._controller.send_stop(write_trajectory(motion))
 
     def _current_ending(self) -> Ending | None:
-        """Return the ended run, if any, without its stop if another client moves the arm."""
+        """Return the ended run or None; delete its stop motion if another client moves the arm."""
         ending = self._ending
         if ending is not None and self._controller.taken:
             self._ending = replace(ending, last=None) if ending.reason else None
@@ -404,7 +404,7 @@ class ExcitationPublisherNode(ArmidNode):
             self.log(f'run complete: {gate.run.duration:.1f} s, approach included')
 
     def _on_goal_ended(self, reason: str) -> None:
-        """React to the end of a controller goal; `reason` is empty after a complete run."""
+        """End the run at the end of a controller goal; `reason` is '' after a success."""
         gate, elapsed = self._gate, self._arm.now() - self._begun
         if gate is None:  # the run was stopped before
             ending = self._ending

@@ -174,7 +174,7 @@ class LiveDiagnosisNode(ListeningNode):
         return f'writing {", ".join(FILES)} to {folder}'
 
     def next_run(self) -> str:
-        """Start to plan a motion that separates rivals; it is published on ~/experiment."""
+        """Start to plan a motion that separates rivals, for publication on ~/experiment."""
         self._require(diagnosed=True)
         self._helper.ask('plan', self.value('seed'))
         return f'planning a motion; it will be published on {self._runs.topic_name}'
@@ -282,7 +282,7 @@ class LiveDiagnosisNode(ListeningNode):
         self._adopt(self._described(urdf))
 
     def _settings(self, values: Mapping[str, Any]) -> LiveSettings:
-        """Return the settings from the ROS parameters, with new values for some of them."""
+        """Return the settings from the ROS parameters; `values` replace parameters by name."""
         names = (*(entry.name for entry in LIVE_SETTINGS), 'learning')
         return LiveSettings(**{name: values.get(name, self.value(name)) for name in names})
 

@@ -251,7 +251,7 @@ class OnlineIdentifierNode(ListeningNode):
             self.identifier.use(self._settings({name: self.value(name) for name in names}))
 
     def _settings(self, values: Mapping[str, Any]) -> OnlineSettings:
-        """Return the settings from the ROS parameters, with new values for some of them."""
+        """Return the settings from the ROS parameters; `values` replace parameters by name."""
         new = {name: x for name, x in values.items() if name in OnlineIdentifier.CHANGEABLE}
         if 'false_alarm_time' in new:
             new['false_alarm_time'] = new['false_alarm_time'] or None
@@ -274,7 +274,7 @@ class OnlineIdentifierNode(ListeningNode):
         return OnlineIdentifier(arm, settings, rng=np.random.default_rng(0))
 
     def level(self, troubled: bool) -> bytes:
-        """Return the level for /diagnostics: STALE without joint states, ERROR if unusable."""
+        """Return the level for /diagnostics: STALE without joint states, ERROR for wrong data."""
         failed = self.identifier is not None and bool(self.identifier.error)
         stopped = self.freshness.stopped
         return DiagnosticStatus.ERROR if failed and not stopped else super().level(troubled)
@@ -332,7 +332,7 @@ class OnlineIdentifierNode(ListeningNode):
             publisher.publish(message)
 
     def _begin(self, identifier: OnlineIdentifier) -> None:
-        """Start with an identifier; later models on the topic `model` may only add effects."""
+        """Replace the identifier; later models on the topic `model` can only add effects."""
         self._own_effects = identifier.arm.effects
         self._adopt(identifier)
 

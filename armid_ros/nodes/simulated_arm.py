@@ -371,7 +371,7 @@ class SimulatedArmNode(ArmidNode):
         return replace(arm, effects=arm.effects + more.effects, values=arm.values + more.values)
 
     def _sensors(self, joints: Sequence[str], values: Mapping[str, Any]) -> Sensors:
-        """Return the sensors from the ROS parameters, with new values for some of them."""
+        """Return the sensors from the ROS parameters; `values` replace parameters by name."""
         noise = {
             name: per_joint(values.get(name, self.value(name)), joints, f"parameter '{name}'")
             for name in _SENSORS

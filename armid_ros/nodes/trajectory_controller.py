@@ -154,7 +154,7 @@ class TrajectoryController:
 
     def discover(self) -> None:
         """
-        Wait for a controller that accepts goals, at most one second.
+        Wait up to one second for a controller that accepts goals.
 
         Raises
         ------
@@ -180,7 +180,7 @@ class TrajectoryController:
         return f'{self.readers} subscribers{self._rivals}'
 
     def send_stop(self, trajectory: JointTrajectory, again: bool = False) -> None:
-        """Send a stop trajectory as the run was sent; repeat a stop on the topic as well."""
+        """Send a stop by the interface of the run; send a repeated stop also as a message."""
         if self._by_action:
             self._send_goal(trajectory, NO_TOLERANCE, NO_TOLERANCE)
         if again or not self._by_action:

@@ -56,7 +56,7 @@ class LiveSettings:
     material: float = 0.01
 
     def __post_init__(self) -> None:
-        """Raise an IdentificationError if the window is shorter than a diagnosed motion."""
+        """Raise an IdentificationError unless 0 < shortest <= window."""
         if not 0.0 < self.shortest <= self.window:
             raise IdentificationError(
                 f"the parameter 'shortest' is {self.shortest:g} s, but has to be positive and at "

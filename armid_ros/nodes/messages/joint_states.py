@@ -64,7 +64,7 @@ class JointSample(NamedTuple):
 
 class JointStateReader:
     """
-    Decoder of the JointState messages of one robot; it counts and logs unusable ones.
+    Decoder of the JointState messages of a robot; it counts and logs invalid messages.
 
     Parameters
     ----------

@@ -51,7 +51,7 @@ def private_context(domain: int | None = None) -> Iterator[Context]:
 @contextmanager
 def reserved_domain() -> Iterator[int]:
     """
-    Yield the ID of a ROS domain that no other process of armid uses during the block.
+    Yield the ID of a ROS domain that no other process of armid uses in a `with` block.
 
     Raises
     ------

@@ -10,7 +10,7 @@ import time
 
 class RealTime:
     """
-    Pacing of a simulation by real time; time that is too late is skipped.
+    Pacing of a simulation by real time; a simulation that is too slow skips time.
 
     Parameters
     ----------
