@@ -22,7 +22,7 @@ META = 'armid.columns'
 
 
 def _kept(ctx: click.Context, parameter: click.Parameter, value: Any) -> Any:
-    """Store the value of an option in click's context for `settings`; return the value."""
+    """Store the value of an option in click's context, and return the value."""
     ctx.meta.setdefault(META, {})[parameter.name] = value
     return value
 
@@ -32,7 +32,7 @@ _option = partial(click.option, callback=_kept, expose_value=False)
 
 
 def _rules(ctx: click.Context, parameter: click.Parameter, value: Any) -> Any:
-    """Store pairs (old, new) of --rename for `settings`; RecordingError if malformed."""
+    """Store the pairs (old, new) of --rename in click's context; return the pairs."""
     rules = []
     for text in value:
         old, *new = listed(text, ':')
@@ -48,7 +48,7 @@ def _rules(ctx: click.Context, parameter: click.Parameter, value: Any) -> Any:
 
 
 def _couplings(ctx: click.Context, parameter: click.Parameter, value: Any) -> Any:
-    """Store motor, joint, ratio of --coupling for `settings`; RecordingError if malformed."""
+    """Store motor, joint and ratio of each --coupling in click's context; return these."""
     couplings = []
     for text in value:
         pair, equals, ratio = text.rpartition('=')
@@ -62,7 +62,7 @@ def _couplings(ctx: click.Context, parameter: click.Parameter, value: Any) -> An
 
 
 def _numbers(ctx: click.Context, parameter: click.Parameter, value: str | None) -> Any:
-    """Store the numbers of an option for `settings`: one for all joints, or one per joint."""
+    """Store the numbers of an option in click's context: one for all joints, or one each."""
     if value is not None:
         from armid_ros.recording.columns import numbers
 

@@ -88,7 +88,7 @@ def identify(
     as_json: bool,
     **settings: Any,
 ) -> None:
-    """Identify an arm model with uncertainties from recordings."""
+    """Identify an arm model with confidence intervals from recordings."""
     from armid_ros.api.arguments import with_effects
     from armid_ros.api.identification import IdentificationResult
     from armid_ros.api.identification import identify as run

@@ -188,7 +188,7 @@ def with_packages(context: click.Context, source: str | None) -> str | None:
             raise click.BadParameter(f"'{text}' has to be PACKAGE=FOLDER", param_hint='--package')
         if source in (None, '-'):
             raise click.BadParameter(
-                f"'{text}': a package folder is used only with --robot FILE, a description",
+                f"'{text}': a package folder needs --robot with a description file",
                 param_hint='--package',
             )
         written.append(shlex.quote(f'package:{name}:={Path(folder).resolve()}'))
