@@ -167,7 +167,7 @@ class MergedBags:
 
     @classmethod
     def of(cls, bag: BagSummary | Refused) -> MergedBags:
-        """Convert the summary of a bag, without the rows of the bag, or a refused bag."""
+        """Return a sum of one bag, which may be refused, without the rows of the bag."""
         if isinstance(bag, Refused):
             return cls(refused=(bag,))
         version = bag.bag.url, bag.bag.version
@@ -236,7 +236,7 @@ class BagSummary:
 
 def prepare(bag: BagFile, job: Job, bags_of_arm: int = 1) -> BagSummary | Refused:
     """
-    Return the normal equations of a bag, or a `Refused` with the reason if it is not usable.
+    Return the summary of a bag, or a `Refused` with the reason for a bag that is not usable.
 
     Parameters
     ----------
