@@ -282,7 +282,7 @@ def _response(s: ComplexArray, values: FloatArray) -> ComplexArray:
 
 
 def _first_guess(joint: str, frequency: FloatArray, found: ComplexArray) -> FloatArray:
-    """Return initial parameters for `_response`, from antiresonance and resonance."""
+    """Return initial values of the 7 joint parameters, from antiresonance and resonance."""
     size = np.abs(found[:, 0, 0])
     lowest = int(np.argmin(size[frequency > 4.0 * frequency[0]]))
     lowest += int(np.count_nonzero(frequency <= 4.0 * frequency[0]))

@@ -78,18 +78,18 @@ def fit_rigid(runs: Sequence[ElasticRun]) -> RigidFit:
     problem = [part for number, run in enumerate(runs) for part in _rows(run, str(number))]
     if not problem:
         raise IdentificationError(
-            f'step 1 needs an experiment of more than {2 * _SETTLING_TIME:g} s; record longer'
+            f'the rigid fit needs an experiment over {2 * _SETTLING_TIME:g} s; record longer'
         )
     normal = NormalEquations.of(problem)
     products = normal.summed()[:-1, :-1]
     scale = np.sqrt(np.diag(products))
     if not np.all(scale > 0.0):
-        raise IdentificationError('step 1 needs motion of both joints, but one rests; move it')
+        raise IdentificationError('the rigid fit needs motion of both joints, but one rests')
     sizes = np.linalg.eigvalsh(products / np.outer(scale, scale))
     # smallest singular value of identifiable columns, relative to the largest
     if sizes[0] < 1e-6**2 * sizes[-1]:
         raise IdentificationError(
-            'step 1 cannot identify the inertias from the slow motion; let both joints accelerate '
+            'the slow motion does not determine the inertias; let both joints accelerate '
             'in several poses'
         )
     solution = solve(problem)

@@ -103,8 +103,8 @@ def identify_subspace(
     columns = sum(max(len(e.u) - 2 * _HORIZON + 1, 0) for e in experiments)
     if columns < needed:
         raise IdentificationError(
-            f'the recordings are too short, record longer: step 2 needs {needed} samples after '
-            f'the first {2 * _HORIZON} samples of each experiment, but there are {columns}'
+            f'the recordings are too short, record longer: apart from the first {2 * _HORIZON} '
+            f'samples of each experiment, {needed} samples are needed, but there are {columns}'
         )
     u_scale, y_scale = (
         np.sqrt(np.mean(np.concatenate([getattr(e, name) for e in experiments]) ** 2, axis=0))

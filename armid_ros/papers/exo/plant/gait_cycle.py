@@ -270,7 +270,7 @@ def _walk(
     pair: TiedPair, legs: PairMotion, start: FloatArray, cycle: float
 ) -> tuple[FloatArray, FloatArray]:
     """
-    Integrate the hip motions of both machines over three gait cycles with given leg angles.
+    Integrate the hip motions over three gait cycles; return states and rates of the last.
 
     States and rates of the last cycle have the shape (N, 2, 2, 2): position and velocity, of the
     machine and its wearer, forward and up.

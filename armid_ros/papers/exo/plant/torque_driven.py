@@ -141,7 +141,7 @@ def _forward_dynamics(
     torque: DrivingTorque,
     on_ground: bool,
 ) -> Rate:
-    """Return a function for the time derivative of positions and velocities `free`."""
+    """Return a function for the state derivative of the joints with indices `free`."""
     robot, own, tied = pair.robot, motions.own, len(pair.ties)
     ends = [(tie.joint, np.array(tie.point)) for tie in pair.ties]
     if on_ground:
