@@ -65,7 +65,7 @@ class Worker:
             run = next_run(diagnosis, np.random.default_rng(argument))
             if run is None:
                 raise IdentificationError(
-                    'the last diagnosis has no rivals, so no further motion is needed'
+                    'the last diagnosis is not ambiguous, so no motion is needed'
                 )
             return run.sentence, excitation_text(run.excitation)
         except ArmidError as error:
