@@ -96,7 +96,7 @@ def exo(
     names = topics.split(',')
     if len(names) != 2:
         raise ModelError(
-            f'--topics {topics}: name the topics of exoskeleton and wearer, separated by a comma'
+            f'--topics {topics}: name two topics, of exoskeleton and wearer, separated by a comma'
         )
     if bag is None:
         require_new(out / 'recording')
