@@ -273,7 +273,7 @@ class ExcitationPublisherNode(ArmidNode):
     def check(self, values: Mapping[str, Any]) -> None:
         """Raise a TrajectoryError if a new `file` or `use_sim_time` cannot be set now."""
         if 'use_sim_time' in values:
-            raise TrajectoryError("'use_sim_time' can be set only when the node starts")
+            raise TrajectoryError("the clock ('use_sim_time') can be set only at the start")
         if 'file' in values:
             with reading("parameter 'file'", TrajectoryError):
                 self._require_rest()
