@@ -48,7 +48,7 @@ def _rules(ctx: click.Context, parameter: click.Parameter, value: Any) -> Any:
 
 
 def _couplings(ctx: click.Context, parameter: click.Parameter, value: Any) -> Any:
-    """Store motor, joint and ratio of each --coupling in click's context; return these."""
+    """Store (motor, joint, ratio) of each --coupling in click's context, and return all."""
     couplings = []
     for text in value:
         pair, equals, ratio = text.rpartition('=')
@@ -62,7 +62,7 @@ def _couplings(ctx: click.Context, parameter: click.Parameter, value: Any) -> An
 
 
 def _numbers(ctx: click.Context, parameter: click.Parameter, value: str | None) -> Any:
-    """Store the numbers of an option in click's context: one for all joints, or one each."""
+    """Store the numbers of an option in click's context: one number, or one per joint."""
     if value is not None:
         from armid_ros.recording.columns import numbers
 

@@ -188,7 +188,7 @@ def project_options(
     others: Callable[[], Iterable[click.Command]],
 ) -> dict[str, Any]:
     """
-    Return the defaults of a command from armid.toml; print them on stderr.
+    Read the defaults of a command from armid.toml; print and return the defaults.
 
     A key outside of a table sets an option of all commands. A key in the table of a command
     sets the option for that command only.

@@ -30,7 +30,7 @@ _SHARED = {
 
 
 def _speed(context: click.Context, parameter: click.Parameter, value: Any) -> str | float:
-    """Return --speed as a speed class, or as a share of velocity and acceleration limits."""
+    """Return the value of --speed: a speed class, or a share of the limits of the joints."""
     try:
         return str(value) if value in SPEED_CLASSES else float(value)
     except ValueError:

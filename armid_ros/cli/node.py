@@ -17,7 +17,7 @@ _ROS = re.compile(r'rclpy|ros\w+_runtime_py|\w+_(msgs|interfaces|srvs)')
 
 
 def main(name: str | None = None) -> int | None:
-    """Run a node of this package or of a plug-in, by default the node named as the program."""
+    """Run a node of this package or a plug-in; the default name is that of the program."""
     name = name or Path(sys.argv[0]).name
     try:
         if find_spec(f'armid_ros.nodes.{name}') is None and name in plug_ins('nodes'):

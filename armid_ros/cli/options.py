@@ -257,7 +257,7 @@ def model_of(path: Path, robot: Robot | None) -> ArmModel:
     if not np.allclose(given, own):
         typed, known = (','.join(f'{part:g}' for part in vector) for vector in (given, own))
         raise ModelError(
-            f'{path}: its gravity is {known}, but --gravity is {typed}: leave out --gravity, or '
+            f'{path}: the model has gravity {known}, but --gravity is {typed}: leave it out, or '
             'write the other gravity into the file if the mounting of the arm has changed'
         )
     return arm
@@ -311,7 +311,7 @@ def read(
 
 
 def kept_source(source: str, robot: Robot, out: Path) -> str:
-    """Return the robot source for result files; write a URDF from a bag to the folder."""
+    """Return path or name of the robot for result files; write the URDF of a bag to `out`."""
     if source == '-':
         write_file(out / 'robot.urdf', robot.urdf)
         return 'robot.urdf'

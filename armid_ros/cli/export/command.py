@@ -80,9 +80,7 @@ def export(
     if robot_source is not None:
         robot = options.open_robot(robot_source, 'earth', joints)
     elif joints is not None:
-        raise click.UsageError(
-            '--joints chooses joints of a description, but none is given: name it with --robot'
-        )
+        raise click.UsageError('--joints needs --robot, the description whose joints are driven')
     arm = options.model_of(model, robot)
     notes: tuple[str, ...] = ()
     if kind in ('cpp', 'python'):
