@@ -110,7 +110,7 @@ def find_bags(patterns: Sequence[str], arm_pattern: str | None = None) -> list[B
         try:
             listed = filesystem.glob(path, detail=True)
         except Exception as error:  # stores raise different exceptions
-            raise FleetError(f'{pattern}: cannot be listed: {error}') from error
+            raise FleetError(f'{pattern}: no list of files: {error}') from error
         bags = list(_bags(filesystem, listed))
         if not bags:
             raise FleetError(
@@ -165,7 +165,7 @@ def _bags(
 
 
 def _arm(pattern: str, path: str) -> str:
-    """Return the name of the arm: part of the path at the first wildcard, or bag's folder."""
+    """Return the name of an arm: path component at the first wildcard, or folder of the bag."""
     wild = [k for k, part in enumerate(pattern.split('/')) if _WILDCARD.search(part)]
     parts = path.rstrip('/').split('/')
     last = len(parts) - 1

@@ -253,7 +253,7 @@ def plan_fleet(
         if entry is None:
             known = ', '.join(list(robots)[:5]) + (' ...' if len(robots) > 5 else '')
             raise FleetError(
-                f"--robots: arm '{arm}' is not in the table, which has {known}; add a line for it"
+                f"--robots: arm '{arm}' is not in the table, which has {known}; add its line"
             )
         bags_of.setdefault(entry, []).extend(own)
     store, run = Store(out), uuid.uuid4().hex[:12]
@@ -386,6 +386,6 @@ def _model(entry: Entry, settings: FleetSettings) -> ArmModel:
         if not linear:
             raise FleetError(
                 f'--effects {effect.name}: the torque is not linear in its parameters, so bags '
-                'cannot be merged; name other effects, and use `armid diagnose` for this one'
+                'cannot be merged; name other effects, or use `armid diagnose` for this effect'
             )
     return model

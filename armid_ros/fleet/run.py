@@ -241,7 +241,7 @@ class _Run:
                 outcome = None
             if future.status in ('cancelled', 'lost'):
                 raise FleetError(
-                    'the scheduler was lost, and with it the tasks; finished results are kept: '
+                    'the scheduler and its tasks were lost; finished results are kept: '
                     'run the same command again with --resume'
                 )
             tasks = under_way.pop(future.key)
