@@ -159,7 +159,7 @@ def _parameters_section(
 
 
 def rigid_section(fit: RigidFit) -> Section:
-    """Return the section with the parameters of step 1, which models the joints as rigid."""
+    """Return the section with the parameters of the fit with rigid joints (step 1)."""
     estimate = fit.estimate
     rows = [
         (

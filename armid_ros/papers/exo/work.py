@@ -38,7 +38,7 @@ def record(
     noise: tuple[float, float],
     rng: Generator,
 ) -> None:
-    """Write a bag with noisy joint states; `noise` is that of angles [deg] and torques [N m]."""
+    """Write a bag with noisy joint states; `noise`: std of angles [deg] and torques [N m]."""
     tau = pair_torques(pair, *motions).tau
     tau = tau + noise[1] * rng.normal(size=tau.shape)
     stamps = 10**9 + np.rint(motions.own.t * 1e9).astype(np.int64)

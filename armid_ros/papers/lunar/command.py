@@ -25,7 +25,7 @@ _HEADS = {
 @parameters.seed
 @parameters.as_json
 def lunar(out: Path, seed: int, every: bool, as_json: bool) -> None:
-    """Repeat the identification of a humanoid arm on the moon in a paper; compare the errors."""
+    """Repeat a published identification of a humanoid arm on the moon, and compare the errors."""
     from armid_ros.cli import options
     from armid_ros.cli.options import provenance
     from armid_ros.cli.terminal import progress

@@ -125,7 +125,7 @@ def read_sides(
     path: str | Path, robot: Robot, settings: ReadSettings = DEFAULT
 ) -> tuple[Recording, Recording]:
     """
-    Read a bag; return the joint states of the motors, and those of the links.
+    Read a bag; return a recording of the motors and a recording of the links.
 
     Raises
     ------
@@ -168,7 +168,7 @@ def _experiments(
 def _common(
     path: str | Path, names: Sequence[str], stamps: Sequence[npt.NDArray[np.int64]]
 ) -> npt.NDArray[np.int64]:
-    """Return the time stamps [us] that all topics have; RecordingError if they are too few."""
+    """Return the time stamps [us] that all topics have; RecordingError for too few stamps."""
     common: npt.NDArray[np.int64] = reduce(np.intersect1d, stamps)
     # smallest share of samples with a common timestamp on all topics
     if len(common) < 0.9 * max(map(len, stamps)):

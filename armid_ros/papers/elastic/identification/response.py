@@ -37,7 +37,7 @@ SIZE = 3 + 2 * len(PER_JOINT)
 
 
 def unpack(parameters: TwoLinkParameters) -> FloatArray:
-    """Convert parameters to a vector, (13,): alpha, beta, gamma, then those of `PER_JOINT`."""
+    """Convert parameters to a vector, (13,): alpha, beta, gamma, then `PER_JOINT` in pairs."""
     joints = [getattr(parameters, field) for field, _, _ in PER_JOINT]
     return np.concatenate([[parameters.alpha, parameters.beta, parameters.gamma], *joints])
 

@@ -174,7 +174,7 @@ def _covariance(jacobian: FloatArray) -> FloatArray:
 @dataclass(frozen=True, eq=False)
 class MeasuredJoint:
     """
-    Measured frequency responses from the motor torque of a joint to its velocities.
+    Measured frequency responses of a joint from motor torque to motor and link velocity.
 
     Attributes
     ----------
@@ -270,7 +270,7 @@ def identify_two_inertia(
     first, beta, gamma, rotor = rigid.estimate.values[:4].tolist()
     if not (first > 0.0 and beta > 0.0 and first * beta > gamma**2):
         raise IdentificationError(
-            f'step 1 found inertias that no arm has: alpha + mm gear^2 = {first:.3g} (link 1 and '
+            f'no arm has the fitted inertias: alpha + mm gear^2 = {first:.3g} (link 1 and '
             f'rotor 1), beta = {beta:.3g} (link 2), gamma = {gamma:.3g} kg m^2 (coupling). Is the '
             'motion strong enough? Are torques and velocities positive in the same direction?'
         )

@@ -177,7 +177,7 @@ class InteractionIdentifierNode(ArmidNode):
         signal = np.concatenate([part[order] for part in parts])
         if not np.all(np.abs(signal) <= MAX_MAGNITUDE):
             raise RecordingError(
-                f'a {" or ".join(fields)} is not finite or above {MAX_MAGNITUDE:g}'
+                f'a {" or ".join(fields)} is above {MAX_MAGNITUDE:g} or not finite'
             )
         stamp = message.header.stamp
         if stamp.sec < 0 or stamp.nanosec >= 10**9:

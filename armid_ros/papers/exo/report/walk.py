@@ -187,7 +187,7 @@ def feet_section(cycle: GaitCycle) -> Section:
 
 
 def by_torque_section(walked: SimulatedWalk) -> Section:
-    """Return the section with position errors of torque-driven joints, and paper errors."""
+    """Return the section with position errors of torque-driven joints, here and in the paper."""
     rate = read_assumptions()['torque_rate'].value
     text = (
         f'One joint follows its torque ({rate:g} samples per second, cubic splines). The hips are '
