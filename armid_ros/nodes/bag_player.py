@@ -136,7 +136,7 @@ class BagPlayerNode(ArmidNode):
         setting(
             'state_timeout',
             0.5,
-            'Age of a joint state that is out of date.',
+            'Largest age of a usable joint state.',
             's',
             limits=(0.01, 60.0),
         ),

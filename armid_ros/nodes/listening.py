@@ -31,7 +31,7 @@ ROBOT_PARAMETERS = (
     NodeParameter(
         'gravity',
         'earth',
-        'earth, moon, or x,y,z in the base frame [m/s^2]; that of the model where there is one.',
+        'earth, moon, or x,y,z in the base frame [m/s^2]; a model file has its own gravity.',
         check=parse_gravity,
     ),
     NodeParameter('joints', [''], 'Driven joints; if empty, all joints except those of grippers.'),

@@ -40,17 +40,17 @@ _LEVELS = {
 #: Parameters of the fields of LiveSettings, which can be set at run time.
 LIVE_SETTINGS = (
     setting(
-        'window', 20.0, 'Longest diagnosed motion; a change empties it.', 's', limits=(4.0, 600.0)
+        'window', 20.0, 'Longest diagnosed motion; a change clears it.', 's', limits=(4.0, 600.0)
     ),
     setting(
         'shortest', 8.0, 'Shortest diagnosed motion after a change.', 's', limits=(2.0, 600.0)
     ),
     setting('every', 4.0, 'Length of motion between two diagnoses.', 's', limits=(0.5, 3600.0)),
-    setting('rate', 200.0, 'Joint states that are kept per second.', 'Hz', limits=(10.0, 2000.0)),
+    setting('rate', 200.0, 'Stored joint states per second.', 'Hz', limits=(10.0, 2000.0)),
     setting(
         'confirmations',
         2,
-        'Diagnoses in a row that must agree on an effect before it is proposed.',
+        'Successive diagnoses that have to name the same effect before its proposal.',
         limits=(1, 100),
     ),
     setting(
@@ -90,8 +90,8 @@ class LiveDiagnosisNode(ListeningNode):
         NodeParameter(
             'learning',
             20.0,
-            'Motion of the healthy arm at the beginning. The misfit of the model is computed from '
-            'it if neither a baseline nor the model file gives it. 0: diagnose all deviations '
+            'Duration of motion of the healthy arm at the beginning, for the misfit of the model '
+            'if neither a baseline nor the model file has the misfit. 0: diagnose all deviations '
             'from the model, not only changes.',
             's',
             limits=(0.0, 600.0),

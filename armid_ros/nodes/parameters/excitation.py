@@ -70,7 +70,7 @@ PUBLISHER_PARAMETERS = (
         'floor',
         '',
         'Height of the floor above the origin of the base [m], or none; empty: the height shipped '
-        'with the robot, or the base plane of an arm that stands.',
+        'with the robot, or the base plane of an upright arm.',
     ),
     NodeParameter(
         'environment',
@@ -141,8 +141,8 @@ PUBLISHER_PARAMETERS = (
     setting(
         'stopping',
         0.5,
-        'Time in which the arm is brought to rest; longer if its limits require it. Without '
-        'zero_stamp the arm is not started where clocks differ by more than a tenth of it.',
+        'Duration of a stop of the arm; longer if the limits of the arm require it. Without '
+        'zero_stamp, the arm is not started if clocks differ by more than a tenth of this.',
         's',
         limits=(0.1, 10.0),
     ),
