@@ -161,7 +161,7 @@ def _speed(context: click.Context, parameter: click.Parameter, value: Any) -> st
     '--floor',
     metavar='Z|none',
     help='Height of the floor above the origin of the base [m]. By default, without '
-    '--environment, the base plane of an arm that stands.',
+    '--environment, the base plane of an upright arm.',
 )
 @click.option(
     '--after',
@@ -351,6 +351,6 @@ def write_course(
         f'{joint} {q:.3g} {unit}'
         for joint, q, unit in zip(robot.joints, course.q[0], robot.position_units, strict=True)
     )
-    say(f'starts at rest in the middle of the ranges, {first}: bring the arm there first')
+    say(f'starts at rest in the middle of the joint ranges: first move the arm to {first}')
     for missing in space.unchecked:
         say(f'not checked: {missing}', 'yellow')

@@ -70,7 +70,7 @@ def inspect(
     'robot_source',
     metavar='R',
     shell_complete=parameters.completed,
-    help='The description, in place of the first argument.',
+    help='The robot description, in place of the argument R.',
 )
 @parameters.packages
 @click.option(

@@ -82,7 +82,7 @@ joints = click.option(
     '--joints',
     default=None,
     metavar='A,B,...',
-    help='Driven joints; all but grippers by default. A name with a comma is in double quotes.',
+    help='Driven joints; all but grippers by default. Write a name with a comma in double quotes.',
 )
 effects = click.option(
     '--effects',
