@@ -135,7 +135,7 @@ def _print_json(name: str, **document: Any) -> None:
 @click.option(
     '--cutoff', type=float, help='Position filter cut-off [Hz]; default: from a few bags.'
 )
-@click.option('--decimation', type=int, help='Keep one of this many samples.')
+@click.option('--decimation', type=int, help='Decimation: fit every k-th sample.')
 @options.topic
 @options.gravity
 @options.joints
