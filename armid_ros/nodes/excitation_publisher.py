@@ -435,7 +435,7 @@ class ExcitationPublisherNode(ArmidNode):
     def _on_experiment(self, message: String) -> None:
         """Load an excitation from the topic experiment; only ~/start runs it."""
         if self._waiting:
-            raise TrajectoryError('an excitation is about to start; send the new one after it')
+            raise TrajectoryError('an excitation is about to start; send another excitation later')
         self._require_rest()
         excitation = read_excitation(message.data, self._experiments.topic_name)
         self._excitation = checked(excitation, self._planner, self._experiments.topic_name)

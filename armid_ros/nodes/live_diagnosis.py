@@ -282,7 +282,7 @@ class LiveDiagnosisNode(ListeningNode):
         self._adopt(self._described(urdf))
 
     def _settings(self, values: Mapping[str, Any]) -> LiveSettings:
-        """Return the settings from the ROS parameters; `values` replace parameters by name."""
+        """Return the settings: new `values`, and ROS parameters for all other settings."""
         names = (*(entry.name for entry in LIVE_SETTINGS), 'learning')
         return LiveSettings(**{name: values.get(name, self.value(name)) for name in names})
 

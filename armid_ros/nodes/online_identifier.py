@@ -251,7 +251,7 @@ class OnlineIdentifierNode(ListeningNode):
             self.identifier.use(self._settings({name: self.value(name) for name in names}))
 
     def _settings(self, values: Mapping[str, Any]) -> OnlineSettings:
-        """Return the settings from the ROS parameters; `values` replace parameters by name."""
+        """Return the settings: new `values`, and ROS parameters for all other settings."""
         new = {name: x for name, x in values.items() if name in OnlineIdentifier.CHANGEABLE}
         if 'false_alarm_time' in new:
             new['false_alarm_time'] = new['false_alarm_time'] or None

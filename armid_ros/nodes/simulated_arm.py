@@ -371,7 +371,7 @@ class SimulatedArmNode(ArmidNode):
         return replace(arm, effects=arm.effects + more.effects, values=arm.values + more.values)
 
     def _sensors(self, joints: Sequence[str], values: Mapping[str, Any]) -> Sensors:
-        """Return the sensors from the ROS parameters; `values` replace parameters by name."""
+        """Return the sensors from new `values`, and ROS parameters for all other quantities."""
         noise = {
             name: per_joint(values.get(name, self.value(name)), joints, f"parameter '{name}'")
             for name in _SENSORS
