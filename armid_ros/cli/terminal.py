@@ -58,7 +58,7 @@ def progress(what: str) -> Iterator[Tick]:
 
 
 def progress_line(what: str, share: float, spent: float) -> str:
-    """Return a line with the done share, the time `spent` [s] and the remaining time."""
+    """Return a line with completed share, elapsed time `spent` [s] and remaining time."""
     known = 0.0 < share < 1.0
     rest = f', about {spent * (1.0 / share - 1.0):.0f} s to go' if known else ''
     return f'{what}: {100.0 * share:.0f} %, {spent:.0f} s{rest}'
