@@ -117,7 +117,7 @@ class FleetFit:
         return cls(base, tuple(kept), replace(fit, values=values))
 
     def noise(self, rows: Iterable[Regression]) -> FloatArray:
-        """Return the noise covariance, (r, r), of the normal equations of regression rows."""
+        """Return the covariance (r, r) that noise causes in the normal equations of `rows`."""
         products = np.zeros((len(self.kept), len(self.kept)))
         for part in rows:
             some = part.restrict(self.kept)
@@ -167,7 +167,7 @@ class MergedBags:
 
     @classmethod
     def of(cls, bag: BagSummary | Refused) -> MergedBags:
-        """Return a sum of one bag, which may be refused, without the rows of the bag."""
+        """Convert the summary of a bag, or a refused bag, to a sum of a single bag."""
         if isinstance(bag, Refused):
             return cls(refused=(bag,))
         version = bag.bag.url, bag.bag.version

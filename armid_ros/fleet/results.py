@@ -128,7 +128,7 @@ def write_summary(store: Store, summary: BagSummary, job: Job) -> None:
 
 def find_summary(store: Store, bag: BagFile, job: Job) -> BagSummary | Refused | None:
     """
-    Return the stored result of a bag; None if it is missing or from other settings.
+    Return the stored result of a bag; None without a result for the same settings.
 
     Results of an earlier run are used only if the job resumes.
 
@@ -189,7 +189,7 @@ def write_arm(
 
 def arm_is_done(store: Store, arm: str, bags: Sequence[BagFile], job: Job) -> list[Refused] | None:
     """
-    Return the refused bags if the stored estimate is from exactly the given bags.
+    Return the refused bags of a stored estimate from exactly the given bags; else None.
 
     Returns
     -------
