@@ -184,7 +184,7 @@ def _outputs(modal: ComplexArray, states: ComplexArray) -> ComplexArray:
 
 
 def _driven(u: FloatArray, dt: float, poles: ComplexArray, hold: Hold) -> ComplexArray:
-    """Return the states of r modes, (N, r), that an input u (N,) drives with unit gain."""
+    """Return the states of r modes, (N, r), for an input u, (N,), with unit input gains."""
     states = np.empty((len(u), len(poles)), complex)
     for k, pole in enumerate(poles):
         factor = np.exp(pole * dt)
