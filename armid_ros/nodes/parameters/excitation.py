@@ -187,7 +187,7 @@ PUBLISHER_PARAMETERS = (
 
 def make_planner(value: Values) -> tuple[TransferPlanner, tuple[str, ...]]:
     """
-    Return a path planner for the robot and obstacles of ROS parameters; and impossible checks.
+    Return a path planner from ROS parameters, and the checks that the description does not allow.
 
     Parameters
     ----------
