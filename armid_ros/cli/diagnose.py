@@ -237,7 +237,7 @@ def _model_of(path: Path, robot: Robot) -> ArmModel:
         return arm
     if known.joints == robot.joints and kinematics_digest(known) != kinematics_digest(robot):
         raise ArmidError(
-            f'{path}: the robot of this model has other kinematics than '
+            f'{path}: the joints of this model have other kinematics than those of '
             f'{robot.name}; name the description of the model with --robot, or identify this arm'
         )
     return arm
