@@ -78,7 +78,7 @@ def fit_rigid(runs: Sequence[ElasticRun]) -> RigidFit:
     problem = [part for number, run in enumerate(runs) for part in _rows(run, str(number))]
     if not problem:
         raise IdentificationError(
-            f'the rigid fit needs an experiment over {2 * _SETTLING_TIME:g} s; record longer'
+            f'the rigid fit needs an experiment longer than {2 * _SETTLING_TIME:g} s'
         )
     normal = NormalEquations.of(problem)
     products = normal.summed()[:-1, :-1]
