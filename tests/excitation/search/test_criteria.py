@@ -56,6 +56,13 @@ def test_costs_are_those_of_the_covariance(w):
     assert spectral('D', scale, 2.0).cost(w.T @ w) == pytest.approx(balanced)
 
 
+@pytest.mark.parametrize('name', ['E', 'condition'])
+def test_smooth_cost_is_just_above_the_cost(w, name):
+    criterion = spectral(name, np.ones(5))
+    cost, smooth = criterion.cost(w.T @ w), criterion.smooth(w.T @ w)[0]
+    assert cost <= smooth <= cost + np.log(5) / 12.0
+
+
 def test_subset_is_judged_with_the_others_fitted(w):
     wanted = np.array([False, True, False, True, False])
     covariance = np.linalg.inv(w.T @ w)[np.ix_([1, 3], [1, 3])]

@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+from armid_ros.arm import ArmModel
+from armid_ros.effects import make_effect
 from armid_ros.estimate import Estimate, ParameterName
 from armid_ros.identification.online.background import at_once
 from armid_ros.identification.online.change import Change, change_candidates, ChangeCandidate
@@ -12,10 +14,12 @@ from armid_ros.identification.online.change_search import (
     score_statistics,
     ScoreStatistics,
 )
-from armid_ros.identification.online.change_watch import ChangeWatch, Row
+from armid_ros.identification.online.change_watch import ChangeWatch, NuisanceRows, Row
 from armid_ros.identification.online.null_calibration import NullCalibration
 from armid_ros.identification.online.recursive import RecursiveLeastSquares, WeightedSample
 from armid_ros.identification.online.settings import FALSE_ALARM_TIME
+from armid_ros.identification.rows.causal import CausalMotion
+from armid_ros.motion import Motion
 import numpy as np
 import pytest
 from scipy import stats
@@ -246,3 +250,24 @@ def test_what_a_window_does_not_show_has_an_infinite_deviation():
     size = Estimate(NAMES[:2], values[:2], covariance[:2, :2])
     unknown, known = str(Change(candidate, (), 1.0, size)).split(',')
     assert 'unknown' in unknown and 'inf' not in unknown and '+1' in known
+
+
+def test_columns_of_nuisance_are_those_of_the_effects_that_the_arm_lacks(robot):
+    arm = ArmModel(robot)
+    stribeck = make_effect('stribeck_friction', robot)
+    names = ('viscous_friction', 'coulomb_friction', 'load_dependent_friction')
+    viscous, coulomb, loaded = (make_effect(name, robot) for name in names)
+    humps = [stribeck.with_shape((velocity, 2.0)) for velocity in (0.03, 0.1, 0.3)]
+    lacking = viscous, coulomb, *humps, loaded
+    q, dq, ddq = 0.2 * np.random.default_rng(0).normal(size=(3, robot.n_joints))
+    nuisance = NuisanceRows(arm, 5.0)
+    # the first row of a stretch, which filters leave as it is
+    row = Row(0.0, None, CausalMotion(0.0, q, dq, ddq, q), 0.005, 1.0, begins=True)
+    one = Motion(robot.joints, np.zeros(1), q[None], dq[None], ddq[None])
+    (rows,) = at_once(nuisance.columns([row]))
+    expected = np.concatenate([effect.columns(one, arm)[0] for effect in lacking], axis=1)
+    np.testing.assert_allclose(rows, expected, atol=1e-12)
+    assert [p.joint for p in nuisance.parameters] == list(robot.joints) * len(lacking)
+    whole = NuisanceRows(ArmModel(robot, (viscous, coulomb, stribeck, loaded)), 5.0)
+    assert whole.parameters == ()
+    assert at_once(whole.columns([row])).shape == (1, robot.n_joints, 0)

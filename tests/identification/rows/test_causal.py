@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-from armid_ros.identification.rows.causal import CausalFilter
+from armid_ros.identification.rows.causal import CausalFilter, TripleLag
 import numpy as np
 import pytest
 
@@ -37,6 +37,13 @@ def sine_response(pole, frequency, t):
     gain = 1.0 / (1.0 + 1j * frequency / pole) ** 3
     wave = gain * np.exp(1j * frequency * t)
     return wave.imag, (1j * frequency * wave).imag, (-(frequency**2) * wave).imag
+
+
+def test_cutoff_is_where_half_the_power_is_left():
+    lag = TripleLag(CUTOFF)
+    t = np.arange(0.0, 4.0, 1e-4)
+    out = [lag.update(1e-4, np.array([np.sin(2 * np.pi * CUTOFF * s)]))[2, 0] for s in t]
+    assert np.max(out[len(out) // 2 :]) == pytest.approx(np.sqrt(0.5), rel=1e-4)
 
 
 @pytest.mark.parametrize('rate', [50.0, 100.0, 200.0, 1000.0])

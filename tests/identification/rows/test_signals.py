@@ -69,6 +69,14 @@ def test_cutoff_is_where_positions_meet_their_noise(arm):
     assert noisy.decimation == quiet.decimation
 
 
+@pytest.mark.parametrize('rate', [50.0, 200.0, 1000.0, 2000.0])
+def test_a_row_takes_less_than_twenty_smooth_samples_at_any_rate(arm, rate):
+    motion = multisine(arm.robot.joints, 20.0, rate, seed=2)
+    used = conditioning([recorded(arm, motion, position_noise=1e-9)], SignalSettings())
+    assert used.decimation % used.smooth_stride == 0
+    assert used.decimation < 20 * used.smooth_stride
+
+
 @pytest.mark.parametrize('cutoff', [10.0, 40.0])
 def test_noise_of_velocities_is_what_white_noise_of_positions_makes(cutoff):
     rng = np.random.default_rng(0)
