@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The ground of Table 3, the wearer, and a gait with feet that stay where they stand."""
+"""The ground of Table 3, the wearer, the shipped gait, and feet that stay where they stand."""
 
 from armid_ros.errors import TrajectoryError
 from armid_ros.model import inverse_dynamics, random_motion

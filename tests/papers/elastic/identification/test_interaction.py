@@ -1,7 +1,10 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Decoupling: what one link does to the other, and what is left of each joint without it."""
+"""Rigid parameters, what one link does to the other, and what is left of each joint."""
 
+from dataclasses import replace
+
+from armid_ros.errors import IdentificationError
 from armid_ros.model import inverse_dynamics
 from armid_ros.motion import Motion
 from armid_ros.papers.elastic.identification.interaction import (
@@ -15,6 +18,7 @@ from armid_ros.papers.elastic.identification.interaction import (
     measured_response,
     ORDER,
 )
+from armid_ros.papers.elastic.identification.rigid import fit_rigid
 from armid_ros.papers.elastic.identification.subspace import identify_subspace
 from armid_ros.robots import load_robot
 import control
@@ -75,3 +79,40 @@ def test_physical_parameters_follow_from_the_responses(truth, runs) -> None:
     antiresonance, resonance = frequencies(fit)
     np.testing.assert_allclose(antiresonance, (22.7, 29.4), atol=0.25)
     np.testing.assert_allclose(resonance, (35.5, 42.2), atol=0.35)
+
+
+def test_rigid_parameters(runs, truth) -> None:
+    fit = fit_rigid(runs)
+    wanted = [truth.alpha + truth.rotor[0], truth.beta, truth.gamma, truth.rotor[1]]
+    np.testing.assert_allclose(fit.estimate.values[:4], wanted, rtol=0.02)
+    np.testing.assert_allclose(fit.coulomb, truth.joint_coulomb, rtol=0.03)
+    np.testing.assert_allclose(fit.estimate.values[4:6], truth.total_damping, rtol=0.02)
+    assert fit.relative_error < 3.0
+
+
+def test_deviations_hold_for_short_data(runs, truth) -> None:
+    """24 s: rows are closer than the filter lets errors change, which deviations have to know."""
+    true = [truth.alpha + truth.rotor[0], truth.beta, truth.gamma, truth.rotor[1]]
+    true = np.array([*true, *truth.total_damping, *truth.joint_coulomb])
+    off = [
+        (fit.values - true) / fit.std
+        for fit in (fit_rigid(part).estimate for part in (runs[:6], runs[6:]))
+    ]
+    assert np.sqrt(np.mean(np.square(off))) < 1.6
+    assert np.abs(off).max() < 3.0
+
+
+def test_short_experiments_are_refused(clean_steps) -> None:
+    with pytest.raises(IdentificationError, match=r'0\.8 s'):
+        fit_rigid(clean_steps)
+
+
+def test_a_joint_that_stands_is_refused(runs) -> None:
+    still = []
+    for run in runs:
+        stop = np.array([1.0, 0.0])
+        motor = replace(run.motor, dq=run.motor.dq * stop)
+        link = replace(run.link, dq=run.link.dq * stop, ddq=run.link.ddq * stop)
+        still.append(replace(run, motor=motor, link=link))
+    with pytest.raises(IdentificationError, match='rests'):
+        fit_rigid(still)

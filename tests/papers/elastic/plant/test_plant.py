@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Motors that drive links through springs: frequencies, energy, friction, stiff limits, misuse."""
+"""Motors that drive links through springs: frequencies, energy, friction, limits, and MuJoCo."""
 
 from dataclasses import replace
 
