@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""What a file of an identification says of the parameters that a model has."""
+"""What a file of an identification contains, and says of the parameters that a model has."""
 
 from dataclasses import replace
 from typing import get_args

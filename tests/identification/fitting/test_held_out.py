@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Held-out data choose the cut-off, and each half of the data predicts the other."""
+"""Held-out data: the cut-off, halves that predict each other, and scatter of recordings."""
 
 from dataclasses import replace
 
