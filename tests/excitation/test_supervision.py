@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Where an arm is known to be, whether it follows, and how its set point comes to rest."""
+"""Where an arm is known to be, whether it follows, how it comes to rest, and its rehearsal."""
 
 from armid_ros.arm import ArmModel
 from armid_ros.excitation import Excitation, FourierTrajectory
