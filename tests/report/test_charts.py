@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Charts are small, true to the data, and cannot break out of their script."""
+"""Charts and drawings are small, true to the data, and cannot break out of their script."""
 
 from base64 import b64decode
 from io import BytesIO

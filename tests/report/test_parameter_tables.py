@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Parameters that share an axis have one unit, which a heading says once."""
+"""Parameters that share an axis have one unit; labels are short; convergence has intervals."""
 
 from armid_ros.estimate import Estimate, ParameterName
 from armid_ros.report.blocks import DataTable, Paragraph

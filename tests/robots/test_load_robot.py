@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""What becomes of a description: which joints are driven, what is refused and in which words."""
+"""What becomes of a description: which joints are driven, what is refused, arms of others."""
 
 from collections.abc import Callable
 import os

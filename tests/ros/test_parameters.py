@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Every parameter of every node is described, checked, and refused with what to do instead."""
+"""Parameters and arguments of nodes are described, checked, and refused with what to do."""
 
 import gc
 

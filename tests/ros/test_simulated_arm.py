@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The simulated arm moves as it is told, in the time it is given, and refuses the rest."""
+"""The simulated arm, rigid or elastic, moves as it is told, and refuses the rest."""
 
 import re
 

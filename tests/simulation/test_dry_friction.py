@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Friction that holds, and lets go, as dry friction does."""
+"""Friction that holds, and lets go, as dry friction does; its complementarity solver."""
 
 from itertools import product
 

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Recorded runs: what is said to be true is true, and the same again with the same generator."""
+"""Recorded runs: what is said to be true is true, and how well an arm follows."""
 
 from dataclasses import replace
 import re

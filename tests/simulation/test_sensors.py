@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""What sensors add, and that they add exactly that."""
+"""What sensors add, that they add exactly that, and temperatures of joints."""
 
 from armid_ros.errors import ModelError
 from armid_ros.simulation import Sensors
