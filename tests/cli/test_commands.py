@@ -4,6 +4,7 @@
 
 import inspect
 import json
+from pathlib import Path
 import re
 import shlex
 import subprocess
@@ -171,6 +172,15 @@ def test_bad_input_is_one_line_with_the_answer(arguments, message, bags, tmp_pat
     assert lines[0].startswith('armid: ')
     assert message.format(bag=bags[0]) in lines[0]
     assert not (tmp_path / 'o').exists()
+
+
+def test_a_joint_of_a_bag_with_another_name_is_read_as_the_error_says(bags, tmp_path):
+    text = Path(load_robot(ROBOT).path).read_text(encoding='utf-8')
+    other = tmp_path / 'other.urdf'
+    other.write_text(text.replace('"elbow_pitch"', '"ellbow_pitch"'), encoding='utf-8')
+    asked = ('inspect', bags[0], '--robot', other)
+    (rule,) = re.findall(r'--rename ([a-z_]+:[a-z_]+)', armid(*asked, code=2).stderr)
+    armid(*asked, '--rename', rule)
 
 
 FILLING = {
