@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
+from functools import cache
 from itertools import combinations
 from pathlib import Path
 from typing import Literal, NamedTuple
@@ -17,10 +18,13 @@ from armid_ros.motion import FloatArray
 from armid_ros.robots.description import parse_xml
 from armid_ros.robots.meshes import convex_bodies, find_mesh
 from armid_ros.robots.robot import description_name, Robot
+from armid_ros.robots.xacro_expansion import package_folders
 import coal
 import numpy as np
 import pinocchio as pin
 
+Tag = Literal['visual', 'collision']
+Progress = Callable[[float], None]
 _Meshes = dict[tuple[Path, tuple[float, ...]], tuple[coal.CollisionGeometry, ...]]
 #: Attributes of each kind of shape, with a default if there is one.
 _SHAPE_ATTRIBUTES = {
@@ -75,10 +79,7 @@ class LinkShape(NamedTuple):
 
 
 def shapes_of(
-    robot: Robot,
-    tag: Literal['visual', 'collision'],
-    other: Literal['visual', 'collision'] | None = None,
-    progress: Callable[[float], None] | None = None,
+    robot: Robot, tag: Tag, other: Tag | None = None, progress: Progress | None = None
 ) -> Iterator[LinkShape]:
     """
     Yield the visual or the collision shapes of all links of a robot.
@@ -106,6 +107,7 @@ def shapes_of(
         if frame.type == pin.FrameType.BODY
     }
     links = parse_xml(robot.urdf).findall('link')
+    folders = cache(lambda name, urdf: tuple(package_folders(name, urdf)))
     for done, link in enumerate(links):
         if progress is not None:
             progress(done / len(links))
@@ -123,14 +125,12 @@ def shapes_of(
                     f"{robot.name}: <{element.tag}> {number + 1} of link '{name}' has to be a "
                     'box, sphere, cylinder, capsule or mesh with numbers as dimensions'
                 ) from None
-            path = find_mesh(mesh, robot.path) if kind == 'mesh' else None
+            path = find_mesh(mesh, robot.path, folders) if kind == 'mesh' else None
             yield LinkShape(name, frames[name], number, placement, kind, size, mesh, path)
 
 
 def collision_geometry(
-    robot: Robot,
-    progress: Callable[[float], None] | None = None,
-    other: Literal['visual', 'collision'] = 'collision',
+    robot: Robot, progress: Progress | None = None, other: Tag = 'collision'
 ) -> tuple[pin.GeometryModel, dict[str, str]]:
     """
     Return the collision bodies of a robot, with notes on links whose mesh file is missing.
@@ -256,9 +256,7 @@ class CollisionModel:
         return tuple(sorted({_links(self.robot, self.geometry, number) for number in numbers}))
 
 
-def collision_model(
-    robot: Robot, *, progress: Callable[[float], None] | None = None
-) -> CollisionModel:
+def collision_model(robot: Robot, *, progress: Progress | None = None) -> CollisionModel:
     """
     Build the collision model of a robot: bodies, and pairs whose distance is checked.
 

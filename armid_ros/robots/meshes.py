@@ -13,7 +13,7 @@ contain the whole mesh, so a clearance is never overestimated.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -29,9 +29,11 @@ import numpy.typing as npt
 #: Largest ratio of the volume of a hull to the volume that it replaces.
 _MAX_VOLUME_RATIO = 1.1
 _QHULL_ERRORS = (RuntimeError, ValueError)  # errors that qhull raises for degenerate points
+#: Function from a package and the file of the description to possible folders of the package.
+Folders = Callable[[str, Path | None], Iterable[Path]]
 
 
-def find_mesh(name: str, urdf: Path | None) -> Path | None:
+def find_mesh(name: str, urdf: Path | None, folders: Folders = package_folders) -> Path | None:
     """
     Return the path of a mesh file that a URDF names; None if the file is not found.
 
@@ -39,10 +41,9 @@ def find_mesh(name: str, urdf: Path | None) -> Path | None:
     folder of the URDF.
 
     """
-    candidates: Iterable[Path]
     if name.startswith('package://'):
         package, _, inside = name.removeprefix('package://').lstrip('/').partition('/')
-        candidates = (folder / inside for folder in package_folders(package, urdf))
+        candidates = [folder / inside for folder in folders(package, urdf)]
     else:
         folder = Path() if urdf is None else urdf.resolve().parent
         candidates = [folder / name.removeprefix('file://')]
