@@ -32,9 +32,13 @@ def package_data():
 
 
 def commands():
-    """List the command of every plug-in that is there, in its command.py."""
+    """List the command of every plug-in that is there, in its command.py, and that of a clone."""
     found = [path for path in PLUG_INS if (path / 'command.py').is_file()]
-    return [f'{path.name} = {".".join(path.parts)}.command:{path.name}' for path in found]
+    # benchmarks are not installed; `make armid-bench` puts a clone on the path
+    return [
+        *(f'{path.name} = {".".join(path.parts)}.command:{path.name}' for path in found),
+        'bench = benchmarks.bench:bench',
+    ]
 
 
 def nodes():

@@ -12,7 +12,7 @@ from pathlib import Path
 import subprocess
 import sys
 
-from benchmarks.reference_loop import processor
+from benchmarks.metrics import processor
 
 BENCHMARKS = (
     *('changes', 'coverage', 'exo', 'exo_diagnosis', 'growth'),

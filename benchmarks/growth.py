@@ -25,8 +25,8 @@ import armid_ros as ar
 from armid_ros.recording import write_recording
 import numpy as np
 
+from benchmarks.metrics import processor
 from benchmarks.offline_speed import motion, RATE
-from benchmarks.reference_loop import processor
 
 OUT = Path(__file__).parent / 'results' / 'growth.json'
 FRICTION = ('viscous_friction:viscous_coefficient=0.5', 'coulomb_friction:coulomb_torque=0.3')

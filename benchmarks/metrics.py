@@ -93,3 +93,10 @@ def table(metrics: Iterable[Metric]) -> str:
         row = f'{metric.name:30s} {metric.value:7.3f}  {interval:>15s} {metric.count:6d}  {wanted}'
         rows.append(row.rstrip())
     return '\n'.join(rows)
+
+
+def processor() -> str:
+    """Return the model name of the processor."""
+    with open('/proc/cpuinfo', encoding='utf-8') as info:
+        names = (line.split(': ')[1] for line in info if line.startswith('model name'))
+        return next(names, '?').strip()

@@ -3,11 +3,7 @@
 """
 A public benchmark of diagnosis: recordings of arms on two days, and a score of the answers.
 
-    python -m benchmarks.public make FOLDER --seed 7 [--cases 24]
-    python -m benchmarks.public answer FOLDER answers.json [--method METHOD]
-    python -m benchmarks.public score answers.json --seed 7 [--cases 24] [--keep METHOD]
-
-The generators are tests and not in the wheel, so this is no command of `armid`.
+The generators are tests, so `armid bench` exists only in a clone, after `make armid-bench`.
 
 A case is a folder with `arm.urdf` (its masses are up to 6 % wrong), three bags of day 1, three of
 day 2, and one more of day 2 that may be used for validation. Between the days one thing changed,
@@ -28,8 +24,7 @@ shows it on public.md.
 
 from __future__ import annotations
 
-import argparse
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 import json
 from pathlib import Path
@@ -44,7 +39,7 @@ import numpy as np
 
 from benchmarks.bic_selection import bic_selection
 from benchmarks.lived_scoring import LivedJudged, score, VISIBLE
-from benchmarks.metrics import rate, table
+from benchmarks.metrics import Metric, rate
 from benchmarks.other_ways import Estimates, figaroh_estimates, sysid_days
 from benchmarks.two_days import Answer, answer_of, identification_of
 from tests.hidden.lived.cases import case_of, LivedCase
@@ -149,54 +144,20 @@ def judged(seed: int, count: int, answers: Path) -> list[LivedJudged]:
     ]
 
 
-def main() -> None:
-    """Make cases, answer them, or score answers, as the command line states."""
-    parser = argparse.ArgumentParser(prog='python -m benchmarks.public', description=__doc__)
-    parser.formatter_class = argparse.RawDescriptionHelpFormatter
-    commands = parser.add_subparsers(dest='command', required=True)
-    drawn = argparse.ArgumentParser(add_help=False)
-    drawn.add_argument('--seed', type=int, required=True)
-    drawn.add_argument('--cases', type=int, default=24)
-    command = commands.add_parser('make', parents=[drawn], help='write cases')
-    command.add_argument('folder', type=Path)
-    command = commands.add_parser('answer', help='answer all cases by a method')
-    command.add_argument('folder', type=Path)
-    command.add_argument('answers', type=Path)
-    methods = ('diagnosis', 'bic', *DAYS)
-    command.add_argument('--method', choices=methods, default='diagnosis')
-    command = commands.add_parser('score', parents=[drawn], help='compare answers with the truth')
-    command.add_argument('answers', type=Path)
-    command.add_argument('--keep', choices=methods, help='add the score to results/public.json')
-    options = parser.parse_args()
-    if options.command == 'make':
-        make(options.folder, options.seed, options.cases)
-    elif options.command == 'answer':
-        found = {}
-        for case in sorted(options.folder.glob('case_*')):
-            try:
-                found[case.name] = answer(case, options.method)
-            except Exception as error:  # of any tool: the case has no answer
-                print(f'{case.name}: {type(error).__name__}: {error}', flush=True)
-            options.answers.write_text(json.dumps(found, indent=1) + '\n', encoding='utf-8')
-    else:
-        found = judged(options.seed, options.cases, options.answers)
-        own = {*EFFECT_OF.values(), 'payload', 'link_inertia'}
-        simple = [
-            one for one in found if one.cause and one.gap >= VISIBLE and one.cause.name in own
-        ]
-        metrics = (*score(found), rate('simple cause named first', simple, lambda one: one.first))
-        print('\n'.join(one.line for one in found))
-        print(table(metrics))
-        if options.keep:
-            kept = json.loads(RESULTS.read_text(encoding='utf-8')) if RESULTS.exists() else {}
-            kept[options.keep] = {
-                one.name.strip(): [round(one.value * one.count), one.count]
-                for one in metrics
-                if np.isfinite(one.value) and np.isfinite(one.low)
-            }
-            rows = (f' {json.dumps(name)}: {json.dumps(one)}' for name, one in kept.items())
-            RESULTS.write_text('{\n' + ',\n'.join(rows) + '\n}\n', encoding='utf-8')
+def scored(found: Sequence[LivedJudged]) -> list[Metric]:
+    """Return the rates of judged cases: of all, and of those that change one parameter."""
+    own = {*EFFECT_OF.values(), 'payload', 'link_inertia'}
+    simple = [one for one in found if one.cause and one.gap >= VISIBLE and one.cause.name in own]
+    return [*score(found), rate('simple cause named first', simple, lambda one: one.first)]
 
 
-if __name__ == '__main__':
-    main()
+def keep(method: str, metrics: Sequence[Metric]) -> None:
+    """Add the score of a method to the results."""
+    kept = json.loads(RESULTS.read_text(encoding='utf-8')) if RESULTS.exists() else {}
+    kept[method] = {
+        one.name.strip(): [round(one.value * one.count), one.count]
+        for one in metrics
+        if np.isfinite(one.value) and np.isfinite(one.low)
+    }
+    rows = (f' {json.dumps(name)}: {json.dumps(one)}' for name, one in kept.items())
+    RESULTS.write_text('{\n' + ',\n'.join(rows) + '\n}\n', encoding='utf-8')

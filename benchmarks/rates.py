@@ -119,7 +119,7 @@ def public_page(public: str) -> str:
             '',
             f'{found["cases"]} arms on two days, made with seed {found["seed"]}. Each method',
             f'answered once, on {found["date"]}.',
-            'Rules and methods: `python -m benchmarks.public --help`.',
+            'Rules: `benchmarks/public.py`. Commands: `armid bench`, after `make armid-bench`.',
             'Methods that compare parameters know loads, links, friction, rotors, offsets.',
             'mujoco.sysid had 16 stretches of 0.4 s of each day, and 10 iterations.',
             '',
