@@ -48,28 +48,23 @@ def verdict(found: Reproduction) -> VerdictSection:
     """Return the verdict box: torque errors compared with the paper, and the identified load."""
     lines, held = [], True
     for one in found.repeated:
-        paper, noisy, gravity, dynamics = one.ratios.values()
-        name = f'Table {one.table.number} ({one.table.title})'
+        paper, noisy, gravity, _ = one.ratios.values()
+        place = f'{one.table.title[0].upper()}{one.table.title[1:]}'
         if one.table.uniform:
             low, high = (digits(float(end)) for end in np.sort(paper)[[0, -1]])
             lines.append(
-                f'{name}: error over noise at most {digits(float(gravity.max()))} with gravity '
-                f'alone, {digits(float(dynamics.max()))} with the full dynamics. '
-                f'The paper has {low} to {high}; less is better.'
+                f'{place}, the largest torque error is {digits(float(gravity.max()))} of the '
+                f'torque noise; the paper has {low} to {high}.'
             )
             held &= bool(gravity.max() <= 0.15)  # of the noise
             continue
         held &= bool(gravity.mean() <= 1.0)  # % of the peak
-        lines += [
-            f'{name}: mean torque error {digits(float(noisy.mean()))} % of the peak torque; '
-            f'the paper has {digits(float(paper.mean()))} %.',
-            f'Without torque noise it is {digits(float(gravity.mean()))} % with gravity alone, '
-            f'{digits(float(dynamics.mean()))} % with the full dynamics.',
-        ]
-    lines.append(
-        f'The {len(found.composites)} gravity parameters give a load of {_load(found)} in the '
-        f'hand; {LOAD:g} kg was simulated.'
-    )
+        lines.append(
+            f'{place}, the torque error is {digits(float(noisy.mean()))} % of the peak torque '
+            f'({digits(float(gravity.mean()))} % without noise); the paper has '
+            f'{digits(float(paper.mean()))} %.'
+        )
+    lines.append(f'The load in the hand is {_load(found)}; {LOAD:g} kg was simulated.')
     grade = ('reproduced', 'good') if held else ('in part', 'fair')
     return VerdictSection(*grade, lines, step='Compare each row of the tables below.')
 
