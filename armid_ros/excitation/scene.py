@@ -211,10 +211,8 @@ class Fitness:
         return f'{self.word}: {" ".join(self.sentences())}'
 
     def sentences(self) -> list[str]:
-        """Return a sentence on limits and unchecked items, and a sentence on distances."""
-        limits = 'The motion keeps all limits'
-        if self.unchecked:
-            limits += f'; not checked: {"; ".join(self.unchecked)}'
+        """Return sentences on unchecked items, on limits and on distances."""
+        unchecked = f'not checked: {"; ".join(self.unchecked)}' if self.unchecked else ''
         parts = []
         if self.nearest is not None:
             parts.append(
@@ -230,7 +228,8 @@ class Fitness:
                 f'lowest checked point {abs(height):.3f} m {side} the {what} ({self.lowest.link})'
             )
         near = ', '.join(parts)
-        found = [f'{text[0].upper()}{text[1:]}.' for text in (limits, near) if text]
+        texts = unchecked, 'the motion keeps all limits', near
+        found = [f'{text[0].upper()}{text[1:]}.' for text in texts if text]
         return found[::-1] if self.word == UNFIT else found
 
 
