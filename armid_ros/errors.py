@@ -38,7 +38,7 @@ class ArmidError(Exception):
     ...     ar.load_robot('nowhere.urdf')
     ... except ar.ArmidError as error:
     ...     print(error)
-    nowhere.urdf: neither a file nor a shipped robot; shipped are humanoid_arm, ...
+    nowhere.urdf: neither a file nor a shipped robot; shipped robots: humanoid_arm, ...
 
     """
 

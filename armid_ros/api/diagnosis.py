@@ -256,8 +256,8 @@ class DiagnosisResult(ShownModel):
     def _steps(self, model: str) -> list[str]:
         """Return the next steps for the user; `model` is the model's path in their commands."""
         worse = dict.fromkeys(joint for pair in self.forward for joint in pair.worse)
-        learned = self.residual is not None
-        steps = next_steps(self.core, self.next_run, self.no_run, model, tuple(worse), learned)
+        flags = self.residual is not None, self.simulated is not None
+        steps = next_steps(self.core, self.next_run, self.no_run, model, tuple(worse), *flags)
         return list(map(pretty, steps))
 
     def summary(self, model: str = MODEL, every: bool = True) -> Summary:

@@ -54,7 +54,8 @@ def next_command(then: str, result: Shown) -> str:
         then = 'excite'
     robot, bags, more = _subject(then, result, given)
     if isinstance(result, DiagnosisResult) and then == 'diagnose':
-        more = ['--residual', 'gp'] if result.baseline else ['--baseline', 'BAG']
+        compared = result.baseline or result.simulated is not None
+        more = ['--residual', 'gp'] if compared else ['--baseline', 'BAG']
     if then == 'excite' and own != 'check':
         more = ['--seed', given['seed'] + 1]
     if then in _OUT:

@@ -250,7 +250,7 @@ def test_no_recording_is_said(arm, ask, recordings, said):
 
 
 def test_a_recording_in_place_of_the_robot_is_answered_with_the_order(runs):
-    with pytest.raises(ar.ArmidError, match=r'first argument is a Recording.*before the recordings'):
+    with pytest.raises(ar.ArmidError, match=r'argument is a Recording.*before the recordings'):
         ar.identify(runs[0], 'my_arm.urdf')
 
 

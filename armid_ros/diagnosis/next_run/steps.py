@@ -25,6 +25,7 @@ def next_steps(
     model: str = MODEL,
     worse: Sequence[str] = (),
     learned: bool = False,
+    simulated: bool = False,
 ) -> list[str]:
     """
     Return sentences on what to inspect, what to record next, and how to use the model.
@@ -43,6 +44,8 @@ def next_steps(
         Joints in which a simulation with the patched model has a larger error than before.
     learned : bool
         Whether the unexplained torque has been learned.
+    simulated : bool
+        Whether the model was identified from a simulator, which has no baseline.
 
     """
     findings, verdict = diagnosis.findings, diagnosis.verdict
@@ -58,7 +61,7 @@ def next_steps(
     elif verdict in ('unknown', 'partial'):
         steps += [f'Look for a cause at {w.joint}: {w.signature}.' for w in diagnosis.left]
         option = '' if learned else '--residual gp, which learns that torque as a map'
-        if diagnosis.baseline != OWN_MISFIT:
+        if diagnosis.baseline != OWN_MISFIT and not simulated:
             option = '--baseline BAG, a recording from before'
         if option:
             steps[-1:] = [f'{" ".join(steps[-1:])} Run armid diagnose with {option}.'.lstrip()]
