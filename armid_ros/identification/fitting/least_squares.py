@@ -140,7 +140,7 @@ class NormalEquations:
         return int(self.products.shape[2]) - 1
 
     def summed(self, scale: npt.ArrayLike = 1.0) -> FloatArray:
-        """Return the sum over joints of products divided by squared scales, (r + 1, r + 1)."""
+        """Return inner products summed over joints, over squared scales, (r + 1, r + 1)."""
         weight = np.broadcast_to(np.asarray(scale, dtype=float), self.counts.shape) ** -2.0
         return np.asarray(np.tensordot(weight, self.products, axes=1))
 

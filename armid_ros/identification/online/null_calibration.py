@@ -203,7 +203,7 @@ class ResidualScale:
         return np.ones(1) if self._value is None else self._value
 
     def learn(self, residual: FloatArray, weights: FloatArray) -> None:
-        """Update the ratio with the residuals of a block in units of assumed noise, (k, m)."""
+        """Update the scale with residuals of a block, in units of the assumed noise, (k, m)."""
         used = np.sum(weights > 0.0, axis=0)
         if not used.any():
             return  # residuals during motion are kept while the arm is at rest

@@ -300,7 +300,7 @@ class RecursiveLeastSquares:
 
 def forget_and_add(root: FloatArray, rows: FloatArray, forgetting: float) -> FloatArray:
     """
-    Return the factor R with rows added, and old information forgotten in their directions.
+    Add rows to the triangular factor R, forget old information in their directions; return R.
 
     In the directions b of U = rows R^-1 = A diag(s) B^T the old information, 1, becomes
     1 - f + s^2 with f = min(s^2, level). It never falls, so the new triangle is the old one

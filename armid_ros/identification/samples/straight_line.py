@@ -59,7 +59,7 @@ class StreamSample:
 @dataclass(frozen=True, eq=False)
 class Excursion:
     """
-    Successive samples off a predicted straight line that later samples are on again.
+    Samples that leave a predicted straight line before later samples return to the line.
 
     Attributes
     ----------
