@@ -293,7 +293,7 @@ class ExcitationPublisherNode(ArmidNode):
         """Raise a TrajectoryError if the arm may move, as path checks block the supervision."""
         self._require_no_run()
         if self._ending is not None and self._ending.reason:
-            raise TrajectoryError('the arm may still move after a stop; wait until it rests')
+            raise TrajectoryError('the arm may not be at rest after a stop; repeat the call later')
 
     def _loaded(self, path: str) -> Excitation:
         if not path:
