@@ -5,13 +5,14 @@ The nuisance parameters that are fitted with each cause: rigid body, friction, m
 
 The residual of recording k, in weighted rows of each joint, is
 
-    y_k = X_k b + B_k (d0 + d_k) + Z_k (g0 + [k is diagnosed] g + u_k) + e_k
+    y_k = X_k b + B_k (d0 + d_m + d_k) + Z_k (g0 + [k is diagnosed] g + u_k) + e_k
 
-where b are base parameters (prior: the description), d0 is the model discrepancy of all recordings
-and d_k that of one recording (Kennedy and O'Hagan, Bayesian calibration of computer models, 2001),
-g are the values of a cause, g0 its values in the baseline, u_k their differences between
-recordings, and e_k is noise. For given standard deviations of d0, d_k and e_k, all of these are
-Gaussian. Each d_k is therefore integrated out of the normal equations of its recording.
+where b are base parameters (prior: the description), d0 is the model discrepancy of all
+recordings, d_m that of a motion in several recordings, and d_k that of one recording (Kennedy and
+O'Hagan, Bayesian calibration of computer models, 2001), g are the values of a cause, g0 its values
+in the baseline, u_k their differences between recordings, and e_k is noise. For given standard
+deviations of d0, d_m, d_k and e_k, all of these are Gaussian. Each d_k is therefore integrated out
+of the normal equations of its recording.
 
 """
 
@@ -24,7 +25,7 @@ from functools import cached_property
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.data.baseline import described_precision, excited_parameters
 from armid_ros.diagnosis.data.discrepancy import discrepancy_columns
-from armid_ros.diagnosis.data.rows import Rows
+from armid_ros.diagnosis.data.rows import REPEATED, Rows
 from armid_ros.diagnosis.search.cause import Cause
 from armid_ros.diagnosis.search.hyperparameters import (
     Hyperparameters,
@@ -122,7 +123,10 @@ class Nuisance:
         prior_precision[given, given] += (_RELATIVE_PRIOR_STD * values[given]) ** -2.0
         joints = range(arm.robot.n_joints)
         functions = discrepancy_columns(rows.data, arm)
-        both = [np.concatenate(pair, axis=2) for pair in zip(columns, functions, strict=True)]
+        both = [
+            np.concatenate([x, f, *(f * (part.fold in group) for group in rows.repeated)], axis=2)
+            for x, f, part in zip(columns, functions, rows.data, strict=True)
+        ]
         rest = [part.residual(arm)[:, :, np.newaxis] for part in rows.data]
         weighted = rows.weighted(both, joints)
         residual = [x[:, :, 0] for x in rows.weighted(rest, joints)]
@@ -141,19 +145,32 @@ class Nuisance:
 
     @cached_property
     def discrepancy(self) -> npt.NDArray[np.intp]:
-        """Indices (n, f) of the f columns for the model discrepancy of each joint."""
-        size = self.columns[0].shape[2]
-        return np.arange(self.base.rank, size).reshape(len(self.columns[0]), -1)
+        """Indices (n, f) of the f columns for the discrepancy of each joint in all recordings."""
+        return np.asarray(self._discrepancies[0])
+
+    @cached_property
+    def _discrepancies(self) -> npt.NDArray[np.intp]:
+        """Indices (1 + g, n, f): of all recordings, and of each of g repeated motions."""
+        columns = np.arange(self.base.rank, self.columns[0].shape[2])
+        return columns.reshape(1 + len(self.rows.repeated), len(self.columns[0]), -1)
+
+    def _own_std(self, hyperparameters: Hyperparameters) -> FloatArray:
+        """Return prior standard deviations (K, n) of d_k, the discrepancy of one recording."""
+        share = np.ones((len(self.columns), 1))
+        for group in self.rows.repeated:
+            share[group] = REPEATED
+        return hyperparameters.own * share * np.array(self.rows.amplitude)
 
     @cached_property
     def acting(self) -> list[list[tuple[npt.NDArray[np.intp], FloatArray]]]:
         """Nonzero columns of each joint in each recording: indices and values (M, c)."""
-        body = np.arange(self.base.rank)
-        places = [np.concatenate([body, own]) for own in self.discrepancy]
-        return [
-            [(place, x[:, place]) for place, x in zip(places, columns, strict=True)]
-            for columns in self.columns
-        ]
+        body, found = np.arange(self.base.rank), []
+        for k, columns in enumerate(self.columns):
+            used = [0, *(1 + n for n, group in enumerate(self.rows.repeated) if k in group)]
+            functions = self._discrepancies[used].swapaxes(0, 1)
+            places = [np.concatenate([body, *own]) for own in functions]
+            found.append([(place, x[:, place]) for place, x in zip(places, columns, strict=True)])
+        return found
 
     @cached_property
     def count(self) -> npt.NDArray[np.intp]:
@@ -261,12 +278,16 @@ class Nuisance:
         body += _MIN_PRECISION * np.diag(np.where(squares > 0.0, squares, 1.0))
         shared = max(hyperparameters.shared, _MIN_PRECISION)
         size = shared * unit[:, np.newaxis] * self.unvisited_factor
+        own = max(hyperparameters.own, _MIN_PRECISION) * np.sqrt(1.0 - REPEATED**2)
+        firsts = [self.rows.amplitude[group[0]] for group in self.rows.repeated]
+        of_motions = [np.repeat(own * unit, size.shape[1]) for unit in firsts]
         of_causes = [one.size * one.unit for one in self.accepted]
-        others = np.concatenate([size.ravel(), *of_causes]) ** -2.0
+        others = np.concatenate([size.ravel(), *of_motions, *of_causes]) ** -2.0
         whole = linalg.block_diag(body, np.diag(others))
         fitted = np.ones(len(whole), dtype=bool)
         fitted[:rank] = (hyperparameters.body > 0.0) | self.unset
         fitted[self.discrepancy.ravel()] = hyperparameters.shared > 0.0
+        fitted[self._discrepancies[1:].ravel()] = hyperparameters.own > 0.0
         used = np.flatnonzero(fitted)
         return used, whole[np.ix_(used, used)]
 
@@ -328,7 +349,7 @@ class Nuisance:
         normaliser = -float(count) / settings[0].correlated_rows * np.log(settings[0].noise)
         if settings[0].own:
             place, functions = self.discrepancy, self.discrepancy.shape[1]
-            size = settings[0].own * np.array(self.rows.amplitude)[fitted]
+            size = self._own_std(settings[0])[fitted]
             precision = square[:, place[:, :, np.newaxis], place[:, np.newaxis, :]] * scale
             precision += np.eye(functions) * size[:, :, np.newaxis, np.newaxis] ** -2.0
             covariance = np.asarray(np.linalg.inv(precision))
@@ -391,7 +412,7 @@ class Nuisance:
         residual = self.residual_at(values, k)
         if not hyperparameters.own:
             return residual
-        size = hyperparameters.own * self.rows.amplitude[k]
+        size = self._own_std(hyperparameters)[k]
         for joint, place in enumerate(self.discrepancy):
             functions = self.columns[k][joint][:, place]
             precision = hyperparameters.precision * functions.T @ functions

@@ -88,6 +88,8 @@ class CauseInformation:
         Whether each group consists of diagnosed recordings.
     visible : ndarray, shape (...)
         Share of the norm of the columns that the nuisance columns cannot reproduce.
+    similarity : ndarray, shape (G, G)
+        Prior correlation of the differences u_k of the groups.
 
     """
 
@@ -95,6 +97,7 @@ class CauseInformation:
     vector: FloatArray
     diagnosed: npt.NDArray[np.bool_]
     visible: FloatArray
+    similarity: FloatArray
 
     @classmethod
     def of(
@@ -147,6 +150,7 @@ class CauseInformation:
             (aim.reshape(count, size) - posterior.values @ border) * unit,
             diagnosed[first],
             np.sqrt(np.clip(seen, 0.0, 1.0)),
+            np.eye(len(first)) if pooled else nuisance.rows.similarity,
         )
 
     @property
@@ -158,7 +162,8 @@ class CauseInformation:
         """Return the information from the diagnosed recordings, or from the baseline."""
         of_it = self.diagnosed == diagnosed
         found = self._at(np.flatnonzero(np.repeat(of_it, self.size)))
-        return replace(found, diagnosed=self.diagnosed[of_it])
+        similarity = self.similarity[np.ix_(of_it, of_it)]
+        return replace(found, diagnosed=self.diagnosed[of_it], similarity=similarity)
 
     def among(self, values: npt.NDArray[np.intp]) -> CauseInformation:
         """Return the information on a subset of the values; the others are fixed at zero."""
@@ -177,7 +182,8 @@ class CauseInformation:
         size, axes = np.linalg.eigh(np.einsum('...gpgq->...pq', blocks) / groups)
         size = np.maximum(size, 1e-9 * np.maximum(size.max(axis=-1, keepdims=True), 1e-300))
         root = axes * np.sqrt(np.minimum(spread / size, THERE**2))[..., np.newaxis, :]
-        return [_block_diagonal(np.stack([root] * groups, axis=-3))]
+        lower = np.linalg.cholesky(self.similarity)
+        return [np.einsum('gh,...pq->...gphq', lower, root).reshape(self.matrix.shape)]
 
     def baseline_root(self) -> FloatArray:
         """Return a root of the prior covariance of the values in the baseline."""

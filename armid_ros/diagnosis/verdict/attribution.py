@@ -171,7 +171,7 @@ def _folds(
     rows = linear.rows
     part_of_arm = np.ones(linear.cross.shape[1], dtype=bool)
     part_of_arm[: linear.base.rank] = problem.patches_body
-    part_of_arm[linear.discrepancy] = False
+    part_of_arm[linear.base.rank : linear.columns[0].shape[2]] = False
     for k in (k for k in problem.recordings if rows.diagnosed[k]):
         block, fold = block_rows([part for part in rows.data if part.fold == k])
         x, y = linear.rows_of(k), linear.residual[k].T

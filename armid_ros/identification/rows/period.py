@@ -1,11 +1,16 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Search for the period of a periodic motion in recorded positions."""
+"""Search for the period of a periodic motion, and for repeated motions, in positions."""
 
 from __future__ import annotations
 
 from armid_ros.motion import FloatArray
 import numpy as np
+from scipy import signal
+
+#: Largest rms difference of positions on equal paths, over the range of motion: at most 0.05 if an
+#: arm repeats a motion, at least 0.35 between motions.
+_SAME_PATH = 0.1
 
 
 def find_period(t: FloatArray, positions: FloatArray) -> tuple[int, slice] | None:
@@ -63,6 +68,18 @@ def find_period(t: FloatArray, positions: FloatArray) -> tuple[int, slice] | Non
     lags = range(max(1, lag - 2 * stride), lag + 2 * stride + 1)
     lag = lags[int(np.argmin([_mean_change(positions, shift, part) for shift in lags]))]
     return lag, slice(part.start, min(part.stop, len(t) - lag))
+
+
+def is_same_path(first: FloatArray, second: FloatArray) -> bool:
+    """Return whether positions (N, n) and (M, n) [rad or m] are equal after a shift in time."""
+    middle, size = first.mean(axis=0), np.maximum(np.ptp(first, axis=0), 0.01)  # rad or m
+    a, b = (first - middle) / size, (second - middle) / size
+    likeness = sum(signal.correlate(x, y) for x, y in zip(a.T, b.T, strict=True))
+    lag, longest = int(np.argmax(likeness)) - (len(b) - 1), max(len(a), len(b))
+    a, b = a[max(lag, 0) :], b[max(-lag, 0) :]
+    both = min(len(a), len(b))
+    apart = np.sqrt(np.mean((a[:both] - b[:both]) ** 2, axis=0))
+    return bool(both > 0.7 * longest and apart.max() < _SAME_PATH)
 
 
 def refined_period(positions: FloatArray, lag: int, where: slice) -> float:
