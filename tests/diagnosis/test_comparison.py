@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The evidence of causes is that of normal distributions, written out here."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 from armid_ros.diagnosis.data.rows import Rows
@@ -28,18 +29,24 @@ USED = Conditioning(200.0, 5.0, 20)
 MISFIT = np.array([0.2, 0.1])
 
 
-@pytest.fixture(scope='module')
-def nuisance(bench):
+@pytest.fixture(scope='module', params=[False, True], ids=['other motions', 'a repeated motion'])
+def nuisance(bench, request):
     """Return two recordings of one day and one of the next, of an arm with a dirty elbow."""
     recordings = bench.recordings(lambda motion, tau: 0.3 * np.sin(3.0 * motion.q), seed=3)
+    if request.param:
+        later = slice(100, None)  # the next day repeats a motion, recorded half a second later
+        noise = 0.1 * np.random.default_rng(4).normal(size=recordings[0].tau.shape)
+        again = replace(recordings[0], tau=recordings[0].tau + noise)
+        recordings[2] = replace(again, t=again.t[later], q=again.q[later], tau=again.tau[later])
     data = tuple(trajectories(recordings, USED))
     rows = Rows(data, (MISFIT,) * 3, 2, (MISFIT,) * 3)
+    assert rows.repeated == [[0, 2]] * request.param
     return Nuisance.of(rows, bench.arm, np.random.default_rng(0))
 
 
 def covariance(nuisance, hyperparameters, more=()):
     """Return the covariance of all informative rows, and which these are."""
-    blocks, use = [], [np.any(x != 0.0, axis=2).ravel() for x in nuisance.columns]
+    use = [np.any(x != 0.0, axis=2).ravel() for x in nuisance.columns]
     flat = [x.reshape(-1, x.shape[2]) for x in nuisance.columns]
     rank, functions = nuisance.base.rank, nuisance.discrepancy.shape[1]
     body = np.linalg.inv(nuisance.prior_precision)
@@ -47,11 +54,11 @@ def covariance(nuisance, hyperparameters, more=()):
     whole = np.concatenate(flat)
     reach = nuisance.unvisited_factor.ravel()
     shared = linalg.block_diag(body, np.diag((hyperparameters.shared * unit * reach) ** 2))
-    total = whole @ shared @ whole.T
-    for x in flat:
-        own = x[:, rank:] * hyperparameters.own * unit
-        blocks.append(own @ own.T + hyperparameters.noise**2 * np.eye(len(x)))
-    total += linalg.block_diag(*blocks)
+    whole = whole[:, : rank + len(unit)]
+    total = whole @ shared @ whole.T + hyperparameters.noise**2 * np.eye(len(whole))
+    own = whole[:, rank:] * hyperparameters.own * unit
+    recording = np.repeat(range(len(flat)), [len(x) for x in flat])
+    total += (own @ own.T) * nuisance.rows.similarity[np.ix_(recording, recording)]
     for columns, size in more:
         total += size**2 * columns @ columns.T
     told = np.concatenate(use)
