@@ -4,7 +4,7 @@ from dataclasses import replace
 
 from armid_ros.errors import IdentificationError
 from armid_ros.identification import IdentificationSettings, identify
-from armid_ros.identification.rows.period import find_period
+from armid_ros.identification.rows.period import find_period, is_same_path
 from armid_ros.identification.rows.signals import (
     Conditioning,
     conditioning,
@@ -123,3 +123,16 @@ def test_slow_motion_is_like_itself_a_while_later_and_repeats_nothing():
     there = 0.1 + 0.9 * 0.5 * (1.0 - np.cos(np.pi * np.linspace(0.0, 1.0, 300)))
     q = np.concatenate([crawl, there])
     assert find_period(np.arange(len(q)) / 100.0, np.column_stack([q, -0.5 * q])) is None
+
+
+def test_a_path_is_the_same_after_a_shift_in_time_and_with_noise_but_not_in_another_motion():
+    rng = np.random.default_rng(0)
+    t = np.arange(1000) / 50.0
+    first, other = (
+        np.sin(t[:, np.newaxis] * rng.uniform(1.0, 3.0, 4) + rng.uniform(0.0, 6.0, 4))
+        for _ in range(2)
+    )
+    repeated = first[60:] + 0.005 * rng.normal(size=first[60:].shape)
+    assert is_same_path(first, repeated) and is_same_path(repeated, first)
+    assert not is_same_path(first, other)
+    assert not is_same_path(first, first[600:])  # a short part of it
