@@ -89,7 +89,7 @@ class Backlash(Displacing):
     instantaneous = False
 
     def displacements(self, motion: Motion, arm: Arm) -> Displacement:
-        """Return the link displacement per unit of backlash: minus twist over gap, -1/2 to 1/2."""
+        """Return the link displacement per unit of backlash, -1/2 to 1/2: minus twist over gap."""
         load = arm.load(motion)
         inertia = np.diagonal(arm.load_derivatives(motion)[2], axis1=1, axis2=2)
         place = np.zeros(motion.q.shape)

@@ -64,7 +64,7 @@ class Cause:
 
     @property
     def key(self) -> tuple[str, tuple[str, ...], tuple[int, ...]]:
-        """Name, joints and indices of fitted values, which identify the cause."""
+        """Name and joints of the effect, and indices of its fitted values: these identify a cause."""
         return self.effect.name, self.effect.joints, self.kept
 
     def acts(self, diagnosed: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:

@@ -155,7 +155,7 @@ def percent(share: float) -> str:
 
 
 def _sentences(findings: Sequence[Finding]) -> str:
-    """Return sentences on all causes and their rivals, the two largest causes together."""
+    """Return sentences on all causes and rivals; the first names the two largest causes."""
     clauses: list[str] = []
     assumed: list[str] = []
     for group in by_cause(findings):

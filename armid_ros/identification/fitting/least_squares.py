@@ -305,7 +305,7 @@ def _positive(scale: FloatArray) -> FloatArray:
 
 def factored(products: FloatArray) -> tuple[FloatArray, FloatArray]:
     """
-    Return F such that F' F equals given products of columns, and the inverse of F, each (p, p).
+    Return a factor F (p, p) of a Gram matrix, F' F = `products`, and the inverse of F.
 
     Eigenvalues below the rounding error are raised to the rounding error.
 

@@ -21,7 +21,7 @@ Moment = tuple[float, FloatArray]
 
 @dataclass
 class _Sender:
-    """Sender of joint states: its joints, and its samples (s, k) that are not merged yet."""
+    """Joints of a sender of joint states, and its samples that wait to be merged, (s, k joints)."""
 
     joints: tuple[int, ...]
     samples: deque[Moment] = field(default_factory=lambda: deque(maxlen=1000))
