@@ -174,6 +174,6 @@ def story(changed: ArmModel, diagnosed: DiagnosisResult) -> dict[str, Any]:
 
 
 def _found(effect: Effect, diagnosed: DiagnosisResult) -> bool:
-    """Return whether the first effect that a diagnosis names has the name and joints of `effect`."""
+    """Return whether a diagnosis names `effect` first, on the same joints."""
     first = diagnosed.core.findings[:1]
     return any((one.name, one.joints) == (effect.name, effect.joints) for one in first)

@@ -64,7 +64,7 @@ class Cause:
 
     @property
     def key(self) -> tuple[str, tuple[str, ...], tuple[int, ...]]:
-        """Name and joints of the effect, and indices of its fitted values: these identify a cause."""
+        """Identity of a cause: name and joints of its effect, and indices of its fitted values."""
         return self.effect.name, self.effect.joints, self.kept
 
     def acts(self, diagnosed: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:

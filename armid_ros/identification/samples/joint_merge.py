@@ -21,7 +21,7 @@ Moment = tuple[float, FloatArray]
 
 @dataclass
 class _Sender:
-    """Joints of a sender of joint states, and its samples that wait to be merged, (s, k joints)."""
+    """Joints of a sender of joint states, and its samples (s, k joints) not yet merged."""
 
     joints: tuple[int, ...]
     samples: deque[Moment] = field(default_factory=lambda: deque(maxlen=1000))
