@@ -157,7 +157,8 @@ class CauseComparison:
     def _add_causes(self, accepted: list[CauseResult], ranking: Ranking) -> Accepted:
         """Accept the best cause repeatedly until no further cause is significant."""
         nuisance = ranking.nuisance
-        while len(accepted) < _MOST:
+        # a fixed number of steps, because two causes can make each other redundant without end
+        for _ in range(_MOST - len(accepted)):
             best = self.best(ranking, accepted)
             if best is None:
                 break
