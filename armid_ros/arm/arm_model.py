@@ -215,7 +215,7 @@ class ArmModel:
         return self if known else replace(self, effects=effects)
 
     def link_motion(self, motion: Motion) -> Motion:
-        """Return the true motion of the links: recorded motion plus displacements by effects."""
+        """Return the motion of the links: recorded motion plus displacements of the effects."""
         displacement = self._acting.displacement
         if displacement is None:
             return motion

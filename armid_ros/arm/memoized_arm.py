@@ -66,7 +66,7 @@ class _Memoized(ArmModel):
     _joint_torque = _once(ArmModel.joint_torque)
 
     def link_motion(self, motion: Motion) -> Motion:
-        """Return the true motion of the links: recorded motion plus displacements by effects."""
+        """Return the motion of the links: recorded motion plus displacements of the effects."""
         return motion if self.action().displacement is None else self._moved(motion)
 
     def regressor(self, motion: Motion) -> _Regressor | None:

@@ -75,7 +75,7 @@ def next_command(then: str, result: Shown) -> str:
 def _subject(
     then: str, result: Shown, given: dict[str, Any]
 ) -> tuple[str | Path, list[Path], list[Any]]:
-    """Return the robot, recordings and further options for the next command, named `then`."""
+    """Return the robot, the recordings and other options to suggest for the command `then`."""
     robot, out = given.get('robot_source'), Path(given.get('out') or '')
     bags = list(given.get('bags') or filter(None, [given.get('bag')]))
     more: list[Any] = []

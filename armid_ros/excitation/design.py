@@ -149,13 +149,13 @@ def design(
     prior = None if prior_information is None else np.asarray(prior_information, dtype=float)
     if prior is not None:
         expected = (problem.base.rank,) * 2
-        if rival is not None or prior.shape != expected:
+        if rival is not None:
+            raise TrajectoryError("the criterion 'T' does not use prior information; omit it")
+        if prior.shape != expected or not np.all(np.isfinite(prior)):
             raise TrajectoryError(
-                f'prior information has to be a matrix of shape {expected} over the base '
-                f"parameters, not of shape {prior.shape}, and cannot be used with criterion 'T'"
+                f'prior information of shape {prior.shape}: it has to be a matrix of finite '
+                f'numbers of shape {expected}, with a row for each base parameter'
             )
-        if not np.all(np.isfinite(prior)):
-            raise TrajectoryError('prior information: all entries have to be finite numbers')
 
     search = Search(problem, clearance, prior, rng.spawn(1)[0], progress)
     stopped = search.run()

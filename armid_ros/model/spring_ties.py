@@ -71,7 +71,7 @@ class TieGeometry(NamedTuple):
 
     def pulled(self, slack: float | FloatArray) -> FloatArray:
         """
-        Return torques of the first machine per unit stiffness of each spring, (N, n, S) [m^2].
+        Return joint torques of the first machine per unit stiffness of a spring, (N, n, S) [m^2].
 
         A spring pulls only if it is longer than its slack [m].
 
@@ -125,7 +125,7 @@ def tie_columns_derivatives(
     slack: float | FloatArray = 0.0,
 ) -> tuple[FloatArray, FloatArray]:
     """
-    Differentiate ``TieGeometry.pulled`` by the joint positions of both machines.
+    Return the derivatives of ``TieGeometry.pulled`` by the positions `q` and `other_q`.
 
     Parameters
     ----------

@@ -213,7 +213,7 @@ class JointStateMergerNode(ArmidNode):
         some = [k for k, name in enumerate(called) if math.isfinite(known.get(name, math.nan))]
         if not some:
             raise RecordingError(
-                f'torques of {", ".join(known)} were received, but none of the joints '
+                f'torques were received for {", ".join(known)}, but not for the joints '
                 f'{", ".join(called)}; correct the parameter effort_joints or joints'
             )
         torques = np.array([known[called[k]] for k in some]) * self._gains[some]

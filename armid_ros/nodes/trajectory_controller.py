@@ -187,7 +187,7 @@ class TrajectoryController:
             self._publisher.publish(trajectory)
 
     def trouble(self, patience: float) -> str:
-        """Return a message if the controller is lost, or silent for `patience` [s]; else ''."""
+        """Return a message if the action is gone for `patience` [s] or did not answer; else ''."""
         goal, now = self._goal, time.monotonic()
         if goal is None or not self._by_action:
             return ''

@@ -59,7 +59,7 @@ def _values(trial: CauseResult) -> tuple[FloatArray, FloatArray]:
 
 
 def on_outer_link(explanation: Explanation) -> Explanation:
-    """Move each load that two links could carry to the outer link, and refit."""
+    """Move a load to the outer link if it fits two links equally well, and refit."""
     if explanation.problem is None:
         return explanation
     robot, steps, fitted = explanation.given.robot, explanation.steps, explanation.fitted

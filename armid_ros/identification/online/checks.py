@@ -31,7 +31,7 @@ class StreamChecks:
         self._judged: tuple[bytes, str] | None = None
 
     def take(self, t: float) -> None:
-        """Update the duration of motion with the time stamp [s] of an undamaged sample."""
+        """Update the duration since the first motion, by the time stamp of a valid sample [s]."""
         if self._moved is None:
             lowest, highest = self._positions
             self._moved = t if np.any(highest - lowest > REST_RANGE) else None

@@ -181,7 +181,7 @@ class JointStateLayout:
 
     @cached_property
     def fixed(self) -> tuple[npt.NDArray[np.void], npt.NDArray[np.void]]:
-        """Return the bytes that all messages of this layout have in common, and their bit mask."""
+        """Return a template and a mask; the mask marks the bits that all messages share."""
         expected, mask = np.zeros((2, 1), self.record)
         numbers = {'encapsulation': int(self.order == '<'), 'frame_length': self.frame_length}
         numbers |= {f'n_{name}': n for name, n in zip(QUANTITIES, self.counts, strict=True)}

@@ -270,9 +270,9 @@ def identify_two_inertia(
     first, beta, gamma, rotor = rigid.estimate.values[:4].tolist()
     if not (first > 0.0 and beta > 0.0 and first * beta > gamma**2):
         raise IdentificationError(
-            f'no arm has the fitted inertias: alpha + mm gear^2 = {first:.3g} (link 1 and '
-            f'rotor 1), beta = {beta:.3g} (link 2), gamma = {gamma:.3g} kg m^2 (coupling). Is the '
-            'motion strong enough? Are torques and velocities positive in the same direction?'
+            f'the fitted inertias are impossible: alpha + mm gear^2 = {first:.3g} (link 1 and '
+            f'rotor 1), beta = {beta:.3g} (link 2), gamma = {gamma:.3g} kg m^2 (coupling). Record '
+            'a faster motion, and check the signs of torques and velocities'
         )
     alpha = max(first - max(rotor, 0.0), 1.01 * gamma**2 / beta)
     known = replace(
