@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from armid_ros.effects.base import Arm, Unexplained
 from armid_ros.effects.joint_law import JointLaw, JointStates
-from armid_ros.effects.quantities import MIN_Z_SCORE, Quantity, Shape
+from armid_ros.effects.quantities import Quantity, Shape
 from armid_ros.motion import FloatArray
 from armid_ros.robots import Robot
 import numpy as np
@@ -38,10 +38,6 @@ class JointSpring(JointLaw):
     def law(self, x: JointStates) -> tuple[FloatArray, ...]:
         """Return the spring torque per unit of stiffness, q, and per unit of preload, 1."""
         return x.q, np.ones_like(x.q)
-
-    def plausible(self, values: FloatArray, std: FloatArray, arm: Arm) -> bool:
-        """Return whether the stiffness is significant; a preload alone is a torque offset."""
-        return bool(values[0] > MIN_Z_SCORE * std[0])
 
 
 @dataclass(frozen=True)
