@@ -264,7 +264,7 @@ def _as_diagnosis(
     places = locate_explained(explanation, unseen or evidence, settings) if found else left
     explainer.tell(1.0, word.word)
     small = [x for x in found if settings.everything and x.share < settings.thresholds.headline]
-    remarks = _remarks(found, worse, explanation, word.word, doubt, explainer)
+    remarks = _remarks(found, worse, explanation, word.word, doubt, explainer, gap)
     untested = explanation.untested if before is not None else ''
     return Diagnosis(
         verdict=word.word,
@@ -339,10 +339,13 @@ def _remarks(
     verdict: str,
     doubt: str,
     explainer: Explainer,
+    gap: Gap,
 ) -> list[str]:
     """Return notes: on a model that may be wrong or is not patched, and on unchecked joints."""
     names = ' and '.join(name_in_words(one.name) for one in found)
+    hidden = gap.predicted and gap.closed < explainer.settings.thresholds.inexact
     remarks = {
+        f'No held-out recording shows {names}; the share is that of the others.': found and hidden,
         f'The model is not patched: {names} would make it worse in {", ".join(worse)}.': worse,
         explanation.untested: verdict == 'unknown',
         doubt: verdict != 'consistent',  # then it precedes the verdict

@@ -20,7 +20,6 @@ from armid_ros.diagnosis.search.explanation import Explanation
 from armid_ros.diagnosis.search.joint_fit import JointFit
 from armid_ros.diagnosis.search.nuisance import Nuisance
 from armid_ros.diagnosis.settings import DiagnosisSettings
-from armid_ros.identification.fitting.identifiability import HALF_WIDTH
 from armid_ros.motion import FloatArray
 import numpy as np
 
@@ -50,11 +49,6 @@ class Attribution:
         share = self.gains[list(names)].sum() / max(float(self.gap.sum()), 1e-300)
         return min(float(share), 1.0)
 
-    def worsens(self, cause: int) -> bool:
-        """Return whether a cause increases the squared residual significantly, at 95 %."""
-        gains = self.gains[cause]
-        return bool(gains.sum() + HALF_WIDTH * gains.std() * np.sqrt(len(gains)) < 0.0)
-
     def interval(self, names: Sequence[int], rng: np.random.Generator) -> tuple[float, float]:
         """Return the 95 % interval of the share that given causes explain together."""
         # with 500 resamples, the ends of the interval are accurate to a tenth of its width
@@ -73,9 +67,9 @@ def headline(
 
     Shares are cross-validated, and also measured on held-out recordings if there are any. A cause
     is minor if its larger share is below `least`, or its returned share below `inexact`, and no
-    joint has a gap without it: a cause may act in some motions only. It is minor as well if it
-    increases one of the prediction errors significantly, or if its returned share is below
-    -`inexact`. The returned shares are those of held-out recordings if there are any.
+    joint has a gap without it: a cause may act in some motions only. It is minor as well if one of
+    its shares is below -`inexact`. The returned shares are those of held-out recordings if there
+    are any that show a cause.
 
     Parameters
     ----------
@@ -105,10 +99,11 @@ def headline(
         opens = (fewer.chi2_per_row > limits) & (explanation.chi2_per_row <= limits)
         if not np.any(opens):
             return headline(fewer, unseen, least, settings)
-    worse = [k for k in causes if stated[k] < -inexact or any(x.worsens(k) for x in measured)]
+    worse = [k for k in causes if min(one.share([k]) for one in measured) < -inexact]
     if worse:
         return headline(explanation.without(*worse), unseen, least, settings)
-    return explanation, held_out or fitted
+    seen = held_out is not None and held_out.share(causes) >= inexact
+    return explanation, measured[-1] if seen else fitted
 
 
 def held_out_gains(
