@@ -97,15 +97,6 @@ def recorded(run: SimulatedRun) -> Motion:
     return Motion(run.joints, run.t, run.q, run.dq, run.truth.ddq + beyond, run.tau)
 
 
-def moving(run: SimulatedRun) -> FloatArray:
-    """Mark where no joint or shaft reverses, and the run neither begins nor ends."""
-    dq = run.truth.dq
-    speeds = np.abs(np.column_stack([dq, dq[:, 4] + dq[:, 5]]))
-    chosen = np.all(speeds > 0.03, axis=1)
-    chosen[:30] = chosen[-30:] = False
-    return chosen
-
-
 def rms(x: FloatArray) -> float:
     return float(np.sqrt(np.mean(x**2)))
 
@@ -120,7 +111,10 @@ def test_what_is_recorded_is_what_the_model_predicts(humanoid, reference, name) 
     course = temperature_course('30:60:1', humanoid.n_joints, 2.0)
     arm = at_temperature(arm_with(humanoid, name), course)
     run = simulate(arm, reference, rng=np.random.default_rng(0))
-    motion, chosen = recorded(run), moving(run)
+    motion, dq = recorded(run), run.truth.dq
+    # where no joint or shaft reverses, and the run neither begins nor ends
+    chosen = np.all(np.abs(np.column_stack([dq, dq[:, 4] + dq[:, 5]])) > 0.03, axis=1)
+    chosen[:30] = chosen[-30:] = False
     assert chosen.mean() > 0.75
     without = rms((ArmModel(humanoid).torque(motion) - run.tau)[chosen])
     error = rms((arm.torque(motion) - run.tau)[chosen])
@@ -147,17 +141,13 @@ def test_an_arm_that_is_read_step_by_step_reads_the_same(humanoid, reference, na
     arm = arm_with(humanoid, name)
     whole = simulate(arm, reference, rng=np.random.default_rng(0))
     live = SimulatedArm(arm, rng=np.random.default_rng(0), start=reference.q[0])
-    live.set_trajectory(stopped(reference))
+    # the trajectory ends at rest, which an arm that stands by asks for
+    t = np.append(reference.t, reference.t[-1] + 1.0)
+    q = np.vstack([reference.q, MIDDLE])
+    dq, ddq = (np.vstack([x, np.zeros(6)]) for x in (reference.dq, reference.ddq))
+    live.set_trajectory(Reference(reference.joints, t, q, dq, ddq))
     for steps in (1, 7, 30, 200):
         sample = live.advance(steps)
     row = sample.steps
     np.testing.assert_allclose(sample.q, whole.q[row], atol=1e-9)
     np.testing.assert_allclose(sample.tau, whole.tau[row], atol=1e-4)
-
-
-def stopped(reference: Reference) -> Reference:
-    """Bring the trajectory to rest at its end, which an arm that stands by asks for."""
-    t = np.append(reference.t, reference.t[-1] + 1.0)
-    q = np.vstack([reference.q, MIDDLE])
-    dq, ddq = (np.vstack([x, np.zeros(6)]) for x in (reference.dq, reference.ddq))
-    return Reference(reference.joints, t, q, dq, ddq)

@@ -35,7 +35,7 @@ import numpy as np
 #: Length of a block [s].
 BLOCK_LENGTH = 0.25
 #: Samples in one piece of work; fewer arrive in the meantime, so that the queue shrinks.
-_SAMPLES_PER_PIECE = 10
+_SAMPLES_PER_PIECE = 8
 #: Arrays of a `Motion`.
 _OF_MOTION = 't', 'q', 'dq', 'ddq'
 Item = TypeVar('Item')
@@ -274,7 +274,7 @@ class ChangeWatch:
     @property
     def _samples_per_update(self) -> int:
         # with forgetting, samples are learned one by one; otherwise, this is the longest piece
-        return 4 if self._estimator.forgetting < 1.0 else 8
+        return 4 if self._estimator.forgetting < 1.0 else 6
 
     def _widened(self, rows: Sequence[Row]) -> Pieces[list[WeightedSample]]:
         """Return samples whose regressor rows include the columns of nuisance parameters."""

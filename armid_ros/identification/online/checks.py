@@ -6,7 +6,6 @@ from __future__ import annotations
 
 from armid_ros.identification.rows.checks import MIN_DURATION, position_problem, REST_RANGE, SILENT
 from armid_ros.identification.samples.spikes import SpikeGate
-from armid_ros.motion import FloatArray
 from armid_ros.robots import Robot
 import numpy as np
 
@@ -29,35 +28,28 @@ class StreamChecks:
         self._moved: float | None = None
         self._moving = 0.0
         self._judged: tuple[bytes, str] | None = None
+        #: Whether all measured torques had been constant when `error` was last read.
+        self.silent = True
 
     def take(self, t: float) -> None:
         """Update the duration since the first motion, by the time stamp of a valid sample [s]."""
         if self._moved is None:
-            lowest, highest = self._positions
-            self._moved = t if np.any(highest - lowest > REST_RANGE) else None
+            positions = slice(self._robot.n_joints)
+            ranges = self._gate.highest[positions] - self._gate.lowest[positions]
+            self._moved = t if np.any(ranges > REST_RANGE) else None
         self._moving = 0.0 if self._moved is None else t - self._moved
-
-    @property
-    def _positions(self) -> tuple[FloatArray, FloatArray]:
-        n = self._robot.n_joints
-        return self._gate.lowest[:n], self._gate.highest[:n]
-
-    @property
-    def silent(self) -> bool:
-        """Whether all measured torques have been constant since the start."""
-        n = self._robot.n_joints
-        return bool((self._gate.highest[-n:] <= self._gate.lowest[-n:]).all())
 
     @property
     def error(self) -> str:
         """Return the fault that prevents identification; empty if there is none."""
+        lowest, highest, n = self._gate.lowest, self._gate.highest, self._robot.n_joints
+        self.silent = self.silent and bool((highest[-n:] <= lowest[-n:]).all())
         if self.silent and abs(self._moving) > MIN_DURATION:
             return SILENT
         # the ranges are checked at each row, but seldom increase
-        lowest, highest = self._positions
-        ranged = lowest.tobytes() + highest.tobytes()
+        ranged = lowest[:n].tobytes() + highest[:n].tobytes()
         if self._judged is None or self._judged[0] != ranged:
-            self._judged = ranged, position_problem(self._robot, lowest, highest)
+            self._judged = ranged, position_problem(self._robot, lowest[:n], highest[:n])
         return self._judged[1]
 
 

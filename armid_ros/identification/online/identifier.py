@@ -45,7 +45,6 @@ from armid_ros.model import BaseParameters, regressor
 from armid_ros.motion import FloatArray, Motion
 import numpy as np
 import numpy.typing as npt
-import pinocchio as pin
 
 __all__ = ['OnlineIdentifier', 'OnlineSample', 'OnlineSettings']
 
@@ -115,7 +114,6 @@ class OnlineIdentifier:
         self.base: BaseParameters = arm.base_parameters(rng)
         self._kept = np.array([-1, *self.base.independent]) + 1  # torque and base columns
         self._searches = settings.false_alarm_time is not None  # for changes, at any time
-        self._data = robot.model.createData()
         held = {joint for e in arm.effects if e.holds_at_rest for joint in e.joints}
         self._held = np.array([joint in held for joint in robot.joints])
         self.reset()
@@ -139,6 +137,7 @@ class OnlineIdentifier:
         self._row_filter = TripleLag(settings.cutoff)
         self._row_period = 1.0 / settings.row_rate
         self._work = Background()
+        self._due = 0.0  # number of pieces of background work that are due
         self._had_row = False
         self._estimator = RecursiveLeastSquares(
             self.base.parameters,
@@ -156,8 +155,10 @@ class OnlineIdentifier:
         self._pending: tuple[Row, FloatArray] | None = None  # with its innovation
         self._n_changes = 0
         self.latest: tuple[OnlineSample, ...] = ()
-        # of residuals: weighted squares, their weights, and the standard deviation
-        self._squares, self._counts, self._deviation = np.zeros((3, robot.n_joints))
+        # of residuals: weighted squares, and their weights
+        self._squares, self._counts = np.zeros((2, robot.n_joints))
+        # largest negligible error of each signal: positive for torques, else 0
+        self._negligible = np.zeros((2 + settings.measured_velocity) * robot.n_joints)
         self._generation = -1
         self._last_row: float | None = None
         self._last_moving = np.full(robot.n_joints, -np.inf)
@@ -191,7 +192,7 @@ class OnlineIdentifier:
         self.latest = ()
         if signal is not None:
             self._missing.take(t, self._filter.period)
-            good = self._gate.take(t, signal, self._negligible_error)
+            good = self._gate.take(t, signal, self._negligible)
             found = [self._process(sample) for sample in good]
             self.latest = tuple(one for one in found if one is not None)
         # background work runs with samples that need no other work, if there are any
@@ -202,11 +203,14 @@ class OnlineIdentifier:
             # samples per row from which the update with a row has a sample to itself. With fewer
             # samples, the update shares its sample with pieces of background work.
             busy = added and 4.0 * period <= self._row_period
+        # at least 400 pieces per second; at 200 rows per second, up to 280 are needed
+        self._due = min(self._due, 2.0) + 400.0 * period
         if not busy:
             self._add_pending_row()
             if not self._gate.settle():  # a full window would always end with a row
-                # smallest number of pieces per second
-                self._work.advance(max(1, round(400.0 * period)))
+                pieces = max(1, int(self._due))
+                self._work.advance(pieces)
+                self._due = max(0.0, self._due - pieces)
         self._had_row = bool(self.latest)
         return self.latest[-1] if self.latest else None
 
@@ -253,7 +257,7 @@ class OnlineIdentifier:
         self._last_row = motion.t
         # after ten time constants of the row filter, the effect of its start or of a rest is 3e-3
         used = motion.t - self._last_useless > 10.0 / self._row_filter.pole
-        usable = not (self._checks.silent or self._checks.error)
+        usable = not (self._checks.error or self._checks.silent)
         return self._new_row(motion, step, used & usable, begins)
 
     def estimate(self) -> Estimate:
@@ -372,27 +376,20 @@ class OnlineIdentifier:
         """Return the torque prediction of a filtered joint state; store its regression row."""
         state = (motion.q[None], motion.dq[None], motion.ddq[None])
         one = Motion(self.arm.robot.joints, np.array([motion.t]), *state)
-        robot = self.arm.robot
-        if robot.mechanism is None:
-            rigid = pin.computeJointTorqueRegressor(
-                robot.model, self._data, motion.q, motion.dq, motion.ddq
-            )
-        else:
-            rigid = regressor(robot, one)
-        rigid = rigid.reshape(robot.n_joints, -1)  # one joint has a vector
-        columns = [motion.tau[:, np.newaxis], rigid, self.arm.effect_columns(one)[0]]
-        stacked = np.concatenate(columns, axis=1).take(self._kept, axis=1)
-        filtered = self._row_filter.update(step, stacked.reshape(-1))[2].reshape(stacked.shape)
-        measured, rows = filtered[:, 0], filtered[:, 1:]
+        rigid, effects = regressor(self.arm.robot, one)[0], self.arm.effect_columns(one)[0]
+        columns = np.concatenate([motion.tau[:, np.newaxis], rigid, effects], axis=1)
+        used_columns = columns.take(self._kept, axis=1)
+        filtered = self._row_filter.update(step, used_columns.reshape(-1))[2]
         noise = self._noise
         assert noise is not None
         gain, independent = noise.gain, noise.independent(min(step, self._row_period))
         stamp = motion.t - (self.delay or 0.0)
-        sample = WeightedSample(rows / gain, measured / gain, np.asarray(used * independent))
+        row = (filtered / gain).reshape(used_columns.shape)
+        sample = WeightedSample(row[:, 1:], row[:, 0], np.asarray(used * independent))
         self._add_pending_row()
-        innovation = sample.tau - sample.rows @ self._estimator.values
-        self._pending = Row(stamp, sample, motion, step, gain, begins), innovation
-        return OnlineSample(stamp, measured, measured - innovation * gain, used)
+        predicted = sample.rows @ self._estimator.values
+        self._pending = Row(stamp, sample, motion, step, gain, begins), sample.tau - predicted
+        return OnlineSample(stamp, sample.tau * gain, predicted * gain, used)
 
     def _add_pending_row(self) -> bool:
         """Update the estimate with a pending regression row; return whether a row was pending."""
@@ -413,16 +410,8 @@ class OnlineIdentifier:
         )
         self._counts = estimator.forgetting * self._counts + sample.weights
         known = np.maximum(self._counts, _SMALLEST)
-        self._deviation = np.sqrt(np.maximum(self._squares, 0.0) / known)
-        scale = estimator.scale(sample.weights)
-        self._scores.add(sample.rows * scale[:, None], sample.tau * scale, estimator.values)
+        deviation = np.sqrt(np.maximum(self._squares, 0.0) / known)
+        assert self._noise is not None
+        np.multiply(deviation, self._noise.single, out=self._negligible[-len(deviation) :])
+        self._scores.add(sample, estimator.scale(sample.weights), estimator.values)
         return True
-
-    @property
-    def _negligible_error(self) -> FloatArray:
-        """Return the largest negligible error of each signal: positive for torques, else 0."""
-        n = self.arm.robot.n_joints
-        floor = np.zeros((3 if self.settings.measured_velocity else 2) * n)
-        if self._noise is not None:
-            np.multiply(self._deviation, self._noise.single, out=floor[-n:])
-        return floor

@@ -211,7 +211,7 @@ class ResidualScale:
         self._blocks.append(np.where(used > 0, squares / np.maximum(used, 1), np.nan))
         if len(self._blocks) < 16:  # with fewer blocks, the assumed noise is used
             return
-        later = np.array(self._blocks)[len(self._blocks) // 2 :]
+        later = np.array(list(self._blocks)[len(self._blocks) // 2 :])
         known = np.any(later > 0.0, axis=0)
         value = np.ones(later.shape[1]) if self._value is None else self._value.copy()
         # medians of the columns without NaN; numpy's nanmedian takes ten times as long

@@ -21,7 +21,7 @@ from itertools import pairwise
 
 from armid_ros.identification.fitting.covariance import MIN_RESIDUAL_SHARE
 from armid_ros.identification.online.background import Background, Job, Pieces
-from armid_ros.identification.online.recursive import PRIOR_STD
+from armid_ros.identification.online.recursive import PRIOR_STD, WeightedSample
 from armid_ros.motion import FloatArray
 import numpy as np
 from scipy import linalg, stats
@@ -72,25 +72,28 @@ class RobustCovariance:
         self._rows: FloatArray | None = None
         self._count = 0
 
-    def add(self, rows: FloatArray, tau: FloatArray, values: FloatArray) -> None:
+    def add(self, sample: WeightedSample, scale: FloatArray, values: FloatArray) -> None:
         """
         Add one sample to the present window.
 
         Parameters
         ----------
-        rows, tau : ndarray, shapes (m, P) and (m,)
-            Rows and torques in units of the assumed noise; zero where not used.
+        sample : WeightedSample
+            Rows and torques.
+        scale : ndarray, shape (m,)
+            Factors that scale the rows to unit noise; zero where not used.
         values : ndarray, shape (P,)
             Estimate for the residuals of the window, used if this sample ends a window.
 
         """
         if self._rows is None:
-            self._rows = np.empty((len(tau), self._window, rows.shape[1] + 1))
-        self._rows[:, self._count, :-1] = rows
-        self._rows[:, self._count, -1] = tau
+            self._rows = np.empty((self._window, len(scale), len(values) + 1))
+        row = self._rows[self._count]
+        np.multiply(sample.rows, scale[:, np.newaxis], out=row[:, :-1])
+        np.multiply(sample.tau, scale, out=row[:, -1])
         self._count += 1
         if self._count == self._window:
-            self._work.begin(self._add_window(self._rows, values))
+            self._work.begin(self._add_window(self._rows.swapaxes(0, 1), values))
             self.interrupt()
 
     def allow_change(self, directions: FloatArray, values: FloatArray) -> None:

@@ -31,7 +31,8 @@ from scipy import signal as signals
 _CUTOFF_OF_POLE = float(np.sqrt(2.0 ** (1.0 / 3.0) - 1.0))
 #: Cut-off of the motion filter over that of the row filter, where the sampling rate allows it.
 MOTION_FILTER_RATIO = 4.0
-#: Largest valid position or torque [SI units]; squares of larger numbers dominate all others.
+#: Largest valid norm of positions and torques [SI units]; squares of larger numbers dominate all
+#: others.
 MAX_MAGNITUDE = 1e6
 
 
@@ -94,7 +95,7 @@ class TripleLag:
         if self._state is None:
             self._state = np.repeat(signal[np.newaxis], 5, axis=0)
             return self._state[:3].copy()
-        if dt != self._dt:
+        if abs(dt - self._dt) > 1e-9 * dt:  # more than the rounding error of the stamps
             self._set_step(dt)
         state = self._state
         np.subtract(signal, state[3], out=state[4])
@@ -143,7 +144,7 @@ class CausalFilter:
     Motion filter that smooths and differentiates a stream of joint states.
 
     The sampling period is the median of the first intervals, learned again after every restart.
-    A sample with a wrong length, or with a number that is not finite or above MAX_MAGNITUDE, is
+    A sample of wrong length, with a number that is not finite or a norm above MAX_MAGNITUDE, is
     left out and counted; the signal is interpolated across it. A gap, or a stamp that does not
     increase, restarts the filter. A started filter has no output until its initial state has
     decayed. A `SpikeGate` removes full turns of positions beforehand.
@@ -247,9 +248,9 @@ class CausalFilter:
                 self.rejected['wrong_length'] += 1
                 return None
         signal = np.concatenate(arrays)
-        largest = float(np.abs(signal).max())
-        if not (largest <= MAX_MAGNITUDE and math.isfinite(t)):
-            finite = math.isfinite(largest) and math.isfinite(t)
+        norm = math.hypot(*signal.tolist())
+        if not (norm <= MAX_MAGNITUDE and math.isfinite(t)):
+            finite = math.isfinite(norm) and math.isfinite(t)
             self.rejected['impossible' if finite else 'not_finite'] += 1
             return None
         return signal

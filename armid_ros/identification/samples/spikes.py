@@ -285,14 +285,14 @@ class SpikeGate:
         innovation = innovation_of(self._reference, sample, self._period)
         # a smooth signal keeps its curvature
         curvature = self._level.model.correlation * self._curvature * innovation.acceleration
-        judged = innovation._replace(error=innovation.error - curvature)
+        error = innovation.error - curvature
         # Limits grow with `noise` and `acceleration`, and in proportion if both grow alike. They
         # are at least the limits over one period times the smaller factor: a fast test.
         growth = min(innovation.noise, innovation.acceleration)
         least = np.maximum(growth * self._level.model.limits_of_a_period, self._floor)
-        if not self._pending and (np.abs(judged.error) <= least).all():
+        if not self._pending and (np.abs(error) <= least).all():
             return self._accept([sample], innovation)
-        ratio = self._ratio_to_limit(judged)
+        ratio = self._ratio_to_limit(innovation._replace(error=error))
         if not self._pending:
             if float(np.max(ratio)) <= 1.0:
                 return self._accept([sample], innovation)

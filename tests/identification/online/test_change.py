@@ -48,11 +48,6 @@ def row(t, rows, tau, weights):
     return Row(t, WeightedSample(rows, tau, weights), None, 0.0, 1.0)
 
 
-def watching(estimator, candidate):
-    """Return what watches for one change, and does all its work at once."""
-    return ChangeWatch(estimator, NoNuisance(), [candidate], FALSE_ALARM_TIME, Foreground())
-
-
 def learned_and_block(
     rng, delta: float, seen: int = 4, directions=CHANGED, noise=1.0
 ) -> tuple[RecursiveLeastSquares, Block, np.ndarray, np.ndarray]:
@@ -211,7 +206,8 @@ def stepped(seed, louder=1.0, rests=False):
     parameters = tuple(ParameterName(f'p{k}', '', '') for k in range(3))
     step = np.array([[0.0], [0.0], [1.0]])
     candidate = ChangeCandidate('friction', 'elbow', parameters[2:], step, step)
-    watch = watching(RecursiveLeastSquares(parameters, np.ones(4)), candidate)
+    estimator = RecursiveLeastSquares(parameters, np.ones(4))
+    watch = ChangeWatch(estimator, NoNuisance(), [candidate], FALSE_ALARM_TIME, Foreground())
     for k in range(6000):
         after, rows = k >= 5000, rng.normal(size=(4, 3))
         noise = rng.normal(size=4) * (louder if after else 1.0)

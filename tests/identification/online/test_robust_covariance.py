@@ -7,6 +7,7 @@ from __future__ import annotations
 from armid_ros.arm import ArmModel
 from armid_ros.effects import make_effect
 from armid_ros.identification.online.identifier import OnlineIdentifier, OnlineSettings
+from armid_ros.identification.online.recursive import WeightedSample
 from armid_ros.identification.online.robust_covariance import RobustCovariance
 from armid_ros.robots import load_robot
 import numpy as np
@@ -30,7 +31,7 @@ def test_the_deviation_of_a_mean_is_that_of_theory(keep):
     mean = noise.mean(axis=0)
     scores = RobustCovariance(400, 1.0, Foreground())
     for value in noise:
-        scores.add(np.ones((1, 1)), value, mean)
+        scores.add(WeightedSample(np.ones((1, 1)), value, None), np.ones(1), mean)
     covariance = scores.covariance(np.array([[np.sqrt(count)]]))
     expected = np.sqrt((1.0 + keep) / (1.0 - keep) / count)
     assert np.sqrt(covariance[0, 0]) == pytest.approx(expected, rel=0.15)
@@ -46,7 +47,8 @@ def test_residuals_are_those_of_the_latest_estimate():
     for first in (np.zeros(3), truth):
         scores = RobustCovariance(400, 1.0, Foreground())
         for k, (row, error) in enumerate(zip(rows, noise, strict=True)):
-            scores.add(row, row @ truth + error, truth if k > 3000 else first)
+            sample = WeightedSample(row, row @ truth + error, None)
+            scores.add(sample, np.ones(2), truth if k > 3000 else first)
         covariances.append(scores.covariance(root))
     np.testing.assert_allclose(covariances[0], covariances[1], rtol=1e-9)
     np.testing.assert_allclose(covariances[0], np.linalg.inv(root.T @ root), rtol=0.3, atol=3e-5)
@@ -60,8 +62,9 @@ def test_changes_of_what_is_hardly_excited_leave_a_covariance(seed):
     scores = RobustCovariance(16, 0.99, Foreground())
     basis, scale = rng.normal(size=(rank, size)), 10.0 ** rng.uniform(-3, 3, size)
     for k in range(400):
-        rows = rng.normal(size=(2, rank)) @ basis * scale
-        scores.add(rows, rng.normal(size=2), rng.normal(size=size))
+        rows, tau = rng.normal(size=(2, rank)) @ basis * scale, rng.normal(size=2)
+        sample = WeightedSample(rows, tau, None)
+        scores.add(sample, np.ones(2), rng.normal(size=size))
         if k % 50 == 40:
             chosen = rng.choice(size, rng.integers(1, 6), replace=False)
             scores.allow_change(np.eye(size)[:, chosen], rng.normal(size=size))
@@ -76,7 +79,7 @@ def test_after_a_change_the_noise_is_still_known():
     before, after = np.array([1.0, 2.0, 3.0]), np.array([1.0, 2.0, -4.0])
     scores, direction = RobustCovariance(400, 1.0, Foreground()), np.array([[0.0], [0.0], [1.0]])
     for row, error in zip(rows[:3900], noise[:3900], strict=True):
-        scores.add(row, row @ before + error, before)
+        scores.add(WeightedSample(row, row @ before + error, None), np.ones(1), before)
     scores.allow_change(direction, after)
     w = rows[:, 0]
     information = w.T @ w - np.outer(w.T @ w[:, 2], w.T @ w[:, 2]) / (w[:, 2] @ w[:, 2])
