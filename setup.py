@@ -4,6 +4,7 @@
 
 from glob import glob
 from pathlib import Path
+import zlib
 
 from setuptools import Extension, find_packages, setup
 
@@ -55,6 +56,19 @@ def shared(folder):
     return [(f'share/{NAME}/{path.parent.as_posix()}', [path.as_posix()]) for path in files]
 
 
+def kernel():
+    """Describe the compiled kernel; without a compiler, Python computes the same, more slowly."""
+    source = Path(NAME, 'model', 'kernel.c')
+    checksum = zlib.crc32(source.read_bytes())  # is compared when the kernel is loaded
+    return Extension(
+        f'{NAME}.model._kernel',
+        [str(source)],
+        define_macros=[('CHECKSUM', f'{checksum}L')],
+        extra_compile_args=['-O3'],
+        optional=True,
+    )
+
+
 setup(
     name=NAME,
     version='0.1.0',
@@ -69,8 +83,7 @@ setup(
     license='Apache-2.0',
     packages=find_packages(include=[NAME, f'{NAME}.*']),
     package_data={NAME: package_data()},
-    # without a compiler, Pinocchio and Python compute the same, more slowly
-    ext_modules=[Extension(f'{NAME}.model._kernel', [f'{NAME}/model/kernel.c'], optional=True)],
+    ext_modules=[kernel()],
     data_files=[
         ('share/ament_index/resource_index/packages', [f'resource/{NAME}']),
         (f'share/{NAME}', ['package.xml']),

@@ -3,8 +3,9 @@
 """
 Access to the compiled kernel, `kernel.c`, and rigid bodies in its format.
 
-The kernel computes torques and regressors over whole motions, and steps of the simulation. It is
-compiled at installation. Without a compiler, Pinocchio and Python compute the same numbers.
+The kernel computes torques and regressors over whole motions, steps of the simulation, and updates
+of recursive least squares. It is compiled at installation. Without a compiler, Python and its
+libraries compute the same numbers.
 
 """
 
@@ -12,8 +13,10 @@ from __future__ import annotations
 
 import ctypes
 from functools import cache
-from importlib.util import find_spec
+from importlib import import_module
+from pathlib import Path
 from typing import Any
+import zlib
 
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.robots import Robot
@@ -83,22 +86,29 @@ class BodyOfKernel(Structure):
 
         """
         arrays = [np.ascontiguousarray(x) for x in (motion.q, motion.dq, motion.ddq)]
-        addresses = [x.ctypes.data for x in (*arrays, out)]
-        getattr(kernel(), quantity)(self.address, len(motion), *addresses)
+        library = kernel()
+        getattr(library, quantity)(self.address, len(motion), *library.addresses(*arrays, out))
 
 
 @cache
-def kernel() -> ctypes.CDLL | None:
-    """Load and return the compiled kernel; return None if it is not installed."""
-    found = find_spec('armid_ros.model._kernel')
-    if found is None or found.origin is None:
+def kernel() -> Any:
+    """Load and return the compiled kernel; None without one, or if its source has changed."""
+    try:
+        module = import_module('armid_ros.model._kernel')
+    except ImportError:
         return None
-    library = ctypes.CDLL(found.origin)
+    source = Path(__file__).with_name('kernel.c')
+    if getattr(module, 'checksum', None) != zlib.crc32(source.read_bytes()):
+        return None
+    library = ctypes.CDLL(module.__file__)
     library.advance.restype = COUNT
     library.advance.argtypes = [*3 * [ADDRESS], REAL, COUNT, COUNT, *8 * [ADDRESS]]
     for function in (library.torques, library.regressors):
         function.argtypes = [ADDRESS, COUNT, *4 * [ADDRESS]]
+    library.addresses = module.addresses  # type: ignore[attr-defined]
     library.inertia_matrix.argtypes = 3 * [ADDRESS]
+    library.add_rows.restype = REAL
+    library.add_rows.argtypes = [COUNT, COUNT, *5 * [ADDRESS]]
     return library
 
 

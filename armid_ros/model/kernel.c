@@ -3,9 +3,9 @@
  *
  * Inverse dynamics and regressor of a rigid arm along a motion, and its steps under a feedback
  * controller, for as long as every friction element keeps slipping or sticking as it does and no
- * joint reaches a stop. `rigid_body.py` calls `torques` and `regressors`, `closed_loop.py` calls
- * `advance`. `integrator.py` is the same step in Python and takes the steps at which something
- * changes.
+ * joint reaches a stop; recursive least squares. `rigid_body.py` calls `torques` and `regressors`,
+ * `closed_loop.py` calls `advance`, `recursive.py` calls `add_rows`. `integrator.py` is the same
+ * step in Python and takes the steps at which something changes.
  *
  * Vectors of 6 are motions or forces of a link in its own frame, the angular part first.
  * Algorithms: recursive Newton-Euler and composite rigid body, Featherstone 2008, chapters 5 and 6.
@@ -432,10 +432,95 @@ void inertia_matrix(const Arm *arm, const double *q, double *matrix)
     mass_matrix(arm, poses, matrix);
 }
 
-/* A module of Python that is empty: what is above is called by address, without objects. */
-static PyModuleDef module = {PyModuleDef_HEAD_INIT, "_kernel", NULL, -1, NULL, NULL, NULL, NULL, NULL};
+/* Rows that a reflection combines with a line of the triangle; the compiler unrolls their loops. */
+#define ROWS_AT_ONCE 8
+
+/* Annihilate rows, and their torques, by a reflection for each column of the triangle. */
+static void reflect(int64_t size, double *root, double *right, double *rows, double *tau)
+{
+    double line[size];
+    for (int64_t j = 0; j < size; j++) {
+        double weight[ROWS_AT_ONCE], squares = 0.0, pivot = root[size * j + j], change = right[j];
+        for (int i = 0; i < ROWS_AT_ONCE; i++) squares += rows[size * i + j] * rows[size * i + j];
+        if (squares == 0.0) continue;
+        double length = -copysign(sqrt(pivot * pivot + squares), pivot), factor = 1.0 - pivot / length;
+        root[size * j + j] = length;
+        for (int i = 0; i < ROWS_AT_ONCE; i++) {
+            weight[i] = rows[size * i + j] / (pivot - length);
+            change += weight[i] * tau[i];
+        }
+        change *= factor;
+        right[j] -= change;
+        for (int i = 0; i < ROWS_AT_ONCE; i++) tau[i] -= weight[i] * change;
+        for (int64_t k = j + 1; k < size; k++) line[k] = root[size * k + j];
+#pragma GCC ivdep
+        for (int64_t k = j + 1; k < size; k++) { /* the columns are independent of each other */
+            double part = line[k];
+            for (int i = 0; i < ROWS_AT_ONCE; i++) part += weight[i] * rows[size * i + k];
+            part *= factor;
+            line[k] -= part;
+            for (int i = 0; i < ROWS_AT_ONCE; i++) rows[size * i + k] -= weight[i] * part;
+        }
+        for (int64_t k = j + 1; k < size; k++) root[size * k + j] = line[k];
+    }
+}
+
+/*
+ * Add rows (count, size) and their torques to the least-squares problem R x = z, and solve it for
+ * x; return the squared residual that this adds. R is the upper triangle of `root`, column by
+ * column; R and z = `right` are overwritten by those of the QR decomposition with the new rows.
+ */
+double add_rows(int64_t size, int64_t count, double *root, double *right, const double *rows,
+                const double *tau, double *x)
+{
+    double some[ROWS_AT_ONCE * size], torques[ROWS_AT_ONCE], squares = 0.0;
+    for (int64_t first = 0; first < count; first += ROWS_AT_ONCE) {
+        size_t used = (size_t)(count - first < ROWS_AT_ONCE ? count - first : ROWS_AT_ONCE);
+        memset(some, 0, sizeof some);
+        memset(torques, 0, sizeof torques);
+        memcpy(some, rows + size * first, used * (size_t)size * sizeof *some);
+        memcpy(torques, tau + first, used * sizeof *torques);
+        reflect(size, root, right, some, torques);
+        for (int i = 0; i < ROWS_AT_ONCE; i++) squares += torques[i] * torques[i];
+    }
+    memcpy(x, right, (size_t)size * sizeof *x);
+    for (int64_t k = size - 1; k >= 0; k--) {
+        x[k] /= root[size * k + k];
+        for (int64_t i = 0; i < k; i++) x[i] -= root[size * k + i] * x[k];
+    }
+    return squares;
+}
+
+/* Return the addresses of contiguous arrays as a tuple; `ndarray.ctypes` takes ten times as long. */
+static PyObject *addresses(PyObject *self, PyObject *const *arrays, Py_ssize_t count)
+{
+    PyObject *found = PyTuple_New(count);
+    (void)self;
+    for (Py_ssize_t i = 0; found && i < count; i++) {
+        Py_buffer view;
+        PyObject *address = NULL;
+        if (!PyObject_GetBuffer(arrays[i], &view, PyBUF_ANY_CONTIGUOUS)) {
+            address = PyLong_FromVoidPtr(view.buf);
+            PyBuffer_Release(&view);
+        }
+        if (address) PyTuple_SET_ITEM(found, i, address);
+        else Py_CLEAR(found);
+    }
+    return found;
+}
+
+static PyMethodDef methods[] = {
+    {"addresses", (PyCFunction)(void (*)(void))addresses, METH_FASTCALL, NULL},
+    {NULL, NULL, 0, NULL},
+};
+
+/* All other functions are called by address, without objects of Python. */
+static PyModuleDef module = {PyModuleDef_HEAD_INIT, "_kernel", NULL, -1, methods, NULL, NULL, NULL, NULL};
 
 PyMODINIT_FUNC PyInit__kernel(void)
 {
-    return PyModule_Create(&module);
+    PyObject *made = PyModule_Create(&module);
+    /* of this file, by `setup.py`; `compiled.py` does not call a kernel of another source */
+    if (made && PyModule_AddIntConstant(made, "checksum", CHECKSUM)) Py_CLEAR(made);
+    return made;
 }

@@ -12,7 +12,6 @@ linear in the gravity vector and in the inertial parameters of the robot.
 from __future__ import annotations
 
 from dataclasses import replace
-import threading
 from weakref import WeakKeyDictionary
 
 from armid_ros.estimate import ParameterName
@@ -26,6 +25,7 @@ import pinocchio as pin
 #: origin of the joint frame.
 LINK_PARAMETERS = ('m', 'mx', 'my', 'mz', 'Ixx', 'Ixy', 'Iyy', 'Ixz', 'Iyz', 'Izz')
 LINK_UNITS = ('kg', 'kg m', 'kg m', 'kg m') + ('kg m^2',) * 6
+_BODIES: WeakKeyDictionary[Robot, BodyOfKernel | None] = WeakKeyDictionary()
 
 
 def rigid_parameter_names(robot: Robot) -> tuple[ParameterName, ...]:
@@ -50,26 +50,11 @@ def link_unit(name: str) -> str:
     return dict(zip(LINK_PARAMETERS, LINK_UNITS, strict=True)).get(name.rstrip('0123456789'), '')
 
 
-class _Prepared(threading.local):
-    """Cache per thread and robot: the data object of Pinocchio and the body of the kernel."""
-
-    def __init__(self) -> None:
-        self.data: WeakKeyDictionary[Robot, pin.Data] = WeakKeyDictionary()
-        self.bodies: WeakKeyDictionary[Robot, BodyOfKernel | None] = WeakKeyDictionary()
-
-    def data_of(self, robot: Robot) -> pin.Data:
-        """Return the cached data object of Pinocchio for a robot."""
-        data = self.data.get(robot)
-        return self.data.setdefault(robot, robot.model.createData()) if data is None else data
-
-    def body_of(self, robot: Robot) -> BodyOfKernel | None:
-        """Return a robot in the format of the compiled kernel; None if there is no kernel."""
-        if robot not in self.bodies:
-            self.bodies[robot] = kernel_body(robot)
-        return self.bodies[robot]
-
-
-_PREPARED = _Prepared()
+def _body_of(robot: Robot) -> BodyOfKernel | None:
+    """Return a robot in the format of the compiled kernel; None if there is no kernel."""
+    if robot not in _BODIES:
+        _BODIES[robot] = kernel_body(robot)
+    return _BODIES[robot]
 
 
 def inverse_dynamics(robot: Robot, motion: Motion) -> FloatArray:
@@ -86,11 +71,11 @@ def inverse_dynamics(robot: Robot, motion: Motion) -> FloatArray:
         motion, jacobian = robot.mechanism.along(motion)
         return _projected(jacobian, inverse_dynamics(robot.tree, motion))
     tau = np.empty((len(motion), robot.n_joints))
-    body = _PREPARED.body_of(robot)
+    body = _body_of(robot)
     if body is not None:
         body.along(motion, 'torques', tau)
         return tau
-    model, data = robot.model, _PREPARED.data_of(robot)
+    model, data = robot.model, robot.model.createData()
     for k, (q, dq, ddq) in enumerate(zip(motion.q, motion.dq, motion.ddq, strict=True)):
         tau[k] = pin.rnea(model, data, q, dq, ddq)
     return tau
@@ -137,7 +122,7 @@ def inverse_dynamics_derivatives(
         )
         by_q, by_dq, by_ddq = (whole - added for whole, added in pairs)
         return by_q, by_dq, by_ddq
-    model, data = robot.model, _PREPARED.data_of(robot)
+    model, data = robot.model, robot.model.createData()
     n = robot.n_joints
     by_q, by_dq, by_ddq = np.empty((3, len(motion), n, n))
     for k, (q, dq, ddq) in enumerate(zip(motion.q, motion.dq, motion.ddq, strict=True)):
@@ -201,11 +186,11 @@ def regressor(robot: Robot, motion: Motion) -> FloatArray:
         return _projected(jacobian, regressor(robot.tree, motion))
     n = robot.n_joints
     y = np.zeros((len(motion), n, len(LINK_PARAMETERS) * n))
-    body = _PREPARED.body_of(robot)
+    body = _body_of(robot)
     if body is not None:
         body.along(motion, 'regressors', y)
         return y
-    model, data = robot.model, _PREPARED.data_of(robot)
+    model, data = robot.model, robot.model.createData()
     for k, (q, dq, ddq) in enumerate(zip(motion.q, motion.dq, motion.ddq, strict=True)):
         y[k] = pin.computeJointTorqueRegressor(model, data, q, dq, ddq)
     return y

@@ -4,6 +4,7 @@
 
 from armid_ros.arm import ArmModel
 from armid_ros.effects import make_effect
+from armid_ros.model import inverse_dynamics, regressor
 from armid_ros.model.compiled import kernel, kernel_body
 from armid_ros.motion import Motion
 from armid_ros.robots import load_robot, robot_from_urdf
@@ -66,6 +67,11 @@ def swinging(body, seconds=0.8):
     return Reference(body.joints, t, body.middle_pose + shift)
 
 
+def test_kernel_of_another_source_is_not_called(monkeypatch):
+    monkeypatch.setattr('armid_ros.model._kernel.checksum', 0)
+    assert kernel.__wrapped__() is None
+
+
 @pytest.mark.parametrize('source', ROBOTS)
 def test_body_is_that_of_pinocchio(source):
     body, rng = robot(source), np.random.default_rng(3)
@@ -73,9 +79,7 @@ def test_body_is_that_of_pinocchio(source):
     added = np.diag(rng.uniform(0.0, 0.1, n))
     data, structure = body.model.createData(), kernel_body(body, added)
     motion = Motion(body.joints, 0.1 * np.arange(20), *rng.uniform(-2.0, 2.0, (3, 20, n)))
-    torques, regressors = np.zeros((20, n)), np.zeros((20, n, 10 * n))
-    structure.along(motion, 'torques', torques)
-    structure.along(motion, 'regressors', regressors)
+    torques, regressors = inverse_dynamics(body, motion), regressor(body, motion)
     inertia = np.empty((n, n))
     for k, (q, dq, ddq) in enumerate(zip(motion.q, motion.dq, motion.ddq, strict=True)):
         expected = pin.rnea(body.model, data, q, dq, ddq)

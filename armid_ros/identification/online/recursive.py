@@ -23,6 +23,7 @@ from typing import NamedTuple
 
 from armid_ros.errors import IdentificationError
 from armid_ros.estimate import Estimate, ParameterName
+from armid_ros.model.compiled import kernel
 from armid_ros.motion import FloatArray
 import numpy as np
 import numpy.typing as npt
@@ -35,6 +36,8 @@ MIN_FORGETTING = 0.9
 PRIOR_STD = 1e6
 #: Columns of a Householder block; the fastest for 60 to 120 parameters.
 _BLOCK_COLUMNS = 8
+#: Number of rows above which LAPACK is faster than the compiled kernel.
+_MOST_ROWS_OF_KERNEL = 24
 
 
 class WeightedSample(NamedTuple):
@@ -165,32 +168,37 @@ class RecursiveLeastSquares:
         counts = np.ones(len(tau)) if weights is None else np.asarray(weights)
         if not counts.any():
             return
-        innovation = tau - rows @ self._values
         by_sample = counts.reshape(-1, len(self._noise))
         scale = self.scale(by_sample).reshape(-1)
-        rows = rows * scale[:, np.newaxis]
+        rows, tau = rows * scale[:, np.newaxis], tau * scale
         if self._forgetting < 1.0:
+            innovation = tau - rows @ self._values
             self._root = forget_and_add(self._root, rows, self._forgetting)
-            gradient = rows.T @ (innovation * scale)
-            half, _ = lapack.dtrtrs(self._root, gradient[:, np.newaxis], trans=1)
+            half, _ = lapack.dtrtrs(self._root, (rows.T @ innovation)[:, np.newaxis], trans=1)
             self._values = self._values + lapack.dtrtrs(self._root, half)[0][:, 0]
             self._squares *= self._forgetting
             self._freedom *= self._forgetting
+            self._squares += float(innovation @ (tau - rows @ self._values))
         else:
-            # Householder reflections add the rows to R theta = z
-            self._root, reflectors, factors, _ = lapack.dtpqrt(
-                0, min(_BLOCK_COLUMNS, len(self._root)), self._root, rows, overwrite_a=1
-            )
-            self._right, _, _ = lapack.dtpmqrt(
-                *(0, reflectors, factors, self._right, (tau * scale)[:, np.newaxis]),
-                trans='T',
-                overwrite_a=1,
-            )
-            self._values = lapack.dtrtrs(self._root, self._right)[0][:, 0]
-        after = tau * scale - rows @ self._values
-        self._squares += float(innovation * scale @ after)
+            self._squares += self._add(rows, tau)
         self._freedom += float(counts.sum())
         self.samples += int(np.count_nonzero(by_sample.any(axis=1)))
+
+    def _add(self, rows: FloatArray, tau: FloatArray) -> float:
+        """Add rows of unit noise to R theta = z by reflections; return their squared residuals."""
+        library, size = kernel(), len(self._root)
+        if library is not None and len(rows) <= _MOST_ROWS_OF_KERNEL:
+            self._values = np.empty(size)
+            arrays = self._root, self._right, np.ascontiguousarray(rows), tau, self._values
+            return float(library.add_rows(size, len(rows), *library.addresses(*arrays)))
+        self._root, reflectors, factors, _ = lapack.dtpqrt(
+            0, min(_BLOCK_COLUMNS, size), self._root, rows, overwrite_a=1
+        )
+        self._right, rest, _ = lapack.dtpmqrt(
+            *(0, reflectors, factors, self._right, tau[:, np.newaxis]), trans='T', overwrite_a=1
+        )
+        self._values = lapack.dtrtrs(self._root, self._right)[0][:, 0]
+        return float(np.sum(rest**2))
 
     def update_together(self, samples: Sequence[WeightedSample]) -> None:
         """

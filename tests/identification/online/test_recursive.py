@@ -1,6 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 from armid_ros.estimate import ParameterName
+from armid_ros.identification.online import recursive
 from armid_ros.identification.online.recursive import (
     PRIOR_STD,
     RecursiveLeastSquares,
@@ -37,18 +38,24 @@ def feed(estimator, rows, tau):
 
 
 @pytest.mark.parametrize('forgetting', [1.0, 0.99])
-def test_samples_taken_together_teach_what_they_teach_one_by_one(forgetting):
+def test_samples_taken_together_teach_what_they_teach_one_by_one(forgetting, monkeypatch):
     rng = np.random.default_rng(11)
     rows, tau, _ = linear_data(rng, samples=60)
     weights = np.where(rng.random((60, 1)) < 0.2, 0.0, rng.random(tau.shape))
     samples = [WeightedSample(*some) for some in zip(rows, tau, weights, strict=True)]
-    single, several = (
-        RecursiveLeastSquares(names(8), NOISE, forgetting=forgetting) for _ in range(2)
+    single, several, by_lapack = (
+        RecursiveLeastSquares(names(8), NOISE, forgetting=forgetting) for _ in range(3)
     )
     for sample in samples:
         single.update(*sample)
     for first in range(0, 60, 7):
         several.update_together(samples[first : first + 7])
+    monkeypatch.setattr(recursive, 'kernel', lambda: None)
+    for sample in samples:
+        by_lapack.update(*sample)
+    np.testing.assert_allclose(by_lapack.values, single.values, rtol=1e-12)
+    np.testing.assert_allclose(by_lapack.covariance, single.covariance, rtol=1e-12, atol=1e-14)
+    assert by_lapack.variance_factor == pytest.approx(single.variance_factor, rel=1e-12)
     np.testing.assert_allclose(several.values, single.values, rtol=1e-8)
     np.testing.assert_allclose(several.covariance, single.covariance, rtol=1e-6)
     assert several.variance_factor == pytest.approx(single.variance_factor)
