@@ -335,8 +335,8 @@ class ArmModel:
     def effect_columns(self, motion: Motion) -> FloatArray:
         """Return derivatives of the torque readings by all effect parameters, (N, n, P - 10 n)."""
         blocks = [self.columns_of(effect, motion) for effect in self.effects]
-        empty = np.empty((len(motion), motion.n_joints, 0))
-        return np.concatenate([empty, *blocks], axis=2)
+        none = [] if blocks else [np.empty((len(motion), motion.n_joints, 0))]
+        return np.concatenate(blocks or none, axis=2)
 
     def columns(self, motion: Motion) -> FloatArray:
         """

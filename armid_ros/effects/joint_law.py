@@ -7,7 +7,7 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 from armid_ros.effects.action import Action, direction, DryFriction
 from armid_ros.effects.base import Arm, Effect
@@ -117,7 +117,8 @@ def joint_columns(effect: Effect, motion: Motion, *quantities: FloatArray) -> Fl
 
     """
     own = effect.indices(motion.joints)
-    return _placed(own, motion, [values[:, own] for values in quantities])
+    every = own == list(range(motion.n_joints))
+    return _placed(own, motion, quantities if every else [x[:, own] for x in quantities])
 
 
 def scatter(effect: Effect, values: FloatArray, robot: Robot) -> FloatArray:
@@ -146,7 +147,11 @@ def scatter(effect: Effect, values: FloatArray, robot: Robot) -> FloatArray:
 
 def _placed(own: list[int], motion: Motion, quantities: Sequence[FloatArray]) -> FloatArray:
     """Arrange torques of the joints `own`, per unit of each quantity, as a regressor (N, n, P)."""
-    columns = np.zeros((*motion.q.shape, len(own), len(quantities)))
+    n, count = len(own), len(quantities)
+    columns = np.zeros((len(motion), motion.n_joints * n * count))
+    places: Any = slice(None, None, (n + 1) * count)  # takes less time than indices
+    if own != list(range(motion.n_joints)):
+        places = count * (n * np.array(own, dtype=np.intp) + np.arange(n))
     for number, values in enumerate(quantities):
-        columns[:, own, np.arange(len(own)), number] = values
-    return columns.reshape(*motion.q.shape, len(own) * len(quantities))
+        columns[:, number:][:, places] = values
+    return columns.reshape(*motion.q.shape, n * count)

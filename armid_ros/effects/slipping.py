@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 from armid_ros.motion import FloatArray
 import numpy as np
@@ -64,15 +65,9 @@ class Hysteresis:
         states[0] = self.start(np.where(moves, dq[0], 0.0))
         for element, distance in enumerate(self.distance):
             own, state = travel[:, element], states[:, element]
-            for first, last, end in _monotone_parts(own):
+            ends = np.sign(np.diff(own))  # of the spring: the direction of motion, -1, 0 or 1
+            reversals = np.flatnonzero(np.diff(ends)) + 1
+            for first, last in pairwise(np.unique([0, *reversals, len(ends)])):
                 decay = np.exp(-np.abs(own[first + 1 : last + 1] - own[first]) / float(distance))
-                state[first + 1 : last + 1] = end - (end - state[first]) * decay
+                state[first + 1 : last + 1] = ends[first] - (ends[first] - state[first]) * decay
         return states
-
-
-def _monotone_parts(travel: FloatArray) -> list[tuple[int, int, float]]:
-    """Return (first sample, last sample, direction +-1 or 0) of each motion between reversals."""
-    step = np.sign(np.diff(travel))
-    turns = np.flatnonzero(np.diff(step)) + 1
-    ends = zip(np.append(0, turns), np.append(turns, len(step)), strict=True)
-    return [(int(a), int(b), float(step[a])) for a, b in ends if b > a]
