@@ -247,7 +247,7 @@ class OnlineIdentifier:
         # is not used.
         moving = np.abs(motion.dq) >= 0.01
         self._last_moving[moving] = motion.t
-        if not moving.all():
+        if not all(moving.tolist()):
             resting = motion.t - self._last_moving > 0.1
             self._last_useless[resting & self._held] = motion.t
         begins = self._last_row is None

@@ -166,9 +166,10 @@ class RecursiveLeastSquares:
 
         """
         counts = np.ones(len(tau)) if weights is None else np.asarray(weights)
-        if not counts.any():
-            return
         by_sample = counts.reshape(-1, len(self._noise))
+        used = sum(map(any, by_sample.tolist()))
+        if not used:
+            return
         scale = self.scale(by_sample).reshape(-1)
         rows, tau = rows * scale[:, np.newaxis], tau * scale
         if self._forgetting < 1.0:
@@ -182,7 +183,7 @@ class RecursiveLeastSquares:
         else:
             self._squares += self._add(rows, tau)
         self._freedom += float(counts.sum())
-        self.samples += int(np.count_nonzero(by_sample.any(axis=1)))
+        self.samples += used
 
     def _add(self, rows: FloatArray, tau: FloatArray) -> float:
         """Add rows of unit noise to R theta = z by reflections; return their squared residuals."""
