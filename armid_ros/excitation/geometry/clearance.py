@@ -182,8 +182,7 @@ class ClearanceModel:
 
     def smallest(self, q: FloatArray, reach: float = np.inf) -> FloatArray:
         """Return the smallest distance of two bodies in each pose, (N,) [m]; at most ``reach``."""
-        frames = LinkFrames.of(self.collision.robot, q)
-        sample, pair = np.nonzero(self._bound(frames) < reach)
+        sample, pair = np.nonzero(self._bound(LinkFrames.of(self.collision.robot, q)) < reach)
         distance, _, _ = self._measure(q, sample, pair)
         result = np.full(len(q), reach)
         np.minimum.at(result, sample, distance)
@@ -271,16 +270,17 @@ class ClearanceModel:
 
     def _bound(self, frames: LinkFrames) -> FloatArray:
         """Return lower bounds on the distances of pairs of bodies, (N, number of pairs) [m]."""
-        centre = np.empty((frames.lines.shape[2], len(self.joints), 3))
+        centre = np.empty((len(self.joints), 3, frames.lines.shape[2]))
         for body, joint in enumerate(self.joints):
             place = self.spheres[body, :3]
-            centre[:, body] = place if joint < 0 else frames.places(frames.joints[joint], place)
+            centre[body].T[:] = place if joint < 0 else frames.places(frames.joints[joint], place)
         first, second = self.pairs.T
-        apart = np.linalg.norm(centre[:, second] - centre[:, first], axis=2)
+        between = centre[second] - centre[first]
+        apart = np.sqrt(np.einsum('kcs,kcs->ks', between, between))
         for pair in np.flatnonzero(np.isfinite(self.planes[second, 3])):
             plane = self.planes[second[pair]]
-            apart[:, pair] = centre[:, first[pair]] @ plane[:3] - plane[3]
-        return np.asarray(apart - self.spheres[first, 3] - self.spheres[second, 3])
+            apart[pair] = plane[:3] @ centre[first[pair]] - plane[3]
+        return np.asarray(apart.T - self.spheres[first, 3] - self.spheres[second, 3])
 
     def _measure(
         self, q: FloatArray, sample: IntArray, pair: IntArray, reach: float = -np.inf
