@@ -71,23 +71,24 @@ class BodyOfKernel(Structure):
         ('added_inertia', ADDRESS),
     )
 
-    def along(self, motion: Motion, quantity: str, out: FloatArray) -> None:
+    def along(self, motion: Motion, quantity: str, *arrays: FloatArray) -> None:
         """
-        Compute torques or the regressor of the rigid body along a motion, into `out`.
+        Compute a quantity of the rigid body along a motion, into the last array.
 
         Parameters
         ----------
         motion : Motion
             N samples of the n joints.
         quantity : str
-            'torques', (N, n), or 'regressors', (N, n, 10 n).
-        out : ndarray
-            Array for the result; it has to contain zeros before the call.
+            'torques', (N, n); 'regressors', (N, n, 10 n); or 'regressor_slopes', (3, N, n), the
+            derivatives of sum(weights * regressors) by q, dq and ddq.
+        *arrays : ndarray
+            Weights (N, n, 10 n) of 'regressor_slopes'; array for the result, with zeros.
 
         """
-        arrays = [np.ascontiguousarray(x) for x in (motion.q, motion.dq, motion.ddq)]
-        library = kernel()
-        getattr(library, quantity)(self.address, len(motion), *library.addresses(*arrays, out))
+        library, states = kernel(), (motion.q, motion.dq, motion.ddq)
+        used = [np.ascontiguousarray(x) for x in (*states, *arrays)]
+        getattr(library, quantity)(self.address, len(motion), *library.addresses(*used))
 
 
 @cache
@@ -105,6 +106,7 @@ def kernel() -> Any:
     library.advance.argtypes = [*3 * [ADDRESS], REAL, COUNT, COUNT, *8 * [ADDRESS]]
     for function in (library.torques, library.regressors):
         function.argtypes = [ADDRESS, COUNT, *4 * [ADDRESS]]
+    library.regressor_slopes.argtypes = [ADDRESS, COUNT, *5 * [ADDRESS]]
     library.addresses = module.addresses  # type: ignore[attr-defined]
     library.inertia_matrix.argtypes = 3 * [ADDRESS]
     library.add_rows.restype = REAL
@@ -126,11 +128,6 @@ def kernel_body(
         Inertia added to the inertia matrix of the robot [kg m^2]; by default none.
     weighs : bool
         Whether gravity acts on the robot.
-
-    Returns
-    -------
-    BodyOfKernel or None
-        None without a compiled kernel, or for more joints than the kernel supports.
 
     """
     library, n = kernel(), robot.n_joints

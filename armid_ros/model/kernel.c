@@ -424,6 +424,126 @@ void regressors(const Arm *arm, int64_t samples, const double *q, const double *
     }
 }
 
+/* Product s x y of a joint's axis with a motion: minus the change of y by the joint's position. */
+static double along_change(const Joint *joint, const double y[6], const double weight[6])
+{
+    double change[6];
+    cross(joint->turn, y, change);
+    cross(joint->turn, y + 3, change + 3);
+    add_cross(joint->slide, y, change + 3);
+    return dot(weight, change) + dot(weight + 3, change + 3);
+}
+
+/* Add the derivatives of sum(weight * columns) of `force_per_parameter` by v and a. */
+static void force_slopes(const double v[6], const double a[6], double weight[10][6], double by_v[6], double by_a[6])
+{
+    double by_point[3];
+    memcpy(by_point, weight[0] + 3, sizeof by_point);
+    for (int k = 0; k < 3; k++) {
+        double unit[3] = {0}, turned[3], by_turned[3], *moment = weight[1 + k], *force = moment + 3;
+        unit[k] = 1.0;
+        add_cross(moment, unit, by_point);
+        add_cross(unit, force, by_a);
+        cross(v, unit, turned);
+        cross(force, v, by_turned);
+        add_cross(turned, force, by_v);
+        add_cross(unit, by_turned, by_v);
+    }
+    for (int column = 0, row = 0; row < 3; row++)
+        for (int k = 0; k <= row; k++, column++) { /* Ixx, Ixy, Iyy, Ixz, Iyz, Izz */
+            double spin[3] = {0}, by_spin[3], *moment = weight[4 + column];
+            spin[row] = v[k];
+            spin[k] = v[row];
+            cross(moment, v, by_spin);
+            add_cross(spin, moment, by_v);
+            by_a[k] += moment[row];
+            by_v[k] += by_spin[row];
+            if (row == k) continue;
+            by_a[row] += moment[k];
+            by_v[row] += by_spin[k];
+        }
+    for (int i = 0; i < 3; i++) by_a[3 + i] += by_point[i];
+    add_cross(v + 3, by_point, by_v);
+    add_cross(by_point, v, by_v + 3);
+}
+
+/* Derivatives of sum(weights * regressor) by q, dq and ddq: the regressor in reverse mode. */
+static void slopes(const Arm *arm, const Pose *poses, const double *dq, const double *ddq, const double *weights,
+                   double *by_q, double *by_dq, double *by_ddq)
+{
+    double v[MOST_JOINTS][6], a[MOST_JOINTS][6], by_v[MOST_JOINTS][6], by_a[MOST_JOINTS][6];
+    double axes[MOST_JOINTS][MOST_JOINTS][6], by_axes[MOST_JOINTS][MOST_JOINTS][6];
+    motions_of(arm, poses, dq, ddq, v, a);
+    for (int64_t link = 0; link < arm->n; link++) {
+        double columns[10][6], weight[10][6] = {{0}};
+        force_per_parameter(v[link], a[link], columns);
+        memcpy(axes[link][link], arm->joints[link].turn, 3 * sizeof(double));
+        memcpy(axes[link][link] + 3, arm->joints[link].slide, 3 * sizeof(double));
+        memset(by_v[link], 0, sizeof by_v[link]);
+        memset(by_a[link], 0, sizeof by_a[link]);
+        for (int64_t joint = link; joint >= 0; joint = arm->joints[joint].parent) {
+            const double *row = weights + 10 * (arm->n * joint + link);
+            double *axis = axes[link][joint], *by_axis = by_axes[link][joint];
+            if (joint != link) motion_to_link(&poses[link], axes[arm->joints[link].parent][joint], axis);
+            memset(by_axis, 0, 6 * sizeof *by_axis);
+            for (int k = 0; k < 10; k++)
+                for (int i = 0; i < 6; i++) {
+                    by_axis[i] += row[k] * columns[k][i];
+                    weight[k][i] += row[k] * axis[i];
+                }
+        }
+        force_slopes(v[link], a[link], weight, by_v[link], by_a[link]);
+    }
+    for (int64_t link = arm->n - 1; link >= 0; link--) {
+        const Joint *joint = &arm->joints[link];
+        double own[6], by_own[6] = {0}, carried[6], *v_link = v[link], *by_v_link = by_v[link], *by_a_link = by_a[link];
+        for (int k = 0; k < 3; k++) {
+            own[k] = joint->turn[k] * dq[link];
+            own[3 + k] = joint->slide[k] * dq[link];
+        }
+        add_cross(own, by_a_link, by_v_link);
+        add_cross(own + 3, by_a_link + 3, by_v_link);
+        add_cross(own, by_a_link + 3, by_v_link + 3);
+        add_cross(by_a_link, v_link, by_own);
+        add_cross(by_a_link + 3, v_link + 3, by_own);
+        add_cross(by_a_link + 3, v_link, by_own + 3);
+        for (int i = 0; i < 6; i++) by_own[i] += by_v_link[i];
+        by_dq[link] = dot(joint->turn, by_own) + dot(joint->slide, by_own + 3);
+        by_ddq[link] = dot(joint->turn, by_a_link) + dot(joint->slide, by_a_link + 3);
+        for (int i = 0; i < 6; i++) carried[i] = v_link[i] - own[i];
+        by_q[link] = -along_change(joint, carried, by_v_link);
+        memcpy(carried, a[link], sizeof carried); /* without the joint's own acceleration */
+        for (int k = 0; k < 3; k++) {
+            carried[k] -= joint->turn[k] * ddq[link];
+            carried[3 + k] -= joint->slide[k] * ddq[link];
+        }
+        add_cross(own, v_link, carried);
+        add_cross(own + 3, v_link, carried + 3);
+        add_cross(own, v_link + 3, carried + 3);
+        by_q[link] -= along_change(joint, carried, by_a_link);
+        if (joint->parent >= 0) {
+            add_force_to_parent(&poses[link], by_v_link, by_v[joint->parent]);
+            add_force_to_parent(&poses[link], by_a_link, by_a[joint->parent]);
+        }
+        for (int64_t other = joint->parent; other >= 0; other = arm->joints[other].parent) {
+            by_q[link] -= along_change(joint, axes[link][other], by_axes[link][other]);
+            add_force_to_parent(&poses[link], by_axes[link][other], by_axes[joint->parent][other]);
+        }
+    }
+}
+
+/* Derivatives of sum(weights * regressors), at each sample, by q, dq and ddq: (3, samples, n). */
+void regressor_slopes(const Arm *arm, int64_t samples, const double *q, const double *dq, const double *ddq,
+                      const double *weights, double *by)
+{
+    Pose poses[MOST_JOINTS];
+    int64_t size = samples * arm->n;
+    for (int64_t row = 0; row < size; row += arm->n) {
+        poses_of(arm, q + row, poses);
+        slopes(arm, poses, dq + row, ddq + row, weights + 10 * arm->n * row, by + row, by + size + row, by + 2 * size + row);
+    }
+}
+
 /* Inertia matrix at one pose, for the tests against Pinocchio. */
 void inertia_matrix(const Arm *arm, const double *q, double *matrix)
 {

@@ -140,14 +140,10 @@ class LinkFrames:
             positions[k] = self.places(joint, offset).T
             for mover in self.frames[self.joints.index(joint)].movers:
                 jacobians[k, mover] = self.lines[mover] + _cross(self.turns[mover], positions[k])
-        by_moving = jacobians.transpose(3, 0, 2, 1)
-        return positions.transpose(2, 0, 1), self._by_driven(by_moving)
-
-    def _by_driven(self, by_moving: FloatArray) -> FloatArray:
-        """Convert derivatives by moving joints (N, ..., m) to derivatives by driven joints."""
-        if self.coupling is None:
-            return by_moving
-        return np.asarray(np.einsum('k...m,kmn->k...n', by_moving, self.coupling))
+        by_joint = jacobians.transpose(3, 0, 2, 1)
+        if self.coupling is not None:  # from moving joints to driven joints
+            by_joint = np.einsum('k...m,kmn->k...n', by_joint, self.coupling)
+        return positions.transpose(2, 0, 1), by_joint
 
 
 def _cross(a: FloatArray, b: FloatArray) -> FloatArray:

@@ -196,6 +196,22 @@ def regressor(robot: Robot, motion: Motion) -> FloatArray:
     return y
 
 
+def regressor_slopes(robot: Robot, motion: Motion, weights: FloatArray) -> FloatArray | None:
+    """
+    Differentiate sum(weights * regressor) of each sample by q, dq and ddq, shape (3, N, n).
+
+    The weights have the shape of the regressor. The result is None for a robot with a mechanism,
+    and without the compiled kernel.
+
+    """
+    body = None if robot.mechanism is not None else _body_of(robot)
+    if body is None:
+        return None
+    slopes = np.empty((3, *motion.q.shape))
+    body.along(motion, 'regressor_slopes', weights, slopes)
+    return slopes
+
+
 def gravity_sensitivity(robot: Robot, q: FloatArray) -> FloatArray:
     """
     Differentiate joint torques by the components of the gravity vector.

@@ -135,7 +135,17 @@ def _set_inertials(root: minidom.Element, robot: Robot) -> None:
         name = link.getAttribute('name')
         carrier = _frame(robot, name).parentJoint - 1
         if name in robot.links:
-            _set_inertial(link, body[carrier] - shares[carrier] * attached[carrier])
+            own = body[carrier] - shares[carrier] * attached[carrier]
+            inertia = pin.Inertia.FromDynamicParameters(own)
+            values = {
+                'origin': {'xyz': text_of(inertia.lever), 'rpy': '0 0 0'},
+                'mass': {'value': text_of(inertia.mass)},
+                'inertia': inertia_attributes(inertia.inertia),
+            }
+            inertial = _child(link, 'inertial')
+            for tag, row in values.items():
+                for key, text in row.items():
+                    _child(inertial, tag).setAttribute(key, text)
         elif carrier >= 0 and shares[carrier] < 1.0:
             for inertial in _children(link, 'inertial'):
                 for element in (_child(inertial, 'mass'), _child(inertial, 'inertia')):
@@ -151,20 +161,6 @@ def _share(body: FloatArray, attached: FloatArray) -> float:
         return 0.0
     largest = float(scipy.linalg.eigh(pseudo_inertia(attached), pseudo_inertia(body))[0][-1])
     return 1.0 if largest <= 1.0 - _MIN_SHARE else 0.5 / largest
-
-
-def _set_inertial(link: minidom.Element, parameters: FloatArray) -> None:
-    """Write inertial parameters to a URDF link as mass, centre of mass and inertia."""
-    body = pin.Inertia.FromDynamicParameters(parameters)
-    values = {
-        'origin': {'xyz': text_of(body.lever), 'rpy': '0 0 0'},
-        'mass': {'value': text_of(body.mass)},
-        'inertia': inertia_attributes(body.inertia),
-    }
-    inertial = _child(link, 'inertial')
-    for name, row in values.items():
-        for key, value in row.items():
-            _child(inertial, name).setAttribute(key, value)
 
 
 def _check(robot: Robot, urdf: str) -> None:

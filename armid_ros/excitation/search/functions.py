@@ -3,9 +3,9 @@
 """
 Cost and limits of a trajectory as smooth functions of Fourier coefficients, with gradients.
 
-Columns that depend only on the state are differentiated by finite differences of the states of all
-samples at once. Columns that depend on the past of the motion are differentiated by finite
-differences of every coefficient.
+The compiled kernel differentiates the columns of the rigid body. Other columns that depend only on
+the state are differentiated by finite differences of the states of all samples at once, columns
+that depend on the past of the motion by finite differences of every coefficient.
 
 Each limit of each joint is one constraint, c <= 0. It is the soft maximum (Kreisselmeier and
 Steinhauser 1979) of the excess over all samples, relative to the limit. A soft maximum is never
@@ -19,11 +19,10 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
-from armid_ros.arm import ArmModel
 from armid_ros.excitation.fourier import fourier_basis, FourierTrajectory, MARGIN
 from armid_ros.excitation.geometry.clearance import ClearanceModel
 from armid_ros.excitation.problem import DesignProblem, parameter_mask
-from armid_ros.model import regressor
+from armid_ros.model.rigid_body import regressor, regressor_slopes
 from armid_ros.motion import BlurredMotion, FloatArray, Motion
 import numpy as np
 import numpy.typing as npt
@@ -53,9 +52,9 @@ class Objective:
         # the direction of motion is smoothed below 5 % of the velocity limit
         self.width = 0.05 * np.where(np.isfinite(velocity), velocity, 1.0)
         arm = problem.arm
+        self._still = settings.target == 'gravity' or arm.quasi_static
         past = parameter_mask(arm, {one.name for one in arm.effects if not one.instantaneous})
-        # indices of the standard parameters among the columns; columns that depend on the past
-        # come last
+        # indices of the standard parameters among the columns; columns of the past come last
         self._order = np.argsort(np.argsort(past, kind='stable'))
 
     def value(self, x: FloatArray) -> tuple[float, Callable[[], FloatArray]]:
@@ -94,9 +93,8 @@ class Objective:
             weights = np.zeros_like(columns)
             by_w = 2.0 * weight * (w @ by_matrix)
             weights[:, :, order] = by_w.reshape(*motion.q.shape, -1) * inverse_noise
-            by_state = self._state_gradient(motion, _weighted(state, weights), weights)
+            total = self._state_gradient(motion, weights)
             # differentiate sum(weights * columns) by the coefficients, where columns need the past
-            total = np.zeros_like(x)
             if past:
                 weights = weights[:, :, -sum(block.shape[2] for block in past) :]
                 here = _weighted(past, weights)
@@ -104,15 +102,21 @@ class Objective:
                     moved = x.copy()
                     moved[index] += _STEP
                     there = _weighted(self._past_columns(moved), weights)
-                    total[index] = (there - here).sum() / _STEP
-            return by_state + total
+                    total[index] += (there - here).sum() / _STEP
+            return total
 
         return cost, gradient
 
-    def _state_gradient(self, motion: Motion, here: FloatArray, weights: FloatArray) -> FloatArray:
+    def _state_gradient(self, motion: Motion, weights: FloatArray) -> FloatArray:
         """Return the gradient of the weighted sum of `_state_columns` by Fourier coefficients."""
-        count, n = motion.q.shape
-        total = np.zeros((n, self.basis[0].shape[1]))
+        (count, n), arm = motion.q.shape, self.problem.arm
+        total, size = np.zeros((n, self.basis[0].shape[1])), len(arm.robot.rigid_parameters)
+        of_body = motion.at_rest() if self._still else motion
+        slopes = regressor_slopes(arm.body, of_body, weights[:, :, :size])
+        if slopes is not None:
+            weights, slopes = weights[:, :, size:], slopes[:1] if self._still else slopes
+            total += sum(by.T @ basis for by, basis in zip(slopes, self.basis, strict=False))
+        here = _weighted(self._state_columns(motion, slopes is None), weights)
         state = np.array([motion.q, motion.dq, motion.ddq])
         for argument, basis in enumerate(self.basis):
             # eight joints at once, to limit the memory of their columns
@@ -120,20 +124,21 @@ class Objective:
                 moved = np.tile(state, (1, len(joints), 1)).reshape(3, len(joints), count, n)
                 moved[argument, np.arange(len(joints)), :, joints] += _STEP
                 q, dq, ddq = moved.reshape(3, -1, n)
-                t = np.tile(motion.t, len(joints))
-                there = self._state_columns(replace(motion, t=t, q=q, dq=dq, ddq=ddq))
+                times = np.tile(motion.t, len(joints))
+                moving = replace(motion, t=times, q=q, dq=dq, ddq=ddq)
+                there = self._state_columns(moving, slopes is None)
                 total[joints] += (_weighted(there, weights) - here) @ basis / _STEP
         return total
 
-    def _state_columns(self, motion: Motion) -> list[FloatArray]:
+    def _state_columns(self, motion: Motion, with_body: bool = True) -> list[FloatArray]:
         """Return the regressor columns of the rigid body and of each instantaneous effect."""
-        arm, target = self.problem.arm, self.problem.settings.target
-        if target == 'effects':
-            body = np.zeros((*motion.q.shape, len(arm.robot.rigid_parameters)))
-        else:
-            still = target == 'gravity' or arm.quasi_static
-            body = regressor(arm.body, motion.at_rest() if still else motion)
-        return [body, *(arm.columns_of(e, motion) for e in arm.effects if e.instantaneous)]
+        arm = self.problem.arm
+        effects = [arm.columns_of(e, motion) for e in arm.effects if e.instantaneous]
+        if not with_body:
+            return effects
+        if self.problem.settings.target == 'effects':
+            return [np.zeros((*motion.q.shape, len(arm.robot.rigid_parameters))), *effects]
+        return [regressor(arm.body, motion.at_rest() if self._still else motion), *effects]
 
     def _past_columns(self, x: FloatArray) -> list[FloatArray]:
         """Return the regressor columns of each effect that depends on the past motion."""
@@ -146,13 +151,13 @@ class Objective:
 
 def _weighted(blocks: Sequence[FloatArray], weights: FloatArray) -> FloatArray:
     """Return the weighted sum of regressor columns at each sample of k motions, (k, N)."""
-    total, start = 0.0, 0
+    total, start = np.zeros((1, len(weights))), 0
     for block in blocks:
         stop = start + block.shape[2]
         part = block.reshape(-1, *weights.shape[:2], block.shape[2])
         total = total + np.einsum('jkrp,krp->jk', part, weights[:, :, start:stop])
         start = stop
-    return np.asarray(total)
+    return total
 
 
 #: Number of parts of the period, each with one clearance constraint. A solver step can then
@@ -265,9 +270,19 @@ class Constraints:
         limited, totals, weights = self._between(arm.joint_torque(motion), -limit, limit, limit)
 
         def gradients() -> FloatArray:
+            # directions of dry friction, states of presliding and twists of springs are constant
+            action = arm.along(motion).action()
+            by_q, by_dq, by_ddq = arm.link_slopes(motion)
+            if action.damping is not None:
+                by_dq = by_dq + action.damping
+            if action.inertia is not None:
+                by_ddq = by_ddq + action.inertia
+            if action.torque is not None:
+                more = action.torque_derivatives(motion)
+                by_q, by_dq = by_q + more[0], by_dq + more[1]
             parts = [
                 np.einsum('lk,klm,kc->lmc', weights, by[:, limited], basis, optimize=True)
-                for by, basis in zip(_torque_slopes(arm, motion), self.basis, strict=True)
+                for by, basis in zip((by_q, by_dq, by_ddq), self.basis, strict=True)
             ]
             return np.asarray(np.sum(parts, axis=0))
 
@@ -315,18 +330,3 @@ class Constraints:
         weights = np.exp(self.sharpness * (excess - largest))
         total = weights.sum(axis=-1, keepdims=True)
         return (largest + np.log(total) / self.sharpness)[..., 0], weights / total
-
-
-def _torque_slopes(arm: ArmModel, motion: Motion) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return derivatives of the joint torques by q, dq and ddq, shape (N, n, n) each."""
-    # directions of dry friction, states of presliding and twists of springs are held constant
-    action = arm.along(motion).action()
-    by_q, by_dq, by_ddq = arm.link_slopes(motion)
-    if action.damping is not None:
-        by_dq = by_dq + action.damping
-    if action.inertia is not None:
-        by_ddq = by_ddq + action.inertia
-    if action.torque is not None:
-        more = action.torque_derivatives(motion)
-        by_q, by_dq = by_q + more[0], by_dq + more[1]
-    return by_q, by_dq, by_ddq
