@@ -21,7 +21,7 @@ from armid_ros.identification.ties.recorded import recorded_interaction_problem
 from armid_ros.identification.ties.stiffness import identify_interaction, Interaction
 from armid_ros.motion import Motion
 from armid_ros.papers.exo.plant.gait import read_gait
-from armid_ros.papers.exo.plant.gait_cycle import driving_torque, gait_cycle
+from armid_ros.papers.exo.plant.gait_cycle import gait_cycle
 from armid_ros.papers.exo.plant.leg_pair import (
     exercise,
     EXERCISES,
@@ -31,6 +31,7 @@ from armid_ros.papers.exo.plant.leg_pair import (
     stepping,
     TiedPair,
 )
+from armid_ros.papers.exo.plant.torque_driven import driving_torque
 from armid_ros.papers.exo.plant.walkers import walking_pair
 from armid_ros.recording import Recording
 from armid_ros.robots.ties import SEGMENTS
@@ -68,7 +69,7 @@ def gait_by_torque() -> None:
         for rate, believed in ((100.0, None), (200.0, None), (1000.0, None), (200.0, soft)):
             tau = cycle.torques(believed)
             torque = driving_torque(cycle, joint, rate, tau)
-            path = walk_in_mujoco(cycle, joint, lambda t, torque=torque: torque(t)[2]).driven
+            path = walk_in_mujoco(cycle, joint, torque).driven
             error = path - cycle.motions.own.q[:, cycle.pair.robot.index(joint)]
             most = float(np.degrees(np.abs(error).max()))
             what = f'{joint}, {rate:.0f} Hz' + (', springs 20 % too soft' if believed else '')

@@ -30,7 +30,8 @@ from armid_ros.papers.elastic.experiments import (
 from armid_ros.papers.elastic.identification.interaction import ideal_response
 from armid_ros.papers.elastic.identification.three_steps import identify_two_inertia
 from armid_ros.papers.exo.plant.gait import read_gait
-from armid_ros.papers.exo.plant.gait_cycle import check_cycle, gait_cycle
+from armid_ros.papers.exo.plant.gait_cycle import gait_cycle
+from armid_ros.papers.exo.plant.torque_driven import check_cycle
 from armid_ros.papers.exo.plant.walkers import walking_pair
 from armid_ros.robots.two_link import two_link_set
 from armid_ros.simulation import Sensors

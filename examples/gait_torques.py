@@ -3,7 +3,8 @@
 """Drive a knee of the exoskeleton by its computed torque over a simulated gait cycle."""
 
 from armid_ros.papers.exo.plant.gait import read_gait
-from armid_ros.papers.exo.plant.gait_cycle import check_cycle, gait_cycle
+from armid_ros.papers.exo.plant.gait_cycle import gait_cycle
+from armid_ros.papers.exo.plant.torque_driven import check_cycle
 from armid_ros.papers.exo.plant.walkers import walking_pair
 import numpy as np
 

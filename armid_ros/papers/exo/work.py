@@ -13,8 +13,9 @@ from armid_ros.identification.ties.recorded import recorded_interaction_problem
 from armid_ros.identification.ties.stiffness import identify_interaction, Interaction
 from armid_ros.motion import Motion
 from armid_ros.papers.exo.plant.gait import Gait, read_assumptions
-from armid_ros.papers.exo.plant.gait_cycle import check_cycle, gait_cycle, ground_by_shares
+from armid_ros.papers.exo.plant.gait_cycle import gait_cycle, ground_by_shares
 from armid_ros.papers.exo.plant.leg_pair import pair_torques, PairMotion, TiedPair
+from armid_ros.papers.exo.plant.torque_driven import check_cycle
 from armid_ros.papers.exo.plant.walkers import walking_pair
 from armid_ros.papers.exo.report.walk import (
     DrivenJoint,

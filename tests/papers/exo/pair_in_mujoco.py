@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-The human-exoskeleton pair in MuJoCo: joints that follow torques, and a cycle on the ground.
+The human-exoskeleton pair in MuJoCo: a cycle on the ground, and a joint that follows a torque.
 
 MuJoCo reads both descriptions itself; the springs are tendons. Prescribed joints follow the
 reference. Their armature is so large that other torques do not move them, a torque accelerates it,
@@ -19,7 +19,6 @@ from xml.etree import ElementTree
 from armid_ros.motion import FloatArray
 from armid_ros.papers.exo.plant.gait_cycle import GaitCycle
 from armid_ros.papers.exo.plant.leg_pair import PairMotion, TiedPair
-from armid_ros.papers.exo.plant.torque_driven import DrivingTorque
 import mujoco
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline
@@ -51,25 +50,6 @@ class Walked:
     driven: FloatArray
     hips: FloatArray
     feet: FloatArray
-
-
-def drive_in_mujoco(
-    pair: TiedPair, motions: PairMotion, driven: Sequence[str], torque: DrivingTorque
-) -> FloatArray:
-    """
-    Simulate driven joints of the machine by torques; all other joints have prescribed motion.
-
-    Returns
-    -------
-    ndarray, shape (N, d)
-        Positions of the driven joints at the samples of the reference [rad].
-
-    """
-    model = _specification(pair).compile()
-    model.tendon_stiffness[:] = pair.stiffness
-    free = [int(model.joint(name).qposadr[0]) for name in driven]
-    states = _states(model, motions, free, free, torque, substeps=4)
-    return np.array([data.qpos[free] for data in states])
 
 
 def walk_in_mujoco(
@@ -119,12 +99,11 @@ def _states(
     motions: PairMotion,
     free: Sequence[int],
     driven: Sequence[int],
-    torque: Callable[[float], FloatArray | float] | None,
-    substeps: int = 1,
+    torque: Callable[[float], float] | None,
 ) -> Iterator[mujoco.MjData]:
     """Simulate, and yield the state of the engine at each sample of the reference."""
     own, other = motions
-    step = model.opt.timestep = float(own.t[1] - own.t[0]) / substeps
+    step = model.opt.timestep = float(own.t[1] - own.t[0])
     places = [model.joint(name).qposadr[0] for name in (*own.joints, *other.joints)]
     held = np.setdiff1d(np.arange(model.nv), free)
     model.dof_armature[held] = _HEAVY
@@ -143,14 +122,13 @@ def _states(
     mujoco.mj_forward(model, data)
     yield data
     for start in own.t[:-1]:
-        for t in start + step * np.arange(substeps):
-            middle = t + step / 2.0
-            data.qfrc_applied[:] = 0.0
-            data.qfrc_applied[held] = _HEAVY * reference(middle)[2, held]
-            if torque is not None:
-                data.qfrc_applied[driven] = torque(middle)
-            mujoco.mj_step(model, data)
-            data.qpos[held], data.qvel[held] = reference(t + step)[:2, held]
+        middle = start + step / 2.0
+        data.qfrc_applied[:] = 0.0
+        data.qfrc_applied[held] = _HEAVY * reference(middle)[2, held]
+        if torque is not None:
+            data.qfrc_applied[driven] = torque(middle)
+        mujoco.mj_step(model, data)
+        data.qpos[held], data.qvel[held] = reference(start + step)[:2, held]
         mujoco.mj_forward(model, data)
         yield data
 

@@ -3,7 +3,7 @@
 """A whole cycle: momentum, periodicity, supports, and the same in MuJoCo."""
 
 from armid_ros.model.kinematics import points_motion
-from armid_ros.papers.exo.plant.gait_cycle import check_cycle, driving_torque
+from armid_ros.papers.exo.plant.torque_driven import check_cycle, driving_torque
 from armid_ros.papers.exo.plant.walkers import contacts, floating
 import numpy as np
 import pinocchio as pin
@@ -84,7 +84,7 @@ def test_mujoco_walks_the_same_cycle(cycle) -> None:
 @pytest.mark.parametrize('joint', REACH)
 def test_a_joint_walks_the_cycle_by_its_torque_in_both_engines(cycle, joint) -> None:
     torque = driving_torque(cycle, joint, RATE)
-    path = walk_in_mujoco(cycle, joint, lambda t: torque(t)[2]).driven
+    path = walk_in_mujoco(cycle, joint, torque).driven
     check = check_cycle(cycle, joint, RATE)
     column = cycle.pair.robot.index(joint)
     errors = np.degrees(path - cycle.motions.own.q[:, column])

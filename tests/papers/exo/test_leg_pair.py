@@ -1,11 +1,11 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Two machines tied by springs: statics, exercises, and joints that follow torques."""
+"""Two machines tied by springs: statics, exercises, and their sensors."""
 
 from dataclasses import replace
 from itertools import islice
 
-from armid_ros.errors import ModelError, TrajectoryError
+from armid_ros.errors import ModelError
 from armid_ros.model import random_motion
 from armid_ros.papers.exo.plant.gait import read_gait
 from armid_ros.papers.exo.plant.leg_pair import (
@@ -18,11 +18,8 @@ from armid_ros.papers.exo.plant.leg_pair import (
     TiedPair,
 )
 from armid_ros.papers.exo.plant.simulated_pair import PairSample, sensor_readings
-from armid_ros.papers.exo.plant.torque_driven import drive_by_torque, splined
 import numpy as np
 import pytest
-
-from tests.papers.exo.pair_in_mujoco import drive_in_mujoco
 
 STIFFNESS = np.array([1.0e4, 2.0e4, 5.0e3, 3.0e4])
 
@@ -94,37 +91,6 @@ def test_knees_bend_one_way_and_the_stance_foot_is_flat(name) -> None:
     ankle, knee, hip, _, far_knee, _ = wearer.q.T
     assert min(knee.min(), far_knee.min()) > -0.05
     np.testing.assert_allclose(ankle, knee - hip, atol=1e-12)
-
-
-RATE = 100.0
-#: How far joints are off with springs that are 20 % too soft [deg].
-DRIVEN = {'exo_swing_hip': 1.14, 'exo_swing_knee': 2.81}
-
-
-@pytest.fixture(scope='module')
-def step() -> PairMotion:
-    return stepping(PAIR, read_gait(), np.linspace(0.0, 0.456, 229), 0.912)
-
-
-def most(error: np.ndarray) -> float:
-    return float(np.degrees(np.abs(error).max()))
-
-
-@pytest.mark.parametrize('joint', DRIVEN)
-def test_springs_believed_too_soft_lead_both_engines_astray_alike(step, joint) -> None:
-    soft = PAIR.with_stiffness(0.8 * PAIR.stiffness)
-    column = [PAIR.robot.index(joint)]
-    torque = splined(step.own.t, pair_torques(soft, *step).tau[:, column], RATE)
-    followed = drive_by_torque(PAIR, *step, [joint], torque).q[:, column]
-    assert most(followed - step.own.q[::2, column]) == pytest.approx(DRIVEN[joint], abs=0.02)
-    path = drive_in_mujoco(PAIR, step, [joint], torque)[::2]
-    assert most(path - followed) < 0.01
-
-
-def test_an_even_number_of_samples_is_refused() -> None:
-    even = stepping(PAIR, read_gait(), np.linspace(0.0, 0.4, 20))
-    with pytest.raises(TrajectoryError, match='odd'):
-        drive_by_torque(PAIR, *even, ['exo_swing_hip'], lambda t: np.zeros(1))
 
 
 def simulated(count: int, **options) -> list[PairSample]:

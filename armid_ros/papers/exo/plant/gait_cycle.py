@@ -17,7 +17,7 @@ and of its share of the trunk, minus the spring forces. A single foot bears the 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 from armid_ros.model import inverse_dynamics
@@ -25,13 +25,6 @@ from armid_ros.model.kinematics import points_motion
 from armid_ros.motion import FloatArray, Motion, read_only
 from armid_ros.papers.exo.plant.gait import Gait, read_assumptions
 from armid_ros.papers.exo.plant.leg_pair import pair_torques, PairMotion, PairTorques, TiedPair
-from armid_ros.papers.exo.plant.torque_driven import (
-    drive_by_torque,
-    DrivingTorque,
-    GaitCheck,
-    runge_kutta,
-    splined,
-)
 from armid_ros.papers.exo.plant.walkers import (
     columns,
     contacts,
@@ -47,6 +40,8 @@ from armid_ros.robots import Robot
 import numpy as np
 import numpy.typing as npt
 
+#: Function for the rate of a state, shape (s,), at a sample of the prescribed motion.
+Rate = Callable[[int, FloatArray], FloatArray]
 #: Integration steps per cycle.
 _STEPS_PER_CYCLE = 2400
 _PLANE = np.array([0, 2])
@@ -310,42 +305,32 @@ def _walk(
     return states.reshape(-1, 2, 2, 2), rates.reshape(-1, 2, 2, 2)
 
 
-def check_cycle(
-    cycle: GaitCycle, joint: str, rate: float, tau: FloatArray | None = None
-) -> GaitCheck:
+def runge_kutta(rate: Rate, k: int, h: float, x: FloatArray) -> tuple[FloatArray, FloatArray]:
     """
-    Simulate a gait cycle in which a given torque drives one joint of the exoskeleton.
-
-    The source does this check in another simulator and gives the errors of hip and knee. The hips
-    are free, and the feet touch the ground.
+    Integrate a state from sample k to sample k + 2 by one Runge-Kutta step of order 4.
 
     Parameters
     ----------
-    cycle : GaitCycle
-        Prescribed motion, and its forces.
-    joint : str
-        The joint that follows its torque.
-    rate : float
-        Torque samples per second, joined by cubic splines.
-    tau : ndarray, shape (N, n), optional
-        Torques of the machine [N m]; by default those of the cycle.
+    rate : callable
+        Function that returns the time derivative of the state at a sample.
+    k : int
+        First sample.
+    h : float
+        Time from sample k to k + 2 [s].
+    x : ndarray, shape (s,)
+        State at sample k.
+
+    Returns
+    -------
+    slope, after : ndarray, shape (s,)
+        Time derivative at sample k, and state at sample k + 2.
 
     """
-    pair, motions = cycle.pair, cycle.motions
-    torque = driving_torque(cycle, joint, rate, tau)
-    hips = [pair.robot.joints[place] for place in floating(pair.robot)[:2]]
-    moved = drive_by_torque(pair, *motions, [*hips, joint], torque, on_ground=True)
-    return GaitCheck(joint, motions.own.q[::2, pair.robot.index(joint)], moved)
-
-
-def driving_torque(
-    cycle: GaitCycle, joint: str, rate: float, tau: FloatArray | None = None
-) -> DrivingTorque:
-    """Return a function from time [s] to (3,): two zero hip forces, torque of a joint."""
-    column = [cycle.pair.robot.index(joint)]
-    own = (cycle.own.tau if tau is None else tau)[:, column]
-    curve = splined(cycle.own.motion.t, own, rate)
-    return lambda t: np.concatenate([[0.0, 0.0], curve(t)])
+    a = rate(k, x)
+    b = rate(k + 1, x + 0.5 * h * a)
+    c = rate(k + 1, x + 0.5 * h * b)
+    d = rate(k + 2, x + h * c)
+    return a, x + h / 6.0 * (a + 2.0 * (b + c) + d)
 
 
 def ground_by_shares(cycle: GaitCycle) -> FloatArray:

@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Simulation in which some joints follow torques and all others a prescribed motion.
+Simulation of a gait cycle in which one joint of the exoskeleton follows a torque.
 
 The source checks its torques in this way: one joint is driven by its torque, and all others are
 prescribed. If all joints are driven by torques alone, the pair is an inverted pendulum and falls.
@@ -10,174 +10,15 @@ prescribed. If all joints are driven by torques alone, the pair is an inverted p
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-from armid_ros.errors import TrajectoryError
 from armid_ros.motion import FloatArray, Motion
-from armid_ros.papers.exo.plant.leg_pair import PairMotion, TiedPair
-from armid_ros.papers.exo.plant.walkers import contacts, ground_force
+from armid_ros.papers.exo.plant.gait_cycle import GaitCycle, Rate, runge_kutta
+from armid_ros.papers.exo.plant.walkers import contacts, floating, ground_force
 import numpy as np
 import pinocchio as pin
 from scipy.interpolate import CubicSpline
-
-#: Torques of the driven joints, shape (d,) [N m], at a time [s].
-DrivingTorque = Callable[[float], FloatArray]
-#: Function for the rate of a state, shape (s,), at a sample of the prescribed motion.
-Rate = Callable[[int, FloatArray], FloatArray]
-
-
-def splined(t: FloatArray, tau: FloatArray, rate: float) -> DrivingTorque:
-    """
-    Return torques as a function of time: cubic splines through samples at a given rate.
-
-    Parameters
-    ----------
-    t : ndarray, shape (N,)
-        Time [s].
-    tau : ndarray, shape (N, d)
-        Torques [N m].
-    rate : float
-        Samples kept per second.
-
-    """
-    count = max(4, round((t[-1] - t[0]) * rate) + 1)
-    knots = np.linspace(t[0], t[-1], count)
-    curve = CubicSpline(knots, CubicSpline(t, tau)(knots))
-    return lambda time: np.asarray(curve(time))
-
-
-def runge_kutta(rate: Rate, k: int, h: float, x: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """
-    Integrate a state from sample k to sample k + 2 by one Runge-Kutta step of order 4.
-
-    Parameters
-    ----------
-    rate : callable
-        Function that returns the time derivative of the state at a sample.
-    k : int
-        First sample.
-    h : float
-        Time from sample k to k + 2 [s].
-    x : ndarray, shape (s,)
-        State at sample k.
-
-    Returns
-    -------
-    slope, after : ndarray, shape (s,)
-        Time derivative at sample k, and state at sample k + 2.
-
-    """
-    a = rate(k, x)
-    b = rate(k + 1, x + 0.5 * h * a)
-    c = rate(k + 1, x + 0.5 * h * b)
-    d = rate(k + 2, x + h * c)
-    return a, x + h / 6.0 * (a + 2.0 * (b + c) + d)
-
-
-def drive_by_torque(
-    pair: TiedPair,
-    motion: Motion,
-    other_motion: Motion,
-    driven: Sequence[str],
-    torque: DrivingTorque,
-    *,
-    on_ground: bool = False,
-) -> Motion:
-    """
-    Simulate joints of the exoskeleton that torques drive; other joints move as prescribed.
-
-    Parameters
-    ----------
-    pair : TiedPair
-        The machines and their springs.
-    motion, other_motion : Motion
-        Prescribed motion on an even time base of an odd number of samples; the driven joints
-        start from it.
-    driven : sequence of str
-        Joints of the machine that follow torques.
-    torque : callable
-        Function that returns their torques.
-    on_ground : bool
-        Whether the pair is free to walk, with ground under its feet.
-
-    Returns
-    -------
-    Motion
-        Motion of the machine at every other sample; a Runge-Kutta step of order 4 spans two.
-
-    Raises
-    ------
-    TrajectoryError
-        If the number of samples is even.
-
-    """
-    if len(motion) % 2 == 0:
-        raise TrajectoryError(
-            f'the motion has {len(motion)} samples; integration steps span two samples, so the '
-            'number must be odd'
-        )
-    columns = [pair.robot.index(joint) for joint in driven]
-    rate = _forward_dynamics(pair, PairMotion(motion, other_motion), columns, torque, on_ground)
-    x = np.concatenate([motion.q[0, columns], motion.dq[0, columns]])
-    rows = []
-    for k in range(0, len(motion) - 2, 2):
-        slope, after = runge_kutta(rate, k, float(motion.t[k + 2] - motion.t[k]), x)
-        rows.append((x, slope))
-        x = after
-    rows.append((x, rate(len(motion) - 1, x)))
-    states, slopes = (np.array(part) for part in zip(*rows, strict=True))
-    count = len(columns)
-    result = [np.array(part[::2]) for part in (motion.q, motion.dq, motion.ddq)]
-    result[0][:, columns], result[1][:, columns] = states[:, :count], states[:, count:]
-    result[2][:, columns] = slopes[:, count:]
-    return replace(motion, t=motion.t[::2], q=result[0], dq=result[1], ddq=result[2], tau=None)
-
-
-def _forward_dynamics(
-    pair: TiedPair,
-    motions: PairMotion,
-    free: list[int],
-    torque: DrivingTorque,
-    on_ground: bool,
-) -> Rate:
-    """Return a function for the state derivative of the joints with indices `free`."""
-    robot, own, tied = pair.robot, motions.own, len(pair.ties)
-    ends = [(tie.joint, np.array(tie.point)) for tie in pair.ties]
-    if on_ground:
-        ends += zip(*contacts(robot), strict=True)
-    model, operational = pin.Model(robot.model), pin.FrameType.OP_FRAME
-    frames = [
-        model.addFrame(
-            pin.Frame(f'end {k}', robot.index(joint) + 1, pin.SE3(np.eye(3), point), operational)
-        )
-        for k, (joint, point) in enumerate(ends)
-    ]
-    data, count = model.createData(), len(free)
-    far = pair.geometry(own, motions.other).other_position
-    aligned = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
-
-    def rate(k: int, x: FloatArray) -> FloatArray:
-        q, dq, ddq = (np.array(part[k]) for part in (own.q, own.dq, own.ddq))
-        q[free], dq[free], ddq[free] = x[:count], x[count:], 0.0
-        load = pin.rnea(model, data, q, dq, ddq)
-        inertia = pin.crba(model, data, q)
-        pin.computeJointJacobians(model, data, q)
-        pin.updateFramePlacements(model, data)
-        place = np.array([data.oMf[frame].translation for frame in frames])
-        jacobian = np.array(
-            [pin.getFrameJacobian(model, data, frame, aligned)[:3] for frame in frames]
-        )
-        force = np.zeros_like(place)
-        force[:tied] = pair.forces(place[:tied] - far[k])
-        if on_ground:
-            feet, moving = place[tied:], jacobian[tied:] @ dq
-            force[tied:, ::2] = ground_force(feet[:, 2], moving[:, 2], moving[:, 0])
-        push = torque(float(own.t[k])) - load[free]
-        push += np.einsum('cxj,cx->j', jacobian, force)[free]
-        return np.concatenate([x[count:], np.linalg.solve(inertia[np.ix_(free, free)], push)])
-
-    return rate
 
 
 @dataclass(frozen=True)
@@ -214,3 +55,105 @@ class GaitCheck:
     def most(self) -> float:
         """Largest position error of the torque-driven joint [deg]."""
         return float(np.degrees(np.abs(self.error).max()))
+
+
+def driving_torque(
+    cycle: GaitCycle, joint: str, rate: float, tau: FloatArray | None = None
+) -> CubicSpline:
+    """
+    Return the torque of a joint as a function of time [s]: cubic splines at a given rate.
+
+    Parameters
+    ----------
+    cycle : GaitCycle
+        Gait cycle.
+    joint : str
+        Joint of the exoskeleton.
+    rate : float
+        Samples kept per second.
+    tau : ndarray, shape (N, n), optional
+        Torques of the machine [N m]; by default those of the cycle.
+
+    """
+    t, own = cycle.own.motion.t, cycle.own.tau if tau is None else tau
+    knots = np.linspace(t[0], t[-1], max(4, round((t[-1] - t[0]) * rate) + 1))
+    return CubicSpline(knots, CubicSpline(t, own[:, cycle.pair.robot.index(joint)])(knots))
+
+
+def check_cycle(
+    cycle: GaitCycle, joint: str, rate: float, tau: FloatArray | None = None
+) -> GaitCheck:
+    """
+    Simulate a gait cycle in which a given torque drives one joint of the exoskeleton.
+
+    The source does this check in another simulator and gives the errors of hip and knee. The hips
+    are free, and the feet touch the ground. A Runge-Kutta step of order 4 spans two samples, so
+    the result has every other sample.
+
+    Parameters
+    ----------
+    cycle : GaitCycle
+        Prescribed motion, and its forces.
+    joint : str
+        The joint that follows its torque.
+    rate : float
+        Torque samples per second, joined by cubic splines.
+    tau : ndarray, shape (N, n), optional
+        Torques of the machine [N m]; by default those of the cycle.
+
+    """
+    robot, motion = cycle.pair.robot, cycle.own.motion
+    free = [*floating(robot)[:2], robot.index(joint)]
+    slope = _forward_dynamics(cycle, free, driving_torque(cycle, joint, rate, tau))
+    x = np.concatenate([motion.q[0, free], motion.dq[0, free]])
+    rows = []
+    for k in range(0, len(motion) - 2, 2):
+        now, after = runge_kutta(slope, k, float(motion.t[k + 2] - motion.t[k]), x)
+        rows.append((x, now))
+        x = after
+    rows.append((x, slope(len(motion) - 1, x)))
+    states, slopes = (np.array(part) for part in zip(*rows, strict=True))
+    q, dq, ddq = (np.array(part[::2]) for part in (motion.q, motion.dq, motion.ddq))
+    q[:, free], dq[:, free], ddq[:, free] = states[:, :3], states[:, 3:], slopes[:, 3:]
+    moved = replace(motion, t=motion.t[::2], q=q, dq=dq, ddq=ddq, tau=None)
+    return GaitCheck(joint, motion.q[::2, free[2]], moved)
+
+
+def _forward_dynamics(
+    cycle: GaitCycle, free: list[int], torque: Callable[[float], FloatArray]
+) -> Rate:
+    """Return a function for the state derivative of the hips and of the driven joint."""
+    pair, robot, own, tied = cycle.pair, cycle.pair.robot, cycle.own.motion, len(cycle.pair.ties)
+    ends = [(tie.joint, np.array(tie.point)) for tie in pair.ties]
+    ends += zip(*contacts(robot), strict=True)
+    model, operational = pin.Model(robot.model), pin.FrameType.OP_FRAME
+    frames = [
+        model.addFrame(
+            pin.Frame(f'end {k}', robot.index(joint) + 1, pin.SE3(np.eye(3), point), operational)
+        )
+        for k, (joint, point) in enumerate(ends)
+    ]
+    data, count = model.createData(), len(free)
+    far = pair.geometry(*cycle.motions).other_position
+    aligned = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+
+    def rate(k: int, x: FloatArray) -> FloatArray:
+        q, dq, ddq = (np.array(part[k]) for part in (own.q, own.dq, own.ddq))
+        q[free], dq[free], ddq[free] = x[:count], x[count:], 0.0
+        load = pin.rnea(model, data, q, dq, ddq)
+        inertia = pin.crba(model, data, q)
+        pin.computeJointJacobians(model, data, q)
+        pin.updateFramePlacements(model, data)
+        place = np.array([data.oMf[frame].translation for frame in frames])
+        jacobian = np.array(
+            [pin.getFrameJacobian(model, data, frame, aligned)[:3] for frame in frames]
+        )
+        feet, moving = place[tied:], jacobian[tied:] @ dq
+        force = np.zeros_like(place)
+        force[:tied] = pair.forces(place[:tied] - far[k])
+        force[tied:, ::2] = ground_force(feet[:, 2], moving[:, 2], moving[:, 0])
+        push = np.einsum('cxj,cx->j', jacobian, force)[free] - load[free]
+        push[-1] += torque(float(own.t[k]))  # no force acts on the hips
+        return np.concatenate([x[count:], np.linalg.solve(inertia[np.ix_(free, free)], push)])
+
+    return rate
