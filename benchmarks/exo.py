@@ -13,7 +13,6 @@ and the motions that determine four springs.
 from __future__ import annotations
 
 import argparse
-from dataclasses import replace
 
 from armid_ros.errors import IdentificationError
 from armid_ros.identification.ties.problem import Inertias, interaction_problem
@@ -26,10 +25,11 @@ from armid_ros.papers.exo.plant.leg_pair import (
     exercise,
     EXERCISES,
     leg_pair,
-    pair_torques,
     PairMotion,
     stepping,
     TiedPair,
+    with_noise,
+    with_torques,
 )
 from armid_ros.papers.exo.plant.torque_driven import driving_torque
 from armid_ros.papers.exo.plant.walkers import walking_pair
@@ -126,13 +126,14 @@ def find_springs(
     separate: bool = False,
 ) -> Interaction:
     """Add noise, and identify straps from poses, or from a recording if it has 1000 samples."""
-    own, other = measured(motions, degrees, np.random.default_rng(seed))
+    noise = np.radians(degrees), TORQUE_NOISE
+    own, other = with_noise(motions, *noise, np.random.default_rng(seed))
     if len(own) < 1000:
         problem = interaction_problem(
             pair,
             own,
             other,
-            noise=(np.radians(degrees), TORQUE_NOISE),
+            noise=noise,
             inertias=inertias,
             separate=separate,
         )
@@ -146,21 +147,6 @@ def find_springs(
             separate=separate,
         )
     )
-
-
-def with_torques(pair: TiedPair, motions: PairMotion) -> PairMotion:
-    """Return a motion of both machines with the exact torques of the exoskeleton."""
-    return PairMotion(motions.own.with_torque(pair_torques(pair, *motions).tau), motions.other)
-
-
-def measured(motions: PairMotion, degrees: float, rng: np.random.Generator) -> PairMotion:
-    """Return a motion of both machines with sensor noise on angles and torques."""
-    own, other = (
-        replace(m, q=m.q + np.radians(degrees) * rng.normal(size=m.q.shape)) for m in motions
-    )
-    assert own.tau is not None
-    tau = own.tau + TORQUE_NOISE * rng.normal(size=own.tau.shape)
-    return PairMotion(own.with_torque(tau), other)
 
 
 def recorded(motion: Motion, start_ns: int = 0) -> Recording:

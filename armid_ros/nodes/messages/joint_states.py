@@ -50,7 +50,7 @@ class JointSample(NamedTuple):
     t : float
         Time since the full second before the first sample [s].
     q, tau : ndarray, shape (n,)
-        Position [rad or m], torque [N m or N].
+        Position [rad or m], torque [N m or N]; no torques if the reader reads none.
     dq : ndarray, shape (n,), or None
         Velocity; None where the message has none.
 
@@ -74,13 +74,25 @@ class JointStateReader:
         Logs skipped messages.
     clock : Clock
         Clock for the time of reception of messages without a stamp.
+    topic : str
+        Topic that the logged messages name; empty for the only topic of a node.
+    torque : bool
+        Whether the messages have to contain torques.
 
     """
 
-    def __init__(self, joints: tuple[str, ...], complaints: Complaints, clock: Clock) -> None:
+    def __init__(
+        self,
+        joints: tuple[str, ...],
+        complaints: Complaints,
+        clock: Clock,
+        topic: str = '',
+        torque: bool = True,
+    ) -> None:
         self._joints = joints
         self._complaints = complaints
         self._clock = clock
+        self._topic, self._torque = topic, torque
         self._messages = JointStateMessages()
         self._names: Sequence[str] | None = None
         self._order: npt.NDArray[np.intp]
@@ -99,9 +111,12 @@ class JointStateReader:
                 dq = self._ordered(message.names, message.velocity, 'velocity')
                 # joint_state_broadcaster publishes NaN for velocities that are not measured
                 dq = dq if math.isfinite(sum(dq.tolist())) else None
-            tau = self._values(message.names, message.effort, 'effort')
+            tau = np.empty(0)
+            if self._torque:
+                tau = self._values(message.names, message.effort, 'effort')
         except (MalformedMessage, RecordingError) as error:
-            self._complaints.add('joint_states', str(error))
+            text = f'{self._topic}: {error}' if self._topic else str(error)
+            self._complaints.add(self._topic or 'joint_states', text)
             return None
         return JointSample(stamp, q, dq, tau)
 

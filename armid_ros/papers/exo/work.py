@@ -14,7 +14,7 @@ from armid_ros.identification.ties.stiffness import identify_interaction, Intera
 from armid_ros.motion import Motion
 from armid_ros.papers.exo.plant.gait import Gait, read_assumptions
 from armid_ros.papers.exo.plant.gait_cycle import gait_cycle, ground_by_shares
-from armid_ros.papers.exo.plant.leg_pair import pair_torques, PairMotion, TiedPair
+from armid_ros.papers.exo.plant.leg_pair import PairMotion, TiedPair, with_noise, with_torques
 from armid_ros.papers.exo.plant.torque_driven import check_cycle
 from armid_ros.papers.exo.plant.walkers import walking_pair
 from armid_ros.papers.exo.report.walk import (
@@ -40,13 +40,11 @@ def record(
     rng: Generator,
 ) -> None:
     """Write a bag with noisy joint states; `noise`: std of angles [deg] and torques [N m]."""
-    tau = pair_torques(pair, *motions).tau
-    tau = tau + noise[1] * rng.normal(size=tau.shape)
+    measured = with_noise(with_torques(pair, motions), float(np.radians(noise[0])), noise[1], rng)
     stamps = 10**9 + np.rint(motions.own.t * 1e9).astype(np.int64)
     with atomic_bag(path) as writer:
-        for topic, motion, torque in zip(topics, motions, (tau, None), strict=True):
-            q = motion.q + np.radians(noise[0]) * rng.normal(size=motion.q.shape)
-            write_joint_states(writer, topic, motion.joints, stamps, q, None, torque)
+        for topic, motion in zip(topics, measured, strict=True):
+            write_joint_states(writer, topic, motion.joints, stamps, motion.q, None, motion.tau)
 
 
 def walk(pair: TiedPair, gait: Gait, stiffness: float | None, tick: Tick) -> SimulatedWalk:

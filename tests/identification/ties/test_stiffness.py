@@ -12,12 +12,19 @@ from armid_ros.identification.ties.recorded import recorded_interaction_problem
 from armid_ros.identification.ties.stiffness import identify_interaction, Interaction
 from armid_ros.model.spring_ties import TiedMachines
 from armid_ros.papers.exo.plant.gait import read_gait
-from armid_ros.papers.exo.plant.leg_pair import leg_pair, PairMotion, stepping, TiedPair
+from armid_ros.papers.exo.plant.leg_pair import (
+    leg_pair,
+    PairMotion,
+    stepping,
+    TiedPair,
+    with_noise,
+    with_torques,
+)
 import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from benchmarks.exo import find_springs, measured, recorded, with_torques
+from benchmarks.exo import find_springs, recorded
 
 STIFFNESS = 1.0e4
 
@@ -82,7 +89,7 @@ def test_a_recording_gives_them_within_per_cent(pair, seconds, inertias, one, ea
 
 
 def test_recordings_need_not_begin_together(pair, seconds) -> None:
-    own, other = measured(seconds, 0.05, np.random.default_rng(0))
+    own, other = with_noise(seconds, np.radians(0.05), 0.5, np.random.default_rng(0))
     late = other.select(slice(700, None))
     late = recorded(replace(late, t=late.t - late.t[0]), start_ns=700 * 10**6)
     found = identify_interaction(recorded_interaction_problem(pair, recorded(own), late))
@@ -137,7 +144,8 @@ def test_inertias_of_links_that_hardly_turn_stay_near_their_description(pair) ->
     """The trunk's inertia is a column of noise: without a belief its best value is infinite."""
     real = leg_pair(3e3, ('stance_thigh',))
     motions = with_torques(real, stepping(real, read_gait(), np.arange(0.0, 4.0, 1e-3)))
-    sides = (recorded(side) for side in measured(motions, 0.05, np.random.default_rng(9)))
+    readings = with_noise(motions, np.radians(0.05), 0.5, np.random.default_rng(9))
+    sides = (recorded(side) for side in readings)
     problem = recorded_interaction_problem(pair, *sides, inertias='free', separate=True)
     found = identify_interaction(problem)
     away = found.estimate.values - problem.described

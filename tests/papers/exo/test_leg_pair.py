@@ -3,7 +3,6 @@
 """Two machines tied by springs: statics, exercises, and their sensors."""
 
 from dataclasses import replace
-from itertools import islice
 
 from armid_ros.errors import ModelError
 from armid_ros.model import random_motion
@@ -16,8 +15,9 @@ from armid_ros.papers.exo.plant.leg_pair import (
     PairMotion,
     stepping,
     TiedPair,
+    with_noise,
+    with_torques,
 )
-from armid_ros.papers.exo.plant.simulated_pair import PairSample, sensor_readings
 import numpy as np
 import pytest
 
@@ -93,25 +93,10 @@ def test_knees_bend_one_way_and_the_stance_foot_is_flat(name) -> None:
     np.testing.assert_allclose(ankle, knee - hip, atol=1e-12)
 
 
-def simulated(count: int, **options) -> list[PairSample]:
-    rng = np.random.default_rng(0)
-    return list(islice(sensor_readings(leg_pair(), read_gait(), rng=rng, **options), count))
-
-
-def test_without_noise_it_is_the_gait_and_its_torques():
-    pair, samples = leg_pair(), simulated(120)
-    motions = stepping(pair, read_gait(), np.array([s.t for s in samples]))
-    np.testing.assert_allclose([s.q for s in samples], motions.own.q, atol=1e-12)
-    np.testing.assert_allclose([s.other_q for s in samples], motions.other.q, atol=1e-12)
-    np.testing.assert_allclose(
-        [s.tau for s in samples], pair_torques(pair, *motions).tau, atol=1e-9
-    )
-
-
-def test_noise_has_the_size_asked_for_and_comes_from_the_seed():
-    noise = {'angle_noise': 1e-3, 'torque_noise': 0.5}
-    triples = list(zip(*(simulated(200, **one) for one in (noise, noise, {})), strict=True))
-    errors = np.array([a.q - c.q for a, _, c in triples])
-    assert errors.std() == pytest.approx(1e-3, rel=0.1)
-    assert np.array([a.tau - c.tau for a, _, c in triples]).std() == pytest.approx(0.5, rel=0.1)
-    assert all(np.array_equal(a.q, b.q) for a, b, _ in triples)
+def test_noise_has_the_size_asked_for_and_comes_from_the_seed() -> None:
+    exact = with_torques(PAIR, stepping(PAIR, read_gait(), T))
+    one, again = (with_noise(exact, 1e-3, 0.5, np.random.default_rng(0)) for _ in range(2))
+    for found, true in zip(one, exact, strict=True):
+        assert (found.q - true.q).std() == pytest.approx(1e-3, rel=0.1)
+    assert (one.own.tau - exact.own.tau).std() == pytest.approx(0.5, rel=0.1)
+    np.testing.assert_array_equal(one.own.q, again.own.q)

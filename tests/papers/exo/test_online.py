@@ -2,12 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Springs found while both move, and slack where there is some."""
 
-from itertools import islice
-
 from armid_ros.errors import IdentificationError
 from armid_ros.papers.exo.plant.gait import read_gait
-from armid_ros.papers.exo.plant.leg_pair import leg_pair
-from armid_ros.papers.exo.plant.simulated_pair import sensor_readings
+from armid_ros.papers.exo.plant.leg_pair import leg_pair, stepping, with_noise, with_torques
 from armid_ros.papers.exo.springs import OnlineInteraction
 import numpy as np
 import pytest
@@ -18,12 +15,13 @@ SETTINGS = {'memory': 4.0, 'period': 2.0}
 
 def identified(slack: float = 0.0, seconds: float = 4.2) -> OnlineInteraction:
     pair = leg_pair(1e4).with_slack(slack)
-    rng = np.random.default_rng(0)
-    walking = sensor_readings(pair, read_gait(), rate=500.0, rng=rng, **NOISE)
+    walking = stepping(pair, read_gait(), np.arange(1, 500.0 * seconds) / 500.0)
+    exact = with_torques(pair, walking)
+    own, other = with_noise(exact, **NOISE, rng=np.random.default_rng(0))
     online = OnlineInteraction(pair, **SETTINGS)
-    for sample in islice(walking, round(500.0 * seconds)):
-        online.take_other(sample.t, sample.other_q)
-        online.take(sample.t, sample.q, sample.tau)
+    for t, q, tau, other_q in zip(own.t, own.q, own.tau, other.q, strict=True):
+        online.take_other(t, other_q)
+        online.take(t, q, tau)
     return online
 
 

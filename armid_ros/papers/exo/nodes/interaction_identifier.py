@@ -12,13 +12,12 @@ from typing import Any
 from armid_msgs.msg import ParameterEstimate
 from armid_ros.errors import RecordingError
 from armid_ros.identification.rows.causal import MAX_MAGNITUDE
-from armid_ros.identification.samples.joint_merge import joint_places
 from armid_ros.identification.samples.spikes import SpikeGate
 from armid_ros.identification.samples.straight_line import StreamSample
 from armid_ros.identification.ties.stiffness import Interaction
 from armid_ros.nodes.base import ArmidNode, LOOK_PERIOD
 from armid_ros.nodes.messages.estimates import estimate_message
-from armid_ros.nodes.messages.joint_states import DISTURBANCES
+from armid_ros.nodes.messages.joint_states import DISTURBANCES, JointStateReader
 from armid_ros.nodes.messages.timeliness import Freshness
 from armid_ros.nodes.parameters.table import NodeParameter
 from armid_ros.nodes.qos import LATCHED, MatchedSubscription
@@ -27,11 +26,10 @@ from armid_ros.papers.exo.plant.leg_pair import leg_pair
 from armid_ros.papers.exo.springs import OnlineInteraction
 from diagnostic_msgs.msg import DiagnosticStatus
 import numpy as np
+from rclpy.time import Time
 from sensor_msgs.msg import JointState
 
 _TOPICS = ('exo/joint_states', 'human/joint_states')
-#: Used fields of the messages of each machine.
-_FIELDS = (('position', 'effort'), ('position',))
 #: Warning about joint states that are left out.
 _DAMAGED = DISTURBANCES | {
     'spike': 'joint states that jump for single samples are left out',
@@ -79,7 +77,12 @@ class InteractionIdentifierNode(ArmidNode):
         self.identifier = OnlineInteraction(pair, **settings)
         self.received = 0
         self._estimates = self.create_publisher(ParameterEstimate, '~/estimate', LATCHED)
-        self._joints = pair.robot.joints, pair.other.joints
+        self._readers = tuple(
+            JointStateReader(
+                robot.joints, self.complaints, self.get_clock(), topic, robot is pair.robot
+            )
+            for robot, topic in zip((pair.robot, pair.other), _TOPICS, strict=True)
+        )
         self._gates = tuple(
             SpikeGate(robot.prismatic, signals, torque_limit=robot.torque_limit)
             for robot, signals in ((pair.robot, 'qt'), (pair.other, 'q'))
@@ -87,11 +90,15 @@ class InteractionIdentifierNode(ArmidNode):
         self._told: list[Counter[str]] = [Counter(), Counter()]
         self.freshness = tuple(Freshness(topic) for topic in _TOPICS)
         self._stopped = False
-        self._epoch: int | None = None
-        # several seconds at 1 kHz
+        self._epoch_ns = 0
         self.topics = tuple(
             MatchedSubscription(
-                self, JointState, topic, lambda message, k=k: self._take(k, message), depth=10_000
+                self,
+                JointState,
+                topic,
+                partial(self._take, k),
+                raw=True,
+                depth=10_000,  # several seconds at 1 kHz
             )
             for k, topic in enumerate(_TOPICS)
         )
@@ -144,12 +151,13 @@ class InteractionIdentifierNode(ArmidNode):
             return DiagnosticStatus.STALE
         return super().level(troubled)
 
-    def _take(self, machine: int, message: JointState) -> None:
+    def _take(self, machine: int, data: bytes) -> None:
         """Process a joint state of exoskeleton (0) or wearer (1); publish any new estimate."""
         self.received += 1
         self.freshness[machine].mark_received()
-        topic, n = _TOPICS[machine], len(self._joints[machine])
-        for sample in self._signals(machine, message):
+        topic, machines = _TOPICS[machine], self.identifier.machines
+        n = (machines.other if machine else machines.robot).n_joints
+        for sample in self._signals(machine, data):
             if sample.begins:
                 self.identifier.interrupt()
                 text = f'{topic}: positions jump; earlier samples are discarded'
@@ -161,30 +169,22 @@ class InteractionIdentifierNode(ArmidNode):
                 found = self.identifier.separate
                 assert found is not None
                 estimate = estimate_message(found.estimate, len(found.residual))
-                estimate.header = message.header
+                stamp_ns = self._epoch_ns + round(1e9 * sample.t)
+                estimate.header.stamp = Time(nanoseconds=stamp_ns).to_msg()
                 self._estimates.publish(estimate)
 
-    def _signals(self, machine: int, message: JointState) -> list[StreamSample]:
-        """Convert a joint state to valid samples; RecordingError for an invalid message."""
-        topic, gate, fields = _TOPICS[machine], self._gates[machine], _FIELDS[machine]
-        order = joint_places(self._joints[machine], message.name)
-        parts = [np.array(getattr(message, name)) for name in fields]
-        for name, part in zip(fields, parts, strict=True):
-            if len(part) != len(message.name):
-                raise RecordingError(
-                    f'a message has {len(message.name)} names, but {len(part)} values of {name}'
-                )
-        signal = np.concatenate([part[order] for part in parts])
+    def _signals(self, machine: int, data: bytes) -> list[StreamSample]:
+        """Decode a joint state to valid samples; RecordingError for impossible values."""
+        topic, gate, reader = _TOPICS[machine], self._gates[machine], self._readers[machine]
+        read = reader.read(data)
+        if read is None:
+            return []
+        signal = np.concatenate([read.q, read.tau])
         if not np.all(np.abs(signal) <= MAX_MAGNITUDE):
-            raise RecordingError(
-                f'a {" or ".join(fields)} is above {MAX_MAGNITUDE:g} or not finite'
-            )
-        stamp = message.header.stamp
-        if stamp.sec < 0 or stamp.nanosec >= 10**9:
-            raise RecordingError(f'a time stamp is invalid: {stamp.sec} s, {stamp.nanosec} ns')
-        if self._epoch is None:
-            self._epoch = stamp.sec
-        good = gate.take(float(stamp.sec - self._epoch) + 1e-9 * stamp.nanosec, signal)
+            raise RecordingError(f'a position or an effort is above {MAX_MAGNITUDE:g}')
+        stamp_ns = reader.stamp(read.t).nanoseconds
+        self._epoch_ns = self._epoch_ns or stamp_ns  # common to both machines
+        good = gate.take(1e-9 * (stamp_ns - self._epoch_ns), signal)
         for reason, count in (gate.rejected - self._told[machine]).items():
             for _ in range(count):
                 self.complaints.add(f'{topic} {reason}', f'{topic}: {_DAMAGED[reason]}')

@@ -4,8 +4,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from functools import partial
+from itertools import count
 import math
 from pathlib import Path
 from typing import Any
@@ -16,8 +17,7 @@ from armid_ros.nodes.qos import SAMPLES
 from armid_ros.nodes.running.process import run
 from armid_ros.nodes.running.real_time import RealTime
 from armid_ros.papers.exo.plant.gait import read_gait
-from armid_ros.papers.exo.plant.leg_pair import leg_pair
-from armid_ros.papers.exo.plant.simulated_pair import sensor_readings
+from armid_ros.papers.exo.plant.leg_pair import leg_pair, stepping, with_noise, with_torques
 from armid_ros.robots.ties import SEGMENTS
 import numpy as np
 from rclpy.time import Time
@@ -70,16 +70,9 @@ class SimulatedPairNode(ArmidNode):
         pair = leg_pair(self.value('stiffness'), self.value('segments'))
         pair = pair.with_slack(self.value('slack'))
         gait = self.value('gait')
-        self._begin = partial(
-            sensor_readings,
-            pair,
-            read_gait(Path(gait) if gait else None),
-            rate=self.value('rate'),
-            angle_noise=math.radians(self.value('angle_noise')),
-            torque_noise=self.value('torque_noise'),
-            rng=np.random.default_rng(self.value('seed')),
-        )
-        self._pair, self._readings, self.t = pair, self._begin(), 0.0
+        self._gait = read_gait(Path(gait) if gait else None)
+        self._rng = np.random.default_rng(self.value('seed'))
+        self._pair, self._messages, self.t = pair, self._simulated(), 0.0
         self._origin_ns = self.get_clock().now().nanoseconds if start_ns is None else start_ns
         self._exo = self.create_publisher(JointState, 'exo/joint_states', SAMPLES)
         self._human = self.create_publisher(JointState, 'human/joint_states', SAMPLES)
@@ -102,19 +95,26 @@ class SimulatedPairNode(ArmidNode):
 
     def step(self) -> int:
         """Simulate and publish the next sample of both machines; return its time stamp [ns]."""
-        sample = next(self._readings)
-        self.t = float(sample.t)
-        robot, other = self._pair.robot, self._pair.other
-        for publisher, joints, parts in (
-            (self._human, other.joints, (sample.other_q, sample.other_dq)),
-            (self._exo, robot.joints, (sample.q, sample.dq, sample.tau)),
-        ):
-            message = JointState(name=list(joints))
+        self.t, own, other = next(self._messages)
+        for publisher, message in ((self._human, other), (self._exo, own)):
             message.header.stamp = Time(nanoseconds=self.stamp_ns).to_msg()
-            for field, values in zip(('position', 'velocity', 'effort'), parts, strict=False):
-                setattr(message, field, values.tolist())
             publisher.publish(message)
         return self.stamp_ns
+
+    def _simulated(self) -> Iterator[tuple[float, JointState, JointState]]:
+        """Yield times [s] and noisy joint states of exoskeleton and wearer, without end."""
+        noise = math.radians(self.value('angle_noise')), self.value('torque_noise')
+        size = 50  # samples that are computed together
+        for first in count(1, size):
+            t = (first + np.arange(size)) / self.value('rate')
+            motions = with_torques(self._pair, stepping(self._pair, self._gait, t))
+            own, other = with_noise(motions, *noise, self._rng)
+            assert own.tau is not None
+            for k, time in enumerate(t.tolist()):
+                fields = {'position': own.q[k].tolist(), 'velocity': own.dq[k].tolist()}
+                machine = JointState(name=list(own.joints), effort=own.tau[k].tolist(), **fields)
+                fields = {'position': other.q[k].tolist(), 'velocity': other.dq[k].tolist()}
+                yield time, machine, JointState(name=list(other.joints), **fields)
 
     def catch_up(self) -> None:
         """Simulate up to the present real time; skip time if the computer is too slow."""
@@ -126,7 +126,7 @@ class SimulatedPairNode(ArmidNode):
     def reset(self) -> str:
         """Restart both machines in the initial state; the time stamps continue."""
         self._origin_ns = self.stamp_ns
-        self._readings, self.t = self._begin(), 0.0
+        self._messages, self.t = self._simulated(), 0.0
         self.real_time.begin()
         return 'exoskeleton and wearer are in the initial state'
 

@@ -155,6 +155,33 @@ def pair_torques(pair: TiedPair, motion: Motion, other_motion: Motion) -> PairTo
     return PairTorques(read_only(tau), read_only(other_tau), read_only(forces))
 
 
+def with_torques(pair: TiedPair, motions: PairMotion) -> PairMotion:
+    """Return a motion of both machines with the exact torques of the exoskeleton."""
+    return PairMotion(motions.own.with_torque(pair_torques(pair, *motions).tau), motions.other)
+
+
+def with_noise(
+    motions: PairMotion, angle_noise: float, torque_noise: float, rng: np.random.Generator
+) -> PairMotion:
+    """
+    Return the sensor readings of a motion of both machines, as noisy angles and torques.
+
+    Parameters
+    ----------
+    motions : PairMotion
+        Exact motion, with torques of the exoskeleton.
+    angle_noise, torque_noise : float
+        Standard deviation of all angles [rad], and of the torques [N m].
+    rng : numpy.random.Generator
+        Source of the noise.
+
+    """
+    assert motions.own.tau is not None
+    tau = motions.own.tau + torque_noise * rng.normal(size=motions.own.tau.shape)
+    own, other = (replace(m, q=m.q + angle_noise * rng.normal(size=m.q.shape)) for m in motions)
+    return PairMotion(own.with_torque(tau), other)
+
+
 def leg_pair(
     stiffness: npt.ArrayLike | None = None, segments: Sequence[str] = SEGMENTS
 ) -> TiedPair:
