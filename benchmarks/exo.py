@@ -19,7 +19,6 @@ from armid_ros.identification.ties.problem import Inertias, interaction_problem
 from armid_ros.identification.ties.recorded import recorded_interaction_problem
 from armid_ros.identification.ties.stiffness import identify_interaction, Interaction
 from armid_ros.motion import Motion
-from armid_ros.papers.exo.plant.gait import read_gait
 from armid_ros.papers.exo.plant.gait_cycle import gait_cycle
 from armid_ros.papers.exo.plant.leg_pair import (
     exercise,
@@ -52,8 +51,8 @@ def main() -> None:
     asked = parser.parse_args()
     gait_by_torque()
     sets = {
-        '200 poses': stepping(PAIR, read_gait(), np.linspace(0.0, 1.8, 201)[:-1]),
-        '10 s 1 kHz': stepping(PAIR, read_gait(), np.arange(0.0, 10.0, 1e-3)),
+        '200 poses': stepping(PAIR, np.linspace(0.0, 1.8, 201)[:-1]),
+        '10 s 1 kHz': stepping(PAIR, np.arange(0.0, 10.0, 1e-3)),
     }
     exact = {name: with_torques(PAIR, motions) for name, motions in sets.items()}
     stiffness(exact, asked.draws)
@@ -62,7 +61,7 @@ def main() -> None:
 
 def gait_by_torque() -> None:
     """Drive joints in MuJoCo by splined torques over a gait cycle, and print their errors."""
-    cycle = gait_cycle(walking_pair(), read_gait())
+    cycle = gait_cycle(walking_pair())
     soft = cycle.pair.with_stiffness(0.8 * cycle.pair.stiffness)
     print('in MuJoCo, one joint by its torque               paper      wanted      measured')
     for joint, paper, wanted in (('exo_right_hip', 1.5, 0.05), ('exo_right_knee', 2.5, 0.1)):

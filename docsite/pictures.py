@@ -29,7 +29,6 @@ from armid_ros.papers.elastic.experiments import (
 )
 from armid_ros.papers.elastic.identification.interaction import ideal_response
 from armid_ros.papers.elastic.identification.three_steps import identify_two_inertia
-from armid_ros.papers.exo.plant.gait import read_gait
 from armid_ros.papers.exo.plant.gait_cycle import gait_cycle
 from armid_ros.papers.exo.plant.torque_driven import check_cycle
 from armid_ros.papers.exo.plant.walkers import walking_pair
@@ -114,7 +113,7 @@ def _noise(run: ar.Recording, seed: int) -> np.ndarray:
 
 def exo_cycle() -> Figure:
     """Draw angles and errors of hip and knee, and foot forces, over a gait cycle."""
-    cycle = gait_cycle(walking_pair(), read_gait())
+    cycle = gait_cycle(walking_pair())
     soft = cycle.pair.with_stiffness(0.8 * cycle.pair.stiffness)
     figure, panels = _figure(6.2, 3, 2, height_ratios=(2, 1.2, 2))
     for column, (joint, most) in enumerate((('hip', 1.5), ('knee', 2.5))):

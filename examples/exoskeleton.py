@@ -5,13 +5,12 @@
 import armid_ros as ar
 from armid_ros.identification.ties.recorded import recorded_interaction_problem
 from armid_ros.identification.ties.stiffness import identify_interaction
-from armid_ros.papers.exo.plant.gait import read_gait
 from armid_ros.papers.exo.plant.leg_pair import leg_pair, pair_torques, stepping
 import numpy as np
 
 pair, rng = leg_pair(), np.random.default_rng(1)
 t = np.arange(0.0, 10.0, 0.001)
-machine, wearer = stepping(pair, read_gait(None), t)
+machine, wearer = stepping(pair, t)
 tau = pair_torques(pair, machine, wearer).tau
 
 

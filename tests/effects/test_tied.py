@@ -9,7 +9,6 @@ from armid_ros.effects.tied import Partner
 from armid_ros.errors import ModelError
 from armid_ros.identification.rows.signals import Conditioning, segments
 from armid_ros.motion import Motion
-from armid_ros.papers.exo.plant.gait import read_gait
 from armid_ros.papers.exo.plant.leg_pair import (
     leg_pair,
     pair_torques,
@@ -32,7 +31,7 @@ def pair() -> TiedPair:
 
 @pytest.fixture(scope='module')
 def motions(pair) -> PairMotion:
-    return stepping(pair, read_gait(), np.linspace(0.0, 0.456, 457))
+    return stepping(pair, np.linspace(0.0, 0.456, 457))
 
 
 @pytest.fixture(scope='module')

@@ -9,7 +9,6 @@ from armid_ros.errors import ArmidError, RobotError
 from armid_ros.excitation import load_environment, load_excitation
 from armid_ros.files import read_text, regular
 from armid_ros.identification.parameters_file import read_parameters
-from armid_ros.papers.exo.plant.gait import read_gait
 from armid_ros.recording import copy_bag, read_recording
 from armid_ros.recording.bag import Bag
 from armid_ros.recording.tables import open_table
@@ -23,7 +22,6 @@ READERS = {
     'environment.yaml': load_environment,
     'robot.urdf': load_robot,
     'robot.urdf.xacro': load_robot,
-    'gait.csv': read_gait,
     'bag.mcap': Bag,
     'bag.db3': Bag,
     'bag.mcap.zstd': Bag,

@@ -33,10 +33,6 @@ EXERCISES = ('step', 'quick_step', 'swing', 'lift', 'squat', 'rock')
     help='Inertias of the exoskeleton: known from its description, or free (estimated).',
 )
 @click.option(
-    '--gait', 'gait_file', type=click.Path(path_type=Path),
-    help='CSV file with the joint angles of a gait cycle; default: level walking.',
-)  # fmt: skip
-@click.option(
     '--stiffness', type=float, help='Stiffness of the simulated straps [N/m]; default: 10000.'
 )
 @click.option(
@@ -63,7 +59,6 @@ def exo(
     out: Path,
     topics: str,
     inertias: str,
-    gait_file: Path | None,
     stiffness: float | None,
     motion: str,
     duration: float,
@@ -85,15 +80,13 @@ def exo(
     from armid_ros.errors import ModelError
     from armid_ros.files import final_path
     from armid_ros.papers.exo import work
-    from armid_ros.papers.exo.plant.gait import read_gait
     from armid_ros.papers.exo.plant.leg_pair import exercise, leg_pair
     from armid_ros.papers.exo.report.page import exo_report, verdict
     from armid_ros.recording import read_recording
     from armid_ros.recording.writer import require_new
     import numpy as np
 
-    pair, gait = leg_pair(stiffness), read_gait(gait_file)
-    names = topics.split(',')
+    pair, names = leg_pair(stiffness), topics.split(',')
     if len(names) != 2:
         raise ModelError(
             f'--topics {topics}: name two topics, of exoskeleton and wearer, separated by a comma'
@@ -104,7 +97,7 @@ def exo(
     with progress('recording') as tick:
         path = staged.folder / 'recording' if bag is None else bag
         if bag is None:
-            motions = exercise(pair, motion, np.arange(0.0, duration, 1e-3), gait)
+            motions = exercise(pair, motion, np.arange(0.0, duration, 1e-3))
             noise, rng = (angle_noise, torque_noise), np.random.default_rng(seed)
             work.record(path, names, pair, motions, noise, rng)
         settings, source = options.read_settings(), str(final_path(path))
@@ -115,7 +108,7 @@ def exo(
         options.tell_damage(*both)
         machine, wearer = (replace(one, source=source) for one in both)
         found = work.identify_ties(pair, machine, wearer, inertias, tick)
-        walked = work.walk(pair, gait, stiffness, tick) if bag is None else None
+        walked = work.walk(pair, stiffness, tick) if bag is None else None
     used = {'inertias': inertias, 'topics': topics}
     origin = provenance([path], used, seed if bag is None else None)
     shown = motions if bag is None else work.recorded_motions(pair, machine, wearer)

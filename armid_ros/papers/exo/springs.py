@@ -86,6 +86,8 @@ def find_slack(problem: Callable[[float], InteractionProblem]) -> Slack:
     return Slack(best, std, (misfit(0.0) - found.misfit) / noise, found)
 
 
+#: Time between two fits of slack, which need several estimates [s].
+_SLACK_PERIOD = 30.0
 #: Rate of the averaged samples [Hz], far above the frequencies of human motion.
 _AVERAGED_RATE = 100.0
 
@@ -136,8 +138,6 @@ class OnlineInteraction:
         Length of the time window of the estimate [s].
     period : float
         Time between two estimates [s].
-    slack_period : float
-        Time between two fits of slack, which need several estimates [s].
     inertias : {'known', 'free'}
         Whether the inertias of the machine are taken from its description or estimated.
 
@@ -162,16 +162,15 @@ class OnlineInteraction:
         *,
         memory: float = 10.0,
         period: float = 2.0,
-        slack_period: float = 10.0,
         inertias: Inertias = 'known',
     ) -> None:
-        if not (memory >= 3.0 and 0.0 < period <= memory and slack_period > 0.0):
+        if not (memory >= 3.0 and 0.0 < period <= memory):
             raise IdentificationError(
                 f'memory = {memory:g} s and period = {period:g} s: memory has to be at least 3 s '
                 'and at least the period'
             )
         self.machines, self._inertias = machines, inertias
-        self._memory, self._period, self._slack_period = memory, period, slack_period
+        self._memory, self._period = memory, period
         self._own, self._far = _Averages(memory), _Averages(memory)
         self.reset()
 
@@ -230,7 +229,7 @@ class OnlineInteraction:
         if self.together.misfit < 1.5 * self.together.residual.size:
             self.slack = None
         elif t >= self._slack_due:
-            self._slack_due = t + self._slack_period
+            self._slack_due = t + _SLACK_PERIOD
             self.slack = find_slack(lambda slack: self._problem(separate=False, slack=slack))
         return True
 

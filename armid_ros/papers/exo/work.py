@@ -12,7 +12,7 @@ from armid_ros.cli.terminal import Tick
 from armid_ros.identification.ties.recorded import recorded_interaction_problem
 from armid_ros.identification.ties.stiffness import identify_interaction, Interaction
 from armid_ros.motion import Motion
-from armid_ros.papers.exo.plant.gait import Gait, read_assumptions
+from armid_ros.papers.exo.plant.gait import read_assumptions
 from armid_ros.papers.exo.plant.gait_cycle import gait_cycle, ground_by_shares
 from armid_ros.papers.exo.plant.leg_pair import PairMotion, TiedPair, with_noise, with_torques
 from armid_ros.papers.exo.plant.torque_driven import check_cycle
@@ -47,11 +47,11 @@ def record(
             write_joint_states(writer, topic, motion.joints, stamps, motion.q, None, motion.tau)
 
 
-def walk(pair: TiedPair, gait: Gait, stiffness: float | None, tick: Tick) -> SimulatedWalk:
+def walk(pair: TiedPair, stiffness: float | None, tick: Tick) -> SimulatedWalk:
     """Simulate a gait cycle, and its repeats with torque-driven joints of the exoskeleton."""
     tick(0.6, 'simulating a gait cycle')
     walkers = walking_pair(stiffness)
-    cycle, rate = gait_cycle(walkers, gait), read_assumptions()['torque_rate'].value
+    cycle, rate = gait_cycle(walkers), read_assumptions()['torque_rate'].value
     soft = walkers.with_stiffness((1.0 - STIFFNESS_ERROR) * walkers.stiffness)
     torques = cycle.own.tau, cycle.torques(soft), cycle.torques(ground=ground_by_shares(cycle))
     driven = [

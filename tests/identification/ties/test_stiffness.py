@@ -11,7 +11,6 @@ from armid_ros.identification.ties.problem import interaction_problem
 from armid_ros.identification.ties.recorded import recorded_interaction_problem
 from armid_ros.identification.ties.stiffness import identify_interaction, Interaction
 from armid_ros.model.spring_ties import TiedMachines
-from armid_ros.papers.exo.plant.gait import read_gait
 from armid_ros.papers.exo.plant.leg_pair import (
     leg_pair,
     PairMotion,
@@ -37,14 +36,14 @@ def pair() -> TiedPair:
 @pytest.fixture(scope='module')
 def poses(pair) -> PairMotion:
     """Return 200 poses, with exact torques."""
-    motions = stepping(pair, read_gait(), np.linspace(0.0, 1.8, 201)[:-1])
+    motions = stepping(pair, np.linspace(0.0, 1.8, 201)[:-1])
     return with_torques(pair, motions)
 
 
 @pytest.fixture(scope='module')
 def seconds(pair) -> PairMotion:
     """Return 6 s at 1 kHz, with exact torques."""
-    return with_torques(pair, stepping(pair, read_gait(), np.arange(0.0, 6.0, 1e-3)))
+    return with_torques(pair, stepping(pair, np.arange(0.0, 6.0, 1e-3)))
 
 
 def percent(found: Interaction) -> np.ndarray:
@@ -98,7 +97,7 @@ def test_recordings_need_not_begin_together(pair, seconds) -> None:
 
 def test_without_springs_none_are_found(pair) -> None:
     loose = pair.with_stiffness(0.0)
-    still = with_torques(loose, stepping(loose, read_gait(), np.linspace(0.0, 1.8, 200)))
+    still = with_torques(loose, stepping(loose, np.linspace(0.0, 1.8, 200)))
     found = find_springs(loose, still, 0.05, 0)
     lower, upper = found.interval(0.999)[0]
     assert lower < 0.0 < upper
@@ -131,7 +130,7 @@ def test_deviations_that_are_stated_are_those_of_repeats(pair, times, draws) -> 
     As if rows of a recording were independent the deviations would be a third too small.
 
     """
-    motions = with_torques(pair, stepping(pair, read_gait(), times))
+    motions = with_torques(pair, stepping(pair, times))
     found = [find_springs(pair, motions, 0.05, seed) for seed in range(draws)]
     values = np.array([part.stiffness[0] for part in found])
     stated = np.mean([part.std[0] ** 2 for part in found])
@@ -143,7 +142,7 @@ def test_deviations_that_are_stated_are_those_of_repeats(pair, times, draws) -> 
 def test_inertias_of_links_that_hardly_turn_stay_near_their_description(pair) -> None:
     """The trunk's inertia is a column of noise: without a belief its best value is infinite."""
     real = leg_pair(3e3, ('stance_thigh',))
-    motions = with_torques(real, stepping(real, read_gait(), np.arange(0.0, 4.0, 1e-3)))
+    motions = with_torques(real, stepping(real, np.arange(0.0, 4.0, 1e-3)))
     readings = with_noise(motions, np.radians(0.05), 0.5, np.random.default_rng(9))
     sides = (recorded(side) for side in readings)
     problem = recorded_interaction_problem(pair, *sides, inertias='free', separate=True)

@@ -2,7 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The gait of the shipped pair of legs."""
 
-from armid_ros.papers.exo.plant.gait import read_gait
 from armid_ros.papers.exo.plant.gait_cycle import gait_cycle, GaitCycle
 from armid_ros.papers.exo.plant.walkers import walking_pair
 import pytest
@@ -14,4 +13,4 @@ __all__ = ['bench']
 
 @pytest.fixture(scope='session')
 def cycle() -> GaitCycle:
-    return gait_cycle(walking_pair(), read_gait())
+    return gait_cycle(walking_pair())

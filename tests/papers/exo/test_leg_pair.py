@@ -6,7 +6,6 @@ from dataclasses import replace
 
 from armid_ros.errors import ModelError
 from armid_ros.model import random_motion
-from armid_ros.papers.exo.plant.gait import read_gait
 from armid_ros.papers.exo.plant.leg_pair import (
     exercise,
     EXERCISES,
@@ -94,7 +93,7 @@ def test_knees_bend_one_way_and_the_stance_foot_is_flat(name) -> None:
 
 
 def test_noise_has_the_size_asked_for_and_comes_from_the_seed() -> None:
-    exact = with_torques(PAIR, stepping(PAIR, read_gait(), T))
+    exact = with_torques(PAIR, stepping(PAIR, T))
     one, again = (with_noise(exact, 1e-3, 0.5, np.random.default_rng(0)) for _ in range(2))
     for found, true in zip(one, exact, strict=True):
         assert (found.q - true.q).std() == pytest.approx(1e-3, rel=0.1)

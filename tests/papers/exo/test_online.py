@@ -3,7 +3,6 @@
 """Springs found while both move, and slack where there is some."""
 
 from armid_ros.errors import IdentificationError
-from armid_ros.papers.exo.plant.gait import read_gait
 from armid_ros.papers.exo.plant.leg_pair import leg_pair, stepping, with_noise, with_torques
 from armid_ros.papers.exo.springs import OnlineInteraction
 import numpy as np
@@ -15,7 +14,7 @@ SETTINGS = {'memory': 4.0, 'period': 2.0}
 
 def identified(slack: float = 0.0, seconds: float = 4.2) -> OnlineInteraction:
     pair = leg_pair(1e4).with_slack(slack)
-    walking = stepping(pair, read_gait(), np.arange(1, 500.0 * seconds) / 500.0)
+    walking = stepping(pair, np.arange(1, 500.0 * seconds) / 500.0)
     exact = with_torques(pair, walking)
     own, other = with_noise(exact, **NOISE, rng=np.random.default_rng(0))
     online = OnlineInteraction(pair, **SETTINGS)

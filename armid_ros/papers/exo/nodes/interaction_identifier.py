@@ -54,13 +54,6 @@ class InteractionIdentifierNode(ArmidNode):
         NodeParameter('memory', 10.0, 'Length of the time window.', 's', limits=(3.0, 600.0)),
         NodeParameter('period', 2.0, 'Time between estimates.', 's', limits=(0.1, 600.0)),
         NodeParameter(
-            'slack_period',
-            30.0,
-            'Time between fits of slack, if straps without slack do not explain torques.',
-            's',
-            limits=(1.0, 3600.0),
-        ),
-        NodeParameter(
             'inertias',
             'known',
             'Inertias of the exoskeleton: known from its description, or free (estimated).',
@@ -72,7 +65,7 @@ class InteractionIdentifierNode(ArmidNode):
         """Create the node for the shipped exoskeleton and wearer."""
         super().__init__('interaction_identifier', **kwargs)
         pair = leg_pair()
-        names = ('memory', 'period', 'slack_period', 'inertias')
+        names = ('memory', 'period', 'inertias')
         settings = {name: self.value(name) for name in names}
         self.identifier = OnlineInteraction(pair, **settings)
         self.received = 0

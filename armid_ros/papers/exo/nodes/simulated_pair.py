@@ -8,7 +8,6 @@ from collections.abc import Iterator, Mapping
 from functools import partial
 from itertools import count
 import math
-from pathlib import Path
 from typing import Any
 
 from armid_ros.nodes.base import ArmidNode
@@ -16,7 +15,6 @@ from armid_ros.nodes.parameters.table import NodeParameter
 from armid_ros.nodes.qos import SAMPLES
 from armid_ros.nodes.running.process import run
 from armid_ros.nodes.running.real_time import RealTime
-from armid_ros.papers.exo.plant.gait import read_gait
 from armid_ros.papers.exo.plant.leg_pair import leg_pair, stepping, with_noise, with_torques
 from armid_ros.robots.ties import SEGMENTS
 import numpy as np
@@ -36,7 +34,6 @@ class SimulatedPairNode(ArmidNode):
     """
 
     table = (
-        NodeParameter('gait', '', 'CSV file of a gait cycle; empty: level walking.'),
         NodeParameter('stiffness', 1e4, 'Stiffness of all straps.', 'N/m', limits=(0.0, 1e6)),
         NodeParameter('segments', list(SEGMENTS), 'Leg segments with a strap; empty: none.'),
         NodeParameter('slack', 0.0, 'Slack of the straps.', 'm', limits=(0.0, 0.1)),
@@ -69,8 +66,6 @@ class SimulatedPairNode(ArmidNode):
         super().__init__('simulated_pair', **kwargs)
         pair = leg_pair(self.value('stiffness'), self.value('segments'))
         pair = pair.with_slack(self.value('slack'))
-        gait = self.value('gait')
-        self._gait = read_gait(Path(gait) if gait else None)
         self._rng = np.random.default_rng(self.value('seed'))
         self._pair, self._messages, self.t = pair, self._simulated(), 0.0
         self._origin_ns = self.get_clock().now().nanoseconds if start_ns is None else start_ns
@@ -107,7 +102,7 @@ class SimulatedPairNode(ArmidNode):
         size = 50  # samples that are computed together
         for first in count(1, size):
             t = (first + np.arange(size)) / self.value('rate')
-            motions = with_torques(self._pair, stepping(self._pair, self._gait, t))
+            motions = with_torques(self._pair, stepping(self._pair, t))
             own, other = with_noise(motions, *noise, self._rng)
             assert own.tau is not None
             for k, time in enumerate(t.tolist()):

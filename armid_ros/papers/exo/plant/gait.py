@@ -19,14 +19,12 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
-from armid_ros.errors import TrajectoryError
-from armid_ros.files import load_yaml, read_text
+from armid_ros.files import load_yaml
 from armid_ros.motion import FloatArray, freeze, Motion
 import numpy as np
 
 #: Number of harmonics of a gait; higher harmonics are negligible in walking.
 _HARMONICS = 6
-_COLUMNS = ['phase', 'hip_deg', 'knee_deg', 'ankle_deg']
 
 
 @dataclass(frozen=True)
@@ -100,48 +98,21 @@ class Gait:
         )
 
 
-def read_gait(path: Path | None = None) -> Gait:
-    """
-    Read a gait from a CSV file; by default, read the shipped gait of level walking.
-
-    Parameters
-    ----------
-    path : Path, optional
-        A CSV file with the columns phase, hip_deg, knee_deg and ankle_deg over one cycle.
-
-    Raises
-    ------
-    TrajectoryError
-        If the file has other columns, invalid numbers, or too few rows.
-
-    """
-    path = path or leg_pair_file('human_legs/gait.csv')
-    text = read_text(path, TrajectoryError)
-    lines = [line for line in text.splitlines() if line.strip() and not line.startswith('#')]
-    head = [name.strip() for name in lines[0].split(',')] if lines else []
-    if head != _COLUMNS:
-        raise TrajectoryError(f'{path}: the columns are {head}, but have to be {_COLUMNS}')
-    try:
-        rows = np.array([[float(cell) for cell in line.split(',')] for line in lines[1:]])
-    except ValueError as error:
-        raise TrajectoryError(f'{path}: {error}; every row must have four numbers') from None
-    if rows.shape[1:] != (len(_COLUMNS),) or not np.isfinite(rows).all():
-        raise TrajectoryError(f'{path}: every row must have four finite numbers')
-    if len(rows) < 2 * _HARMONICS + 1:
-        raise TrajectoryError(
-            f'{path}: a gait cycle needs {2 * _HARMONICS + 1} rows or more, not {len(rows)}'
-        )
+@lru_cache
+def read_gait() -> Gait:
+    """Read the shipped gait of level walking."""
+    path = leg_pair_file('human_legs/gait.csv')
+    lines = [line for line in path.read_text(encoding='utf-8').splitlines() if line[:1].isdigit()]
+    rows = np.loadtxt(lines, delimiter=',')  # phase and three angles in degrees
     return Gait.fit(rows[:, 0], np.radians(rows[:, 1:]))
 
 
-def stance_motion(gait: Gait, joints: tuple[str, ...], t: FloatArray, phase: FloatArray) -> Motion:
+def stance_motion(joints: tuple[str, ...], t: FloatArray, phase: FloatArray) -> Motion:
     """
     Return the joint motion of a person or exoskeleton on one foot, while the other leg swings.
 
     Parameters
     ----------
-    gait : Gait
-        Gait of one leg.
     joints : tuple of str, length 6
         Stance ankle, knee, hip, swing hip, knee, ankle.
     t : ndarray, shape (N,)
@@ -151,6 +122,7 @@ def stance_motion(gait: Gait, joints: tuple[str, ...], t: FloatArray, phase: Flo
         [1/s, 1/s^2].
 
     """
+    gait = read_gait()
     speed, acceleration = phase[1:, :, np.newaxis]
     here = []
     for derivative in range(3):  # a flat foot and an upright trunk

@@ -23,7 +23,7 @@ from dataclasses import dataclass, replace
 from armid_ros.model import inverse_dynamics
 from armid_ros.model.kinematics import points_motion
 from armid_ros.motion import FloatArray, Motion, read_only
-from armid_ros.papers.exo.plant.gait import Gait, read_assumptions
+from armid_ros.papers.exo.plant.gait import Gait, read_assumptions, read_gait
 from armid_ros.papers.exo.plant.leg_pair import pair_torques, PairMotion, PairTorques, TiedPair
 from armid_ros.papers.exo.plant.walkers import (
     columns,
@@ -160,21 +160,21 @@ class GaitCycle:
         return walking_torques(pair or self.pair, self.motions, forces).tau
 
 
-def gait_cycle(pair: TiedPair, gait: Gait) -> GaitCycle:
+def gait_cycle(pair: TiedPair) -> GaitCycle:
     """
     Simulate three gait cycles of exoskeleton and wearer, and return the last cycle.
+
+    The gait of the wearer is the walkable gait nearest to the shipped one.
 
     Parameters
     ----------
     pair : TiedPair
         A pair that is free to walk: ``walking_pair``.
-    gait : Gait
-        Gait of the wearer; replaced by the nearest walkable gait.
 
     """
     known = read_assumptions()
     cycle, delay = known['cycle_time'].value, known['exoskeleton_delay'].value
-    wearer_gait = walkable(gait, leg_length(pair.other), cycle)
+    wearer_gait = walkable(read_gait(), leg_length(pair.other), cycle)
     phase = np.arange(100) / 100.0
     offset = np.radians(known['walking_offset_deg'].value)
     desired = known['exoskeleton_scale'].value * wearer_gait.gait(phase) + offset

@@ -22,7 +22,7 @@ from armid_ros.errors import ModelError
 from armid_ros.model import inverse_dynamics
 from armid_ros.model.spring_ties import extension, tie_geometry, TiedMachines, TieGeometry
 from armid_ros.motion import FloatArray, Motion, read_only
-from armid_ros.papers.exo.plant.gait import Gait, read_assumptions, read_gait, stance_motion
+from armid_ros.papers.exo.plant.gait import read_assumptions, stance_motion
 from armid_ros.robots import load_robot
 from armid_ros.robots.ties import leg_ties, SEGMENTS
 import numpy as np
@@ -211,7 +211,7 @@ def assumed_stiffness(stiffness: npt.ArrayLike | None) -> FloatArray:
     return np.asarray(assumed if stiffness is None else stiffness, dtype=float)
 
 
-def stepping(pair: TiedPair, gait: Gait, t: FloatArray, period: float | None = None) -> PairMotion:
+def stepping(pair: TiedPair, t: FloatArray, period: float | None = None) -> PairMotion:
     """
     Return the motion of exoskeleton and wearer who step forward and back on a standing foot.
 
@@ -219,8 +219,6 @@ def stepping(pair: TiedPair, gait: Gait, t: FloatArray, period: float | None = N
     ----------
     pair : TiedPair
         The shipped pair.
-    gait : Gait
-        Gait of one leg.
     t : ndarray, shape (N,)
         Time [s].
     period : float, optional
@@ -235,7 +233,7 @@ def stepping(pair: TiedPair, gait: Gait, t: FloatArray, period: float | None = N
     def wearer(joints: tuple[str, ...], time: FloatArray) -> Motion:
         cosine, sine = np.cos(w * time), np.sin(w * time)
         phase = [begin + half * (1.0 - cosine), half * w * sine, half * w**2 * cosine]
-        return stance_motion(gait, joints, time, np.array(phase))
+        return stance_motion(joints, time, np.array(phase))
 
     return following(pair, t, wearer)
 
@@ -277,7 +275,7 @@ EXERCISES = {
 }
 
 
-def exercise(pair: TiedPair, name: str, t: FloatArray, gait: Gait | None = None) -> PairMotion:
+def exercise(pair: TiedPair, name: str, t: FloatArray) -> PairMotion:
     """
     Return the motion of exoskeleton and wearer during a named exercise on one foot.
 
@@ -289,13 +287,11 @@ def exercise(pair: TiedPair, name: str, t: FloatArray, gait: Gait | None = None)
         One of ``EXERCISES``.
     t : ndarray, shape (N,)
         Time [s].
-    gait : Gait, optional
-        Gait for stepping; the shipped one by default.
 
     """
     *angles, period = EXERCISES[name]
     if name.endswith('step'):
-        return stepping(pair, gait or read_gait(), t, period)
+        return stepping(pair, t, period)
     (middle, reach), w = np.radians(angles), 2.0 * np.pi / period
 
     def moving(joints: tuple[str, ...], time: FloatArray) -> Motion:
