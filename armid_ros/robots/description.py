@@ -109,7 +109,6 @@ class Joint:
     effort: float
     damping: float
     friction: float
-    armature: float
     mimic: Mimic | None
 
     @property
@@ -343,9 +342,9 @@ def _joint(element: ElementTree.Element, name: str, notes: list[str]) -> Joint:
     if followed is not None:
         mimic = _mimic(followed, joint, None)
     dynamics = element.find('dynamics')
-    damping, friction, armature = (
+    damping, friction = (
         0.0 if dynamics is None else _number(dynamics, key, joint, 0.0)
-        for key in ('damping', 'friction', 'armature')
+        for key in ('damping', 'friction')
     )
     return Joint(
         name=name,
@@ -361,7 +360,6 @@ def _joint(element: ElementTree.Element, name: str, notes: list[str]) -> Joint:
         effort=effort,
         damping=damping,
         friction=friction,
-        armature=armature,
         mimic=mimic,
     )
 

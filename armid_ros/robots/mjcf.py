@@ -47,7 +47,7 @@ def urdf_of_mjcf(path: Path) -> tuple[str, tuple[str, ...]]:
     Returns
     -------
     urdf : str
-        Links, joints with damping, friction and armature, and shapes.
+        Links, joints with damping and friction, and shapes.
     notes : tuple of str
         Notes on contents of the file that a URDF cannot express.
 
@@ -215,7 +215,6 @@ class _Writer:
         dynamics = {
             'damping': model.dof_damping[dof],
             'friction': model.dof_frictionloss[dof],
-            'armature': model.dof_armature[dof],
         }
         ElementTree.SubElement(
             element, 'dynamics', {key: text_of(value) for key, value in dynamics.items()}
