@@ -71,7 +71,6 @@ def run_lockstep(
     identifier: OnlineIdentifier | None = None,
     *,
     rate: float = 200.0,
-    approach: float = 3.0,
     on_progress: OnProgress | None = None,
 ) -> Progress:
     """
@@ -92,8 +91,6 @@ def run_lockstep(
         Identifies the arm online; without it, a run takes half of the time.
     rate : float
         Rate of joint_states [Hz].
-    approach : float
-        Time to move from the initial position to the start of the excitation [s].
     on_progress : callable, optional
         Called with the progress every second of simulated time.
 
@@ -118,9 +115,7 @@ def run_lockstep(
         )
         limits = Limits.of(arm.plant.robot, speed=1.0, reserve=False)
         planner = TransferPlanner(ArmModel(arm.plant.robot), limits, None)  # no obstacles
-        publisher = stage.add(
-            ExcitationPublisherNode, excitation, planner, start=False, approach=approach
-        )
+        publisher = stage.add(ExcitationPublisherNode, excitation, planner, start=False)
         listeners = [recorder, publisher, *learners]
         topic = plant.resolve_topic_name('joint_states')
 

@@ -13,7 +13,7 @@ from armid_ros.identification.fitting.identifiability import HALF_WIDTH
 from armid_ros.motion import FloatArray
 from armid_ros.papers.lunar.reproduction import Composite, LOAD, Repeated, Reproduction
 from armid_ros.report.blocks import DataTable, Fold, Panels, Paragraph, VerdictSection
-from armid_ros.report.charts import Chart, Series, thinned
+from armid_ros.report.charts import Chart, Series
 from armid_ros.report.notation import digits
 from armid_ros.report.page import Page, Section
 from armid_ros.report.provenance import Provenance
@@ -126,11 +126,9 @@ def curves_section(repeated: Sequence[Repeated]) -> Section:
         assert tau is not None
         for k, joint in enumerate(one.joints):
             true, found = 1e3 * tau[:, k], 1e3 * one.test.predicted[:, k]
-            kept = thinned(true, found)
-            chart = Chart(
-                one.test.motion.t[kept],
-                [Series('true', true[kept]), Series('identified', found[kept], 'predicted')],
-                'time [s]',
+            chart = Chart.over_time(
+                one.test.motion.t,
+                [Series('true', true), Series('identified', found, 'predicted')],
                 'torque [N mm]',
                 height=170,
                 link=f'table{one.table.number}',
