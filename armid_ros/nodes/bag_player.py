@@ -66,8 +66,7 @@ class _JumpGuard:
             q = np.array([known.get(joint, np.nan) for joint in joints])
             new = np.isfinite(q)
             measured[new], seen[new] = q[new], arrived
-        timeout, tolerance = map(self._node.value, ('state_timeout', 'start_tolerance'))
-        lost = staleness(joints, seen, time.monotonic(), timeout)
+        lost = staleness(joints, seen, time.monotonic(), self._node.value('state_timeout'))
         if lost:
             return f'trajectory: {self._states.topic_name}: {lost}; arm position unknown'
         speeds = reference.dq
@@ -78,7 +77,8 @@ class _JumpGuard:
         limits = [self._limits.get(joint, np.inf) for joint in joints]
         fastest = np.where(np.isfinite(limits), limits, top)
         first = (float(reference.t[0]), reference.q[0])
-        fault = jump_fault(joints, first, measured, fastest, tolerance)
+        # largest distance of a joint from the first point [rad or m]
+        fault = jump_fault(joints, first, measured, fastest, 0.01)
         return f'trajectory: {fault}; bring the arm to its first point' if fault else ''
 
     def _on_joint_states(self, message: JointState) -> None:
@@ -125,13 +125,6 @@ class BagPlayerNode(ArmidNode):
             'that follows a trajectory.',
             's',
             limits=(0.0, 3600.0),
-        ),
-        setting(
-            'start_tolerance',
-            0.01,
-            'Largest distance of a joint from the first point of a trajectory.',
-            'rad or m',
-            limits=(0.0001, 1.0),
         ),
         setting(
             'state_timeout',

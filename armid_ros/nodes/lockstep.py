@@ -120,11 +120,12 @@ def run_lockstep(
         topic = plant.resolve_topic_name('joint_states')
 
         def connected() -> bool:
-            recorder.poll()
+            for node in (recorder, *learners):
+                node.poll()
             plant.publish_clock()
             return (
                 not recorder.missing
-                and all(map(matched, learners))
+                and all(learner.joint_states.publishers for learner in learners)
                 and plant.readers >= len(listeners)
                 and publisher.readers >= 1
                 and all(node.get_clock().now().nanoseconds for node in listeners)
@@ -205,9 +206,3 @@ class Stage(ExitStack):
                     'interface blocked?'
                 )
             self._executor.spin_once(timeout_sec=0.1)
-
-
-def matched(learner: OnlineIdentifierNode) -> bool:
-    """Adopt the QoS of publishers of joint states; return whether a publisher exists."""
-    learner.joint_states.match()
-    return learner.joint_states.publishers > 0

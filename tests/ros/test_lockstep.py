@@ -7,7 +7,7 @@ from armid_ros.errors import ArmidError
 from armid_ros.excitation import Excitation, Limits, random_feasible
 from armid_ros.identification.online.identifier import OnlineIdentifier
 from armid_ros.nodes.bag_player import BagPlayerNode
-from armid_ros.nodes.lockstep import EPOCH_NS, matched, MESSAGE_TIMEOUT, run_lockstep, Stage
+from armid_ros.nodes.lockstep import EPOCH_NS, MESSAGE_TIMEOUT, run_lockstep, Stage
 from armid_ros.nodes.online_identifier import OnlineIdentifierNode
 from armid_ros.recording import read_recording, topics
 from armid_ros.robots import load_robot
@@ -89,7 +89,8 @@ def test_a_replay_learns_the_same(first_run, robot):
         node = stage.add(OnlineIdentifierNode, again)
         clock = player.create_publisher(Clock, '/clock', 10)
         stage.spin_until(
-            lambda: clock.get_subscription_count() >= 2 and matched(node), 'joint_states'
+            lambda: clock.get_subscription_count() >= 2 and node.joint_states.publishers,
+            'joint_states',
         )
         while now < EPOCH_NS + round(result.t * 1e9) and not player.finished:
             now += step
