@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 from armid_ros.errors import IdentificationError
 from armid_ros.identification.ties.problem import Inertias, InteractionProblem
@@ -92,38 +92,21 @@ _SLACK_PERIOD = 30.0
 _AVERAGED_RATE = 100.0
 
 
-@dataclass
-class _Averages:
-    """Buffer of the samples of the last `memory` seconds, averaged to 100 Hz."""
+def _add(rows: deque[FloatArray], row: FloatArray, memory: float) -> None:
+    """Add a sample, time first; keep `memory` seconds, none from before a step back in time."""
+    if rows and row[0] <= rows[-1][0]:
+        rows.clear()
+    rows.append(row)
+    while row[0] - rows[0][0] > memory:
+        rows.popleft()
 
-    memory: float
-    t: deque[float] = field(default_factory=deque)
-    rows: deque[FloatArray] = field(default_factory=deque)
-    _group: list[tuple[float, FloatArray]] = field(default_factory=list)
 
-    def take(self, t: float, row: FloatArray) -> None:
-        """Add a sample; clear the buffer first if time did not increase."""
-        if self._group and not 0.0 < t - self._group[-1][0] < 1.0 / _AVERAGED_RATE:
-            if t <= self._group[-1][0]:
-                self.clear()
-            self._close()
-        self._group.append((t, row))
-        if t - self._group[0][0] >= 0.75 / _AVERAGED_RATE:
-            self._close()
-
-    def clear(self) -> None:
-        self.t.clear()
-        self.rows.clear()
-        self._group.clear()
-
-    def _close(self) -> None:
-        if self._group:
-            self.t.append(float(np.mean([t for t, _ in self._group])))
-            self.rows.append(np.mean([row for _, row in self._group], axis=0))
-            self._group.clear()
-        while self.t and self.t[-1] - self.t[0] > self.memory:
-            self.t.popleft()
-            self.rows.popleft()
+def _averaged(rows: deque[FloatArray]) -> FloatArray:
+    """Return samples, time first, averaged over each period of `_AVERAGED_RATE`."""
+    table = np.array(rows)
+    begins = np.flatnonzero(np.diff(np.floor(_AVERAGED_RATE * table[:, 0]), prepend=-np.inf))
+    counts = np.diff(begins, append=len(table))[:, np.newaxis]
+    return np.asarray(np.add.reduceat(table, begins) / counts)
 
 
 class OnlineInteraction:
@@ -171,7 +154,7 @@ class OnlineInteraction:
             )
         self.machines, self._inertias = machines, inertias
         self._memory, self._period = memory, period
-        self._own, self._far = _Averages(memory), _Averages(memory)
+        self._own, self._far = deque[FloatArray](), deque[FloatArray]()  # rows with time first
         self.reset()
 
     def reset(self) -> None:
@@ -190,7 +173,7 @@ class OnlineInteraction:
 
     def take_other(self, t: float, q: FloatArray) -> None:
         """Add a sample of the second machine: time [s] and joint positions (m,) [rad]."""
-        self._far.take(t, q)
+        _add(self._far, np.concatenate([[t], q]), self._memory)
 
     def take(self, t: float, q: FloatArray, tau: FloatArray) -> bool:
         """
@@ -215,7 +198,7 @@ class OnlineInteraction:
             overlap.
 
         """
-        self._own.take(t, np.concatenate([q, tau]))
+        _add(self._own, np.concatenate([[t], q, tau]), self._memory)
         if self._due is None or t < self._due - 2.0 * self._memory:
             self._due = t + self._memory
             self._slack_due = self._due
@@ -237,19 +220,14 @@ class OnlineInteraction:
         """Return the regression of strap stiffness for the samples in the buffers."""
         robot, other = self.machines.robot, self.machines.other
         n = robot.n_joints
-        if len(self._own.t) < 2 or len(self._far.t) < 2:
+        if len(self._own) < 2 or len(self._far) < 2:
             raise IdentificationError(
                 f'too few joint states of {robot.name} or {other.name}; check both topics'
             )
-        begin = self._own.t[0]
-        rows = np.array(self._own.rows)
-        own, far = (
-            Recording(joints=machine.joints, t=np.array(t) - begin, q=q, tau=tau)
-            for machine, t, q, tau in (
-                (robot, self._own.t, rows[:, :n], rows[:, n:]),
-                (other, self._far.t, np.array(self._far.rows), None),
-            )
-        )
+        rows, far_rows = _averaged(self._own), _averaged(self._far)
+        t, q, tau = np.split(rows, [1, n + 1], axis=1)
+        own = Recording(joints=robot.joints, t=t[:, 0] - t[0, 0], q=q, tau=tau)
+        far = Recording(joints=other.joints, t=far_rows[:, 0] - t[0, 0], q=far_rows[:, 1:])
         return recorded_interaction_problem(
             self.machines, own, far, inertias=self._inertias, separate=separate, slack=slack
         )
