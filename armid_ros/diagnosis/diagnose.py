@@ -20,7 +20,7 @@ from armid_ros.diagnosis.search.spans import acting_spans
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.diagnosis.ties import diagnose_ties
 from armid_ros.diagnosis.verdict.attribution import Attribution, headline
-from armid_ros.diagnosis.verdict.bodies import as_bodies, on_outer_link
+from armid_ros.diagnosis.verdict.bodies import as_bodies, as_possible_loads, on_outer_link
 from armid_ros.diagnosis.verdict.finding import Diagnosis, Finding, Gap
 from armid_ros.diagnosis.verdict.naming import findings, minor_findings
 from armid_ros.diagnosis.verdict.remaining_misfit import (
@@ -235,7 +235,7 @@ def _as_diagnosis(
     """Convert an explanation to a diagnosis with findings, verdict, patched model and notes."""
     arm, settings, before = explainer.arm, explainer.settings, explainer.baseline
     explainer.tell(0.85, 'held-out gap')
-    explanation, of_bodies = as_bodies(on_outer_link(explanation))
+    explanation, of_bodies = as_bodies(as_possible_loads(on_outer_link(explanation)))
     explanation, shares, unseen = _with_shares(explanation, explainer)
     both = (explanation.evidence, *(() if unseen is None else (unseen,)))
     excess = RemainingMisfit(explanation, both, before, arm, settings)

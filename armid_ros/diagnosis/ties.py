@@ -21,7 +21,7 @@ from armid_ros.arm.memoized_arm import memoized_arm
 from armid_ros.diagnosis.data.evidence import Evidence, noise_floor
 from armid_ros.diagnosis.data.rows import Rows
 from armid_ros.diagnosis.search.cause import NamedEffect
-from armid_ros.diagnosis.search.comparison import grid_without_baseline
+from armid_ros.diagnosis.search.comparison import CauseComparison, grid_without_baseline
 from armid_ros.diagnosis.search.explainer import Explainer
 from armid_ros.diagnosis.search.explanation import explain, Explanation, has_no_gap, survey
 from armid_ros.diagnosis.search.joint_fit import Fitted, JointFit, parameter_ranges, patched_arm
@@ -72,13 +72,14 @@ def diagnose_ties(
         fitted = problem.fit(named)
         sigma = [noise_floor(part, fitted.arm).sigma for part in prepared.data]
         evidence = Evidence.over_noise(prepared.data, sigma)
-    candidates, invisible = _as_one_cause(explainer, evidence, partner, fitted)
+    rows, free = Rows.over_noise(evidence), [one for one in grid_without_baseline() if one.body]
+    comparison = explainer.comparison(rows, free)
+    candidates, invisible = _as_one_cause(comparison, partner, fitted)
     steps = candidates[:1] * len(named)
     found = Explanation(arm, fitted, problem.fit(), steps, evidence, problem)
     if not has_no_gap(found, replace(settings, material=0.0)):
         rest = replace(explainer, arm=memoized_arm(fitted.arm))
-        free = [one for one in grid_without_baseline() if one.body]
-        result = rest.comparison(Rows.over_noise(evidence), free).select()
+        result = rest.comparison(rows, free).select()
         found = explain(problem, evidence, result, settings, known=(fitted, steps))
     found = replace(found, candidates=candidates, invisible=invisible)
     return ties.without_bias(found)
@@ -230,30 +231,24 @@ def _with_springs(explanation: Explanation, found: Interaction) -> Fitted:
 
 
 def _as_one_cause(
-    explainer: Explainer, evidence: Evidence, partner: Partner, fitted: Fitted
+    comparison: CauseComparison, partner: Partner, fitted: Fitted
 ) -> tuple[tuple[CauseResult, ...], tuple[tuple[str, tuple[str, ...]], ...]]:
     """Test all springs to another machine as a single cause; return results as `survey` does."""
-    settings, robot = explainer.settings, explainer.arm.robot
-    free = [one for one in grid_without_baseline() if one.body]
-    comparison = explainer.comparison(Rows.over_noise(evidence), free)
-    result = comparison.initial()
-    loose = any(own.effect.shapes for own in fitted.named)
-    whole = partner.tied(robot, [own.effect.joints[0] for own in fitted.named], slack=loose)
+    nuisance, settings, result = comparison.nuisance, comparison.settings, comparison.initial()
+    ties = [own.effect for own in fitted.named]
+    loose = any(tie.shapes for tie in ties)
+    whole = partner.tied(nuisance.arm.robot, [tie.joints[0] for tie in ties], slack=loose)
     if loose:
-        whole = whole.with_shape([own.effect.shape for own in fitted.named])
+        whole = whole.with_shape([tie.shape for tie in ties])
     each = len(whole.quantities)
     kept = tuple(range(0, each * len(whole.joints), each))
-    arm, nuisance = memoized_arm(explainer.arm), comparison.nuisance
-    columns = [part.columns(arm, whole)[:, :, list(kept)] for part in nuisance.rows.data]
+    columns = [part.columns(nuisance.arm, whole)[:, :, list(kept)] for part in nuisance.rows.data]
     cause = comparison.catalogue.candidate(whole, kept, columns)
     assert cause is not None
     one = comparison.rank(cause, nuisance)
     ranking, material = result.first, settings.material
-    rivals = [
-        ranking.tested(other, material)
-        for other in ranking.ranked
-        if other.log_bayes_factor >= one.log_bayes_factor
-    ]
+    better = [x for x in ranking.ranked if x.log_bayes_factor >= one.log_bayes_factor]
+    rivals = [ranking.tested(other, material) for other in better]
     candidates, invisible = survey(result, settings)
     trial = replace(ranking.tested(one, material), probability=1.0 / (1.0 + len(rivals)))
     return (replace(trial, rivals=tuple(rivals)), *candidates), invisible

@@ -209,6 +209,9 @@ def expanded(request: dict[str, Any]) -> dict[str, str]:
         answer['error'] = 'the file cannot be expanded'
     except Exception as error:  # xacro evaluates Python expressions, which can raise any error
         answer['error'] = _reason(error, request, missing)
+        if arguments:
+            shown = ' '.join(f'{name}:={value}' for name, value in arguments.items())
+            answer['error'] += f'; its arguments are {shown}'
     return answer
 
 

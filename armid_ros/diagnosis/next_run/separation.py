@@ -13,6 +13,7 @@ jointly with the nuisance parameters.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.verdict.finding import Diagnosis
@@ -85,19 +86,8 @@ def _point_mass(robot: Robot, frame: str) -> FloatArray:
     return np.array(pin.Inertia(1.0, place, np.zeros((3, 3))).toDynamicParameters())
 
 
-@dataclass(frozen=True)
-class Separation:
-    """
-    Predicted separation of a named effect from a rival effect by a motion.
-
-    Attributes
-    ----------
-    name, rival : str
-        Names of the two effects.
-    z : float
-        z-score of the difference of their torques.
-
-    """
+class Separation(NamedTuple):
+    """Names of two effects, and the predicted z-score of the difference of their torques."""
 
     name: str
     rival: str

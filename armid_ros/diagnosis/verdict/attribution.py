@@ -67,9 +67,9 @@ def headline(
 
     Shares are cross-validated, and also measured on held-out recordings if there are any. A cause
     is minor if its larger share is below `least`, or its returned share below `inexact`, and no
-    joint has a gap without it: a cause may act in some motions only. It is minor as well if one of
-    its shares is below -`inexact`. The returned shares are those of held-out recordings if there
-    are any that show a cause.
+    joint has a gap without it: a cause may act in some motions only. It is minor as well if its
+    returned share is below -`inexact`. The returned shares are those of held-out recordings if
+    there are any that show a cause.
 
     Parameters
     ----------
@@ -99,7 +99,7 @@ def headline(
         opens = (fewer.chi2_per_row > limits) & (explanation.chi2_per_row <= limits)
         if not np.any(opens):
             return headline(fewer, unseen, least, settings)
-    worse = [k for k in causes if min(one.share([k]) for one in measured) < -inexact]
+    worse = [k for k in causes if stated[k] < -inexact]
     if worse:
         return headline(explanation.without(*worse), unseen, least, settings)
     seen = held_out is not None and held_out.share(causes) >= inexact

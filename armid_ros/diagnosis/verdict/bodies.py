@@ -13,12 +13,14 @@ from dataclasses import replace
 
 from armid_ros.diagnosis.search.cause import NamedEffect
 from armid_ros.diagnosis.search.explanation import Explanation
-from armid_ros.diagnosis.search.joint_fit import Fitted, JointFit
+from armid_ros.diagnosis.search.joint_fit import Fitted, JointFit, parameter_ranges
 from armid_ros.diagnosis.search.ranking import CauseResult
 from armid_ros.effects.quantities import MIN_Z_SCORE
 from armid_ros.errors import IdentificationError
 from armid_ros.identification.physical.fit_among_bodies import physical_program, PhysicalSettings
+from armid_ros.identification.physical.physical_program import nearest_body
 from armid_ros.model import LINK_PARAMETERS
+from armid_ros.model.pseudo_inertia import pseudo_inertia
 from armid_ros.motion import FloatArray
 from armid_ros.robots import Robot
 import numpy as np
@@ -76,6 +78,24 @@ def on_outer_link(explanation: Explanation) -> Explanation:
             found = replace(explanation, fitted=again, steps=(*steps[:k], moved, *steps[k + 1 :]))
             return on_outer_link(found)
     return explanation
+
+
+def as_possible_loads(explanation: Explanation) -> Explanation:
+    """Replace a physically impossible load by the most likely load that a body can have."""
+    fitted, named = explanation.fitted, list(explanation.fitted.named)
+    values, covariance = fitted.estimate.values.copy(), fitted.estimate.covariance
+    for k, (own, (kept, _)) in enumerate(zip(named, parameter_ranges(named), strict=True)):
+        errors, sign = covariance[np.ix_(kept, kept)], np.sign(own.values[0])  # put down: negative
+        if not own.effect.traits.weighs or len(kept) < 10 or not np.all(np.isfinite(errors)):
+            continue
+        if np.linalg.eigvalsh(sign * pseudo_inertia(own.values))[0] <= 0.0:
+            values[list(kept)] = sign * nearest_body(sign * own.values, errors)
+            named[k] = replace(own, values=values[list(kept)])
+    if explanation.problem is not None:
+        arm = explanation.problem.arm_at(named, fitted.means)
+        estimate = replace(fitted.estimate, values=values)
+        fitted = replace(fitted, arm=arm, named=tuple(named), estimate=estimate)
+    return replace(explanation, fitted=fitted)
 
 
 def as_bodies(explanation: Explanation) -> tuple[Explanation, tuple[str, ...]]:

@@ -152,9 +152,8 @@ class RemainingMisfit:
             usual = np.maximum(thresholds.same_fit * earlier, usual)
         surely = thresholds.surely
         ratios = (blocking_excess(arm, x, x.residuals(arm), surely) for x in self.data)
-        where = 'at rest or in a reversal'
-        more = ' and friction, as with a stop, a brake or a contact'
-        return [Excess(ratio / usual, where, more) for ratio in ratios]
+        where = 'at rest or in a reversal, as with a stop, a brake or a contact,'
+        return [Excess(ratio / usual, where) for ratio in ratios]
 
 
 def locate_blocked_joints(arm: ArmModel, excesses: Sequence[Excess]) -> tuple[Where, ...]:

@@ -83,14 +83,11 @@ class Excess:
         Mean square of the weighted residual over its limit; above one there is a gap.
     where : str
         Description of the data, for the middle of a sentence.
-    more : str
-        End of that sentence: further terms of the limit.
 
     """
 
     ratio: FloatArray
     where: str
-    more: str = ''
 
 
 def locate_explained(

@@ -82,7 +82,7 @@ def decide(
     joints, units, largest = arm.robot.joints, arm.robot.torque_units, int(np.argmax(worst.ratio))
     number = '' if gap is None else f' ({gap.after[largest]:.2g} {units[largest]})'
     error = f'the error of {joints[largest]}{number} {worst.where}'
-    size = f'{larger(np.sqrt(worst.ratio.max()))} the limit that follows from {floor}{worst.more}'
+    size = f'{larger(np.sqrt(worst.ratio.max()))} the limit that follows from {floor}'
     refit, known = _refit(given_body, arm.robot, floor), floor not in (NOISE, ESTIMATED)
     ratio = np.zeros(len(joints)) if gap is None else gap.after / np.maximum(gap.floor, 1e-12)
     above, at_floor = known and ratio.max() > _AT_FLOOR, f'is at the level of {floor}'

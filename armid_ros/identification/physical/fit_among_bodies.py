@@ -29,7 +29,6 @@ from armid_ros.model import BaseParameters
 from armid_ros.model.pseudo_inertia import Consistency, link_parameters, pseudo_inertia
 from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording
-from armid_ros.robots import Robot
 from armid_ros.robots.robot import PER_LINK
 import numpy as np
 import scipy.linalg
@@ -104,7 +103,7 @@ class PhysicalCertificate:
     misfit_ratio : float
         Weighted error on the training data, relative to the unconstrained fit's.
     notes : tuple of str
-        Assumptions on links without a body in the description, and masses far from described.
+        Assumptions on links without a body in the description.
     at_mass : tuple of str
         Links at the lower or upper limit of their mass.
 
@@ -300,7 +299,7 @@ def _fit_links(
         weight=weight,
         tried=tried,
         misfit_ratio=max(_misfit(whole, values) / least, 1.0),
-        notes=(*notes, *_far_from_described(arm.robot, rigid[:, 0])),
+        notes=notes,
         at_mass=tuple(arm.robot.links[k] for k in np.flatnonzero(off)),
     )
     predicted = tuple(part.torque(values) for part in problem)
@@ -315,25 +314,6 @@ def _walls_reached(parameters: FloatArray, box: Box) -> list[str]:
     near = box_conditions(box) @ parameters < _ACTIVE_SHARE * largest
     walls = [f'{side} {axis}' for side in ('lower', 'upper', 'spread along') for axis in 'xyz']
     return [wall for wall, at in zip(walls, near, strict=True) if at]
-
-
-def _far_from_described(robot: Robot, masses: FloatArray) -> tuple[str, ...]:
-    """Return a note on links whose mass [kg] differs much from the description; else empty."""
-    # ratio of a mass to the described one above which a note is given
-    heavy = 3.0
-    described = robot.rigid_parameters[::PER_LINK]
-    named = [
-        link
-        for link, known, mass in zip(robot.links, described, masses, strict=True)
-        if known > 0.0 and not known / heavy <= mass <= heavy * known
-    ]
-    if not named:
-        return ()
-    return (
-        f'masses that differ more than {heavy:g} times from the description: {", ".join(named)}; '
-        'compare them by armid check. Correct the description, or add missing parts, such as '
-        'rotors, springs or a load',
-    )
 
 
 def physical_program(

@@ -27,7 +27,8 @@ from itertools import combinations_with_replacement
 from typing import Any
 
 from armid_ros.errors import IdentificationError
-from armid_ros.model import BaseParameters
+from armid_ros.estimate import ParameterName
+from armid_ros.model import BaseParameters, LINK_PARAMETERS
 from armid_ros.model.pseudo_inertia import link_parameters, pseudo_inertia
 from armid_ros.motion import FloatArray
 from armid_ros.robots.robot import PER_LINK
@@ -219,6 +220,31 @@ class PhysicalProgram:
         offset = np.concatenate([np.zeros(36), np.tile([0.0, 1.0, 0.0], _DIAGONAL)])
         cones = [clarabel.PSDTriangleConeT(8), *[clarabel.ExponentialConeT()] * _DIAGONAL]
         return sparse.hstack(parts), np.tile(offset, self.n_links), cones * self.n_links
+
+
+def nearest_body(values: FloatArray, covariance: FloatArray) -> FloatArray:
+    """
+    Return the most likely inertial parameters (10,) of a body of positive density.
+
+    Parameters
+    ----------
+    values : ndarray, shape (10,)
+        Estimated inertial parameters, with a positive mass.
+    covariance : ndarray, shape (10, 10)
+        Their covariance.
+
+    """
+    mass, center = values[0], values[1:4] / values[0]
+    ball = np.diag([0.05**2] * 3 + [1.0])  # prior with a radius of gyration of 0.05 m
+    ball[:3, :3] += np.outer(center, center)
+    ball[:3, 3] = ball[3, :3] = center
+    none, names = np.empty(0), tuple(ParameterName(name, '', '') for name in LINK_PARAMETERS)
+    base = BaseParameters(names, names, np.arange(PER_LINK), np.eye(PER_LINK))
+    program = PhysicalProgram(base, link_parameters(mass * ball), none, none, None, {})
+    precision = np.linalg.inv(covariance)
+    products = np.column_stack([precision, precision @ values])
+    # the divergence has a hundredth of the weight of a squared standardised error
+    return program.solve(products, 1.0, 0.01)
 
 
 def box_conditions(box: Box) -> FloatArray:
