@@ -13,7 +13,7 @@ filtered. The equation between them remains valid.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -145,10 +145,8 @@ def regressions(
     """
     result = []
     for number, recording in enumerate(recordings, start=1):
-        for motion in segments(recording, used):
-            rest, unsure = held_samples(arm, motion)
+        for motion, unsure, rows in _sections(arm, recording, used):
             stacked = filtered_columns(arm, columns, motion, used, unsure)
-            rows = _rows(motion, used, rest, unsure)
             result.append(Regression(recording.source, *rows, stacked))
         if progress is not None:
             progress(number / len(recordings))
@@ -241,26 +239,23 @@ def by_stretch(problem: Sequence[Stretch], rows: FloatArray) -> list[FloatArray]
 
 def predictions(arm: ArmModel, recordings: Sequence[Recording], used: Conditioning) -> list[Fit]:
     """Return measured and predicted torque for each gap-free section of recordings."""
-    found = []
-    for recording in recordings:
-        for motion in segments(recording, used):
-            rest, unsure = held_samples(arm, motion)
-            torque = decimate(bridged(arm.torque(motion), unsure), used)
-            found.append(Fit(recording.source, *_rows(motion, used, rest, unsure), torque))
-    return found
+    return [
+        Fit(one.source, *rows, decimate(bridged(arm.torque(motion), unsure), used))
+        for one in recordings
+        for motion, unsure, rows in _sections(arm, one, used)
+    ]
 
 
-def _rows(
-    motion: Motion,
-    used: Conditioning,
-    rest: npt.NDArray[np.bool_],
-    unsure: npt.NDArray[np.bool_],
-) -> tuple[Motion, npt.NDArray[np.bool_]]:
-    """Return decimated motion and torque of a section, and a mask of samples not at rest."""
-    kept = np.array(decimated_samples(len(motion), used), dtype=np.intp)
-    assert motion.tau is not None
-    tau = decimate(bridged(motion.tau, unsure), used)
-    return motion.select(kept).with_torque(tau), ~rest[kept]
+def _sections(
+    arm: ArmModel, recording: Recording, used: Conditioning
+) -> Iterator[tuple[Motion, npt.NDArray[np.bool_], tuple[Motion, npt.NDArray[np.bool_]]]]:
+    """Yield each section: motion, `unsure`, and its decimated motion with samples not at rest."""
+    for motion in segments(recording, used):
+        rest, unsure = held_samples(arm, motion)
+        kept = np.array(decimated_samples(len(motion), used), dtype=np.intp)
+        assert motion.tau is not None
+        tau = decimate(bridged(motion.tau, unsure), used)
+        yield motion, unsure, (motion.select(kept).with_torque(tau), ~rest[kept])
 
 
 def filtered_columns(
