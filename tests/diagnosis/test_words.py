@@ -18,9 +18,9 @@ import pytest
 FLOOR = 'old misfit'
 
 
-def excess(bench, ratio, more=''):
+def excess(bench, ratio):
     """Return losses over their limits: one ratio in all joints, or one each."""
-    return Excess(np.ones(bench.robot.n_joints) * ratio, 'in the recordings', more)
+    return Excess(np.ones(bench.robot.n_joints) * ratio, 'in the recordings')
 
 
 def verdict(bench, *findings, left=0.5, given=None, minor=()):
