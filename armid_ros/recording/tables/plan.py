@@ -158,7 +158,7 @@ def plan(
         of_joints = f' of {", ".join(joints)}' if joints else ''
         raise RecordingError(
             f'{table.source}: no columns of positions{of_joints} were found; name the columns by '
-            f"--position 'q{{}}' or --position a,b,c. The columns are {table.listed()}"
+            f"--position 'q{{}}', a,b,c or '[1..6]' (from 0). The columns are {table.listed()}"
         )
     names = tuple(joints) if joints else position.joints(settings.rename)
     sliding = np.zeros(len(names), np.bool_) if slides is None else np.asarray(slides, np.bool_)
