@@ -61,7 +61,7 @@ def verdict(found: Reproduction) -> VerdictSection:
         held &= bool(gravity.mean() <= 1.0)  # % of the peak
         lines.append(
             f'{place}, the torque error is {digits(float(noisy.mean()))} % of the peak torque '
-            f'({digits(float(gravity.mean()))} % without noise); the paper has '
+            f'with noise, and {digits(float(gravity.mean()))} % without; the paper has '
             f'{digits(float(paper.mean()))} %.'
         )
     lines.append(f'The load in the hand is {_load(found)}; {LOAD:g} kg was simulated.')

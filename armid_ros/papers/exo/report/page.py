@@ -61,9 +61,10 @@ def verdict(found: Sequence[Interaction], walked: SimulatedWalk | None) -> Verdi
     """Return the verdict box: strap stiffness with interval, and joint errors of a gait cycle."""
     overall = found[0]
     stiffness, reach = overall.stiffness[0], HALF_WIDTH * overall.std[0]
+    true = '' if walked is None else f'; {walked.stiffness:.0f} N/m were simulated'
     sentences = [
-        'Stiffness of the straps between exoskeleton and wearer: '
-        f'{stiffness:.0f} ± {reach:.0f} N/m (95 %).'
+        f'Stiffness of all {len(found[-1].segments)} straps between exoskeleton and wearer: '
+        f'{stiffness:.0f} ± {reach:.0f} N/m (95 %){true}.'
     ]
     weak = [
         name.replace('_', ' ')
@@ -76,11 +77,8 @@ def verdict(found: Sequence[Interaction], walked: SimulatedWalk | None) -> Verdi
         sentences.append(
             f'Largest error of joints driven by their computed torques, in a gait cycle: {errors}.'
         )
-    beware = (
-        [f'{", ".join(weak)}: the strap extension is too small for an accuracy of 10 %.']
-        if weak
-        else []
-    )
+    small = 'the strap extension is too small for an accuracy of 10 %.'
+    beware = [f'{", ".join(weak)}: {small}'] if weak else []
     if stiffness - reach <= 0.0:
         return VerdictSection('no interaction', 'fair', ['No interaction was identified.'], beware)
     sure = reach < _MAX_HALF_WIDTH * stiffness
